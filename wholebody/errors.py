@@ -1,0 +1,46 @@
+"""Errors that people see: each is one sentence that says what is wrong, where, and how to mend it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class WholebodyError(Exception):
+    """Base of every error that wholebody raises on purpose."""
+
+
+class InputError(WholebodyError, ValueError):
+    """A value that cannot be used: wrong type, shape, sign or range, NaN, or an impossible combination."""
+
+
+class UnknownNameError(WholebodyError, KeyError):
+    """A name that does not exist, with the nearest names that do."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str], where: str = "") -> None:
+        """Build the sentence.
+
+        Args:
+            kind: what was looked for, singular: "frame", "joint", "object".
+            name: the name that was given.
+            known: every name that would have been right.
+            where: the place, such as "goal 2" or "task.toml, key goals[1].frame".
+        """
+        known = sorted(known)
+        near = get_close_matches(str(name), known, n=4, cutoff=0.4) or known[:6]
+        hint = f"did you mean {', '.join(near)}?" if near else "there are none."
+        place = f"{where}: " if where else ""
+        self.kind, self.name, self.known = kind, name, tuple(known)
+        super().__init__(f"{place}no {kind} is called {name!r}; {hint}")
+
+    def __str__(self) -> str:
+        """Return the sentence (KeyError would show its repr)."""
+        return str(self.args[0])
+
+
+class FileFormatError(WholebodyError, ValueError):
+    """A file that cannot be read, with its name and the place in it."""
+
+
+class MissingPackageError(WholebodyError, ImportError):
+    """An optional package that the call needs, with the command that installs it."""
