@@ -1,0 +1,119 @@
+"""One kinematic pass of a model: where everything is at a posture, and how it moves."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+class Wrench(NamedTuple):
+    """Rows of a Jacobian, as wrenches in the world frame.
+
+    Row i is ``rows[i] @ (V_joint - V_against)`` where V is a spatial velocity at the world's origin, linear part first.
+    A force direction n at the point p is the wrench ``[n, p x n]``; a pure rotation about n is ``[0, n]``.
+
+    Attributes:
+        rows: (m, 6) wrenches.
+        joint: index of the Pinocchio joint that carries what moves.
+        against: index of the joint that carries what it moves relative to; 0 is the world.
+    """
+
+    rows: Array
+    joint: int
+    against: int = 0
+
+
+class State:
+    """Placements and Jacobians of a model at one posture, from a single pass of Pinocchio.
+
+    The object is re-used: `update` overwrites everything that was read from it before.
+    """
+
+    def __init__(self, model: pin.Model) -> None:
+        """Allocate Pinocchio's data for `model`."""
+        self.model = model
+        self.data = model.createData()
+        self.q: Array = pin.neutral(model)
+        self.support = joint_support(model)
+        self.jacobian: Array = np.zeros((6, model.nv), order="F")
+        self._frames: dict[int, pin.SE3] = {}
+        self._center_of_mass: Array | None = None
+        self.update(self.q)
+
+    def update(self, q: Array) -> State:
+        """Move to the posture q, shape (nq,).
+
+        Raises:
+            InputError: q has the wrong shape, or a value that is not finite.
+        """
+        q = np.asarray(q, dtype=float)
+        if q.shape != (self.model.nq,):
+            raise InputError(f"a posture has shape ({self.model.nq},), not {q.shape}; start from figure.posture(...)")
+        if not np.isfinite(q).all():
+            raise InputError(f"posture entry {int(np.flatnonzero(~np.isfinite(q))[0])} is not finite; give finite numbers")
+        pin.computeJointJacobians(self.model, self.data, q)
+        self.q = q
+        self.jacobian = self.data.J
+        self._frames.clear()
+        self._center_of_mass = None
+        return self
+
+    def frame(self, index: int) -> pin.SE3:
+        """Placement in the world of the frame with this index."""
+        placement = self._frames.get(index)
+        if placement is None:
+            placement = self._frames[index] = pin.updateFramePlacement(self.model, self.data, index)
+        return placement
+
+    def rows(self, wrenches: Array, joint: NDArray[np.intp], against: NDArray[np.intp]) -> Array:
+        """Jacobian rows of k wrenches, each between its own two joints.
+
+        Args:
+            wrenches: (k, 6).
+            joint: (k,) joints that carry what moves.
+            against: (k,) joints it moves relative to; 0 is the world.
+
+        Returns:
+            (k, nv) rows for the tangent displacement of the posture.
+        """
+        return (wrenches @ self.jacobian) * (self.support[joint] - self.support[against])
+
+    def wrench_jacobian(self, wrench: Wrench) -> Array:
+        """Jacobian (m, nv) of one `Wrench`."""
+        return (wrench.rows @ self.jacobian) * (self.support[wrench.joint] - self.support[wrench.against])
+
+    def center_of_mass(self) -> Array:
+        """Centre of mass in the world, shape (3,), metres."""
+        if self._center_of_mass is None:
+            pin.centerOfMass(self.model, self.data, self.q)
+            self._center_of_mass = self.data.com[0].copy()
+        return self._center_of_mass
+
+    def center_of_mass_jacobian(self) -> Array:
+        """Jacobian of the centre of mass, shape (3, nv).
+
+        Works on data of its own, because Pinocchio's routine overwrites the joint Jacobians.
+        """
+        return np.array(pin.jacobianCenterOfMass(self.model, self._spare(), self.q))
+
+    def _spare(self) -> pin.Data:
+        if not hasattr(self, "_spare_data"):
+            self._spare_data = self.model.createData()
+        return self._spare_data
+
+
+def joint_support(model: pin.Model) -> Array:
+    """Which degrees of freedom move which joint: 0/1 array of shape (njoints, nv); the world's row is zero."""
+    support = np.zeros((model.njoints, model.nv))
+    for joint in range(1, model.njoints):
+        support[joint] = support[model.parents[joint]]
+        first = model.joints[joint].idx_v
+        support[joint, first : first + model.joints[joint].nv] = 1.0
+    return support

@@ -1,0 +1,1 @@
+"""How near things are: shapes, convex pieces, contacts, penetration, sweeps."""
