@@ -31,7 +31,7 @@ _LAZY: dict[str, str] = {
     "Figure": "wholebody.figures.figure",
 }
 
-__all__ = [  # noqa: PLE0604 - the lazy names are listed once, above
+__all__ = [
     "FileFormatError",
     "InputError",
     "MissingPackageError",
