@@ -1,0 +1,92 @@
+"""The parts of a triangle mesh that hang together, and whether each is closed."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.geometry.pieces import Array
+
+
+class Component(NamedTuple):
+    """One part of a mesh.
+
+    Attributes:
+        vertices: (n, 3), only those the part uses.
+        faces: (m, 3), turned outwards where the part is closed.
+        closed: every edge has exactly two faces, which pass along it in opposite directions.
+        volume: enclosed volume; of a part that is not closed, meaningless.
+    """
+
+    vertices: Array
+    faces: NDArray[np.int64]
+    closed: bool
+    volume: float
+
+
+def split_components(vertices: Array, faces: NDArray[np.int64]) -> list[Component]:
+    """Split a mesh where triangles do not share an edge.
+
+    Vertices at the same place are merged first (STL and normals in OBJ tear them apart), degenerate and repeated
+    triangles are dropped. A closed part that is turned inside out within another one is a cavity of that one and stays
+    with it.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    size = float(np.ptp(vertices, axis=0).max()) or 1.0
+    _, first, merged = np.unique(np.round(vertices / (1e-8 * size)), axis=0, return_index=True, return_inverse=True)
+    vertices, faces = vertices[first], merged.reshape(-1)[faces]
+    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
+    faces = faces[np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])]
+    if not len(faces):
+        return []
+    owner = np.repeat(np.arange(len(faces)), 3)
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, edge, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(edge.reshape(-1), kind="stable")
+    start = (np.cumsum(count) - count)[count == 2]
+    left, right = owner[order[start]], owner[order[start + 1]]
+    links = coo_matrix((np.ones(len(left)), (left, right)), shape=(len(faces), len(faces)))
+    number, label = connected_components(links, directed=False)
+    return _with_cavities([_component(vertices, faces[label == k]) for k in range(number)])
+
+
+def _component(vertices: Array, faces: NDArray[np.int64]) -> Component:
+    used, index = np.unique(faces, return_inverse=True)
+    corners, triangles = vertices[used], index.reshape(-1, 3).astype(np.int64)
+    directed = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    forward = np.unique(directed, axis=0)
+    closed = len(forward) == len(directed) and np.array_equal(forward, np.unique(directed[:, ::-1], axis=0))
+    a, b, c = (corners[triangles[:, k]] - corners.mean(axis=0) for k in range(3))
+    volume = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+    return Component(corners, triangles, closed, volume)
+
+
+def _with_cavities(parts: list[Component]) -> list[Component]:
+    """Give cavities to the part around them, and turn the closed parts that are inside out."""
+    solid = [part for part in parts if not part.closed or part.volume > 0]
+    for hollow in (part for part in parts if part.closed and part.volume <= 0):
+        low, high = hollow.vertices.min(axis=0), hollow.vertices.max(axis=0)
+        around = [
+            k
+            for k, part in enumerate(solid)
+            if part.closed
+            and part.volume > -hollow.volume
+            and (part.vertices.min(axis=0) <= low).all()
+            and (part.vertices.max(axis=0) >= high).all()
+        ]
+        if around:
+            k = min(around, key=lambda i: solid[i].volume)
+            outer = solid[k]
+            solid[k] = Component(
+                np.vstack([outer.vertices, hollow.vertices]),
+                np.vstack([outer.faces, hollow.faces + len(outer.vertices)]),
+                True,
+                outer.volume + hollow.volume,
+            )
+        elif hollow.volume < 0:
+            solid.append(Component(hollow.vertices, hollow.faces[:, ::-1].copy(), True, -hollow.volume))
+    return solid

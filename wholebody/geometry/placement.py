@@ -1,0 +1,82 @@
+"""Where something stands: every way of writing a placement, checked and turned into Pinocchio's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError
+
+PlacementLike: TypeAlias = Sequence[float] | NDArray[np.float64] | pin.SE3
+"""(x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 homogeneous matrix, or a ``pinocchio.SE3``."""
+
+ROUNDING = 1e-3
+"""How far a rotation may be from exact: numbers typed with four digits are repaired, anything worse is refused."""
+
+
+def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
+    """Read a placement, metres; the quaternion is x, y, z, w.
+
+    coal reads a NaN placement as touching and takes any matrix for a rotation, so both are refused here.
+
+    Args:
+        at: (3,) position, (7,) position and unit quaternion, (4, 4) homogeneous matrix, or ``pin.SE3``.
+        what: what is being placed, for the error's sentence.
+
+    Returns:
+        A fresh ``pin.SE3`` whose rotation is orthonormal to machine precision.
+
+    Raises:
+        InputError: another shape, a value that is not finite, a quaternion that is not of unit length, a matrix that is
+            not a rigid motion.
+    """
+    if isinstance(at, pin.SE3):
+        return _rigid(np.asarray(at.rotation), np.asarray(at.translation), what)
+    try:
+        values = np.asarray(at, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{what}: {at!r} is not made of numbers; give (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 or a pin.SE3"
+        ) from None
+    if values.shape == (3,):
+        return _rigid(np.eye(3), values, what)
+    if values.shape == (7,):
+        norm = float(np.linalg.norm(values[3:]))
+        if np.isfinite(norm) and abs(norm - 1.0) > ROUNDING:
+            raise InputError(f"{what}: the quaternion has length {norm:.6g}, not 1; give qx, qy, qz, qw of a rotation")
+        x, y, z, w = values[3:] / norm if np.isfinite(norm) else values[3:]
+        rotation = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+        return _rigid(rotation, values[:3], what)
+    if values.shape == (4, 4):
+        if np.isfinite(values).all() and np.abs(values[3] - (0.0, 0.0, 0.0, 1.0)).max() > ROUNDING:
+            raise InputError(f"{what}: the last row of the 4x4 matrix is {values[3].tolist()}, not [0, 0, 0, 1]")
+        return _rigid(values[:3, :3], values[:3, 3], what)
+    raise InputError(
+        f"{what}: shape {values.shape} is none of (3,) position, (7,) position and quaternion, (4, 4) matrix"
+    )
+
+
+def _rigid(rotation: NDArray[np.float64], translation: NDArray[np.float64], what: str) -> pin.SE3:
+    """Check both parts, and round the rotation to the nearest orthonormal matrix (polar decomposition)."""
+    if not (np.isfinite(rotation).all() and np.isfinite(translation).all()):
+        raise InputError(f"{what}: not every value is finite; give finite numbers")
+    error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+    if error > ROUNDING:
+        raise InputError(
+            f"{what}: the rotation is not orthonormal (off by {error:.3g}); give a rotation without scale or shear"
+        )
+    left, _, right = np.linalg.svd(rotation)
+    nearest = left @ right
+    if np.linalg.det(nearest) < 0:
+        raise InputError(f"{what}: the rotation is a reflection (determinant -1); give a right-handed rotation")
+    return pin.SE3(rotation.copy() if error < 1e-14 else nearest, translation.copy())

@@ -1,0 +1,239 @@
+"""The shapes people put around a figure: immutable, checked when they are made, each a union of convex pieces."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from wholebody.errors import InputError
+from wholebody.geometry.convex import ConvexPieces, check_mesh, check_points, convex_pieces, hull_piece
+from wholebody.geometry.meshes import Y_UP, read_mesh
+from wholebody.geometry.pieces import Array, Piece, check_length, check_vector
+
+__all__ = ["Box", "Capsule", "Ellipsoid", "HalfSpace", "Hull", "Mesh", "Piece", "Shape", "Sphere"]
+
+
+class Shape(ABC):
+    """A solid, in its own axes, metres."""
+
+    @abstractmethod
+    def pieces(self) -> tuple[Piece, ...]:
+        """Convex pieces whose union is the shape."""
+
+    @property
+    def added_volume(self) -> float:
+        """Volume that the convex pieces add to the shape, as a share of its own volume; 0 for an exact shape."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class Box(Shape):
+    """A cuboid, centred at its origin.
+
+    Attributes:
+        size: full lengths along x, y and z, metres.
+    """
+
+    size: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        x, y, z = check_vector(self.size, "Box size")
+        object.__setattr__(self, "size", tuple(check_length(side, "Box size") for side in (x, y, z)))
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """One coal Box."""
+        import coal
+
+        return (Piece(coal.Box(*self.size), pin.SE3.Identity(), math.prod(self.size)),)
+
+
+@dataclass(frozen=True)
+class Sphere(Shape):
+    """A ball, centred at its origin.
+
+    Attributes:
+        radius: metres.
+    """
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", check_length(self.radius, "Sphere radius"))
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """One coal Sphere."""
+        import coal
+
+        return (Piece(coal.Sphere(self.radius), pin.SE3.Identity(), 4.0 / 3.0 * math.pi * self.radius**3),)
+
+
+@dataclass(frozen=True)
+class Capsule(Shape):
+    """All points within a radius of a segment along z, centred at its origin.
+
+    Attributes:
+        radius: metres.
+        length: of the segment, without the two half balls, metres.
+    """
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", check_length(self.radius, "Capsule radius"))
+        object.__setattr__(self, "length", check_length(self.length, "Capsule length"))
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """One coal Capsule."""
+        import coal
+
+        volume = math.pi * self.radius**2 * (self.length + 4.0 / 3.0 * self.radius)
+        return (Piece(coal.Capsule(self.radius, self.length), pin.SE3.Identity(), volume),)
+
+
+@dataclass(frozen=True)
+class Ellipsoid(Shape):
+    """An ellipsoid, centred at its origin. Its distances are right to about 1e-7 m, those of other shapes to 1e-9.
+
+    Attributes:
+        semi_axes: half lengths along x, y and z, metres.
+    """
+
+    semi_axes: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        axes = check_vector(self.semi_axes, "Ellipsoid semi_axes")
+        object.__setattr__(self, "semi_axes", tuple(check_length(axis, "Ellipsoid semi_axes") for axis in axes))
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """One coal Ellipsoid."""
+        import coal
+
+        volume = 4.0 / 3.0 * math.pi * math.prod(self.semi_axes)
+        return (Piece(coal.Ellipsoid(*self.semi_axes), pin.SE3.Identity(), volume),)
+
+
+@dataclass(frozen=True)
+class HalfSpace(Shape):
+    """Everything on one side of a plane: the points x with normal . x <= offset are solid.
+
+    Attributes:
+        normal: out of the solid; made a unit vector.
+        offset: distance of the plane from the origin along the normal, metres.
+    """
+
+    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        normal = check_vector(self.normal, "HalfSpace normal")
+        length = math.hypot(*normal)
+        if not 1e-9 < length < 1e9:
+            raise InputError(
+                f"HalfSpace normal is {self.normal!r}; give a direction out of the solid, such as (0, 0, 1)"
+            )
+        offset, _, _ = check_vector((self.offset, 0.0, 0.0), "HalfSpace offset and two zeros")
+        object.__setattr__(self, "normal", tuple(x / length for x in normal))
+        object.__setattr__(self, "offset", offset)
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """One coal Halfspace, of infinite volume."""
+        import coal
+
+        return (Piece(coal.Halfspace(np.array(self.normal), self.offset), pin.SE3.Identity(), math.inf),)
+
+
+@dataclass(frozen=True, eq=False)
+class Hull(Shape):
+    """The convex hull of points.
+
+    Attributes:
+        points: (n, 3), metres; kept without duplicates, read-only.
+    """
+
+    points: Array
+
+    def __post_init__(self) -> None:
+        points = check_points(self.points, "Hull")
+        hull_piece(points, "Hull")
+        points.setflags(write=False)
+        object.__setattr__(self, "points", points)
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """One coal Convex."""
+        return (hull_piece(self.points, "Hull"),)
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh(Shape):
+    """A triangle mesh, split into convex pieces when they are first asked for.
+
+    Attributes:
+        source: path of an OBJ, STL, glTF or GLB file, or a pair of arrays (vertices (n, 3), faces (m, 3)).
+        scale: metres for each unit of the file: 0.001 for millimetres.
+        up: axis of the file that points up; "y" is turned so that it points along z, and the file's z along -y.
+        max_vertices: most vertices of a piece that comes out of a decomposition; convex parts keep all of theirs.
+        threshold: concavity that a decomposition may leave, as a share of the part's size: smaller is closer, with
+            more pieces.
+        vertices: (n, 3) scaled and turned, read-only.
+        faces: (m, 3), read-only.
+    """
+
+    source: str | Path | tuple[ArrayLike, ArrayLike]
+    scale: float = 1.0
+    up: Literal["z", "y"] = "z"
+    max_vertices: int = 32
+    threshold: float = 0.05
+    vertices: Array = field(init=False, repr=False)
+    faces: NDArray[np.int64] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        scale, _, _ = check_vector((self.scale, 0.0, 0.0), "Mesh scale and two zeros")
+        if scale <= 0.0:
+            raise InputError(f"Mesh scale is {self.scale!r}; give the metres of one unit of the file, such as 0.001")
+        if self.up not in ("z", "y"):
+            raise InputError(f"Mesh up is {self.up!r}; give 'z' or 'y'")
+        if isinstance(self.source, (str, Path)):
+            vertices, faces = read_mesh(self.source)
+        else:
+            try:
+                vertices, faces = self.source  # type: ignore[assignment]
+            except (TypeError, ValueError):
+                raise InputError(
+                    "Mesh source: give the path of a file, or a pair of arrays (vertices, faces)"
+                ) from None
+        vertices, faces = check_mesh(np.asarray(vertices, dtype=float) * scale, faces, self._name())
+        vertices = vertices @ Y_UP.T if self.up == "y" else vertices.copy()
+        faces = faces.copy()
+        vertices.setflags(write=False)
+        faces.setflags(write=False)
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces)
+
+    def _name(self) -> str:
+        return f"mesh {self.source}" if isinstance(self.source, (str, Path)) else "mesh"
+
+    def convexified(self) -> ConvexPieces:
+        """Pieces, added volume, and notes on the parts that could not be kept as they are."""
+        return convex_pieces(self.vertices, self.faces, self.max_vertices, self.threshold, self._name())
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """One coal Convex for each convex part, several for the others.
+
+        Raises:
+            InputError: nothing solid in the mesh, or max_vertices or threshold out of range.
+            MissingPackageError: a part is not convex and coacd is not installed.
+        """
+        return self.convexified().pieces
+
+    @property
+    def added_volume(self) -> float:
+        """Volume that the convex pieces add to the closed parts of the mesh, as a share of it."""
+        return self.convexified().added_volume
