@@ -1,0 +1,82 @@
+"""A scene around Pinocchio's sample humanoid, with only what terms ask of a scene."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wholebody.errors import UnknownNameError
+
+
+class StandInFigure:
+    """The part of a figure that terms use."""
+
+    def __init__(self, model: pin.Model) -> None:
+        self.model = model
+        self.root = "free"
+        self.neutral = pin.neutral(model)
+        weights = np.linspace(0.5, 2.0, model.nv)
+        weights[:6] = 0.0
+        self.effort_weights = weights
+        self.neutral_weights = weights[::-1].copy()
+        self.neutral_weights[:6] = 0.0
+        self.groups = {"left_arm": tuple(n for n in model.names if n.startswith("larm"))}
+        idx_v = np.arange(6, model.nv)
+        self.limits = SimpleNamespace(
+            idx_q=idx_v + 1, idx_v=idx_v, lower=np.full(idx_v.size, -1.6), upper=np.full(idx_v.size, 2.1)
+        )
+        self.cones: dict[str, Any] = {}
+
+    def frame_id(self, name: str) -> int:
+        if not self.model.existFrame(name):
+            raise UnknownNameError("frame", name, [frame.name for frame in self.model.frames])
+        return int(self.model.getFrameId(name))
+
+    def posture(self, name: str) -> Any:
+        if name != "standing":
+            raise UnknownNameError("posture", name, ["standing"])
+        return self.neutral.copy()
+
+    def dofs(self, names: Any) -> Any:
+        indices: list[int] = []
+        for name in names:
+            if name == "root":
+                indices += range(6)
+                continue
+            for joint_name in self.groups.get(name, (name,)):
+                if not self.model.existJointName(joint_name):
+                    raise UnknownNameError("joint or group", name, list(self.model.names))
+                joint = self.model.joints[self.model.getJointId(joint_name)]
+                indices += range(joint.idx_v, joint.idx_v + joint.nv)
+        return np.array(sorted(set(indices)), dtype=np.intp)
+
+    def tangent_bounds(self, q: Any) -> tuple[Any, Any]:
+        low, high = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
+        low[self.limits.idx_v] = self.limits.lower - q[self.limits.idx_q]
+        high[self.limits.idx_v] = self.limits.upper - q[self.limits.idx_q]
+        return low, high
+
+
+def humanoid() -> Any:
+    """A scene of Pinocchio's humanoid with box feet, free-flyer root."""
+    model = pin.buildSampleModelHumanoid()
+    geometry = pin.GeometryModel()
+    box = coal.Box(0.24, 0.1, 0.04)
+    for side in ("l", "r"):
+        joint = model.getJointId(f"{side}leg_wrist2_joint")
+        frame = model.addFrame(pin.Frame(f"{side}foot", joint, 0, pin.SE3.Identity(), pin.FrameType.BODY))
+        placement = pin.SE3(np.eye(3), np.array([0.05, 0.0, -0.06]))
+        geometry.addGeometryObject(pin.GeometryObject(f"{side}foot", joint, frame, placement, box))
+    tip = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.7, 1.1), np.array([0.02, 0.01, -0.2]))
+    model.addFrame(pin.Frame("tip", model.getJointId("larm_wrist2_joint"), 0, tip, pin.FrameType.OP_FRAME))
+    return SimpleNamespace(figure=StandInFigure(model), model=model, geometry=geometry)
+
+
+def random_posture(model: pin.Model, rng: np.random.Generator, spread: float = 1.0) -> Any:
+    """A posture far from neutral, root included."""
+    q = pin.integrate(model, pin.neutral(model), spread * rng.normal(size=model.nv))
+    return q

@@ -1,0 +1,111 @@
+"""A frame, or only its orientation, where it should be."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from wholebody.figures.state import State, Wrench
+from wholebody.geometry.placement import PlacementLike
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Goal, Mask, Surroundings, filled
+from wholebody.tasks.residuals import PlacementResidual
+
+
+@dataclass(frozen=True, eq=False)
+class Frame(Goal):
+    """Bring a frame to a place and an orientation.
+
+    The error is the place of the frame minus the target [m], then the rotation vector that leads from the target's
+    orientation to the frame's [rad], both in world axes. The vector is exact up to half a turn; at exactly half a turn
+    its direction is one of two that serve equally.
+
+    Attributes:
+        frame: name of the frame, segment or joint.
+        target: where it should be: (x, y, z) with the axes of the world, (x, y, z, qx, qy, qz, qw), a matrix (4, 4) or
+            a pin.SE3; metres.
+        weight: factor on the squared error [1/m^2 and 1/rad^2: a metre counts as much as a radian].
+
+    Raises:
+        InputError: the target is none of these, or not in metres.
+    """
+
+    frame: str
+    target: PlacementLike
+    _: KW_ONLY
+    weight: float = 1.0
+    _target: Any = field(init=False, repr=False)
+    _residual: PlacementResidual = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        where = f"Frame({self.frame!r})"
+        object.__setattr__(self, "_target", inputs.target_placement(self.target, f"{where}: target"))
+        object.__setattr__(self, "weight", inputs.positive(self.weight, f"{where}: weight"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Frame:
+        """Find the frame."""
+        place = inputs.find_place(scene, self.frame, "Frame")
+        return filled(self, _residual=PlacementResidual.build(place, self._target))
+
+    @property
+    def angular(self) -> Mask:
+        """(6,) the last three rows are in radians."""
+        return self._residual.angular
+
+    def error(self, state: State) -> Array:
+        """(6,) difference in place [m] and orientation [rad]."""
+        return self._residual.value(state)
+
+    def jacobian(self, state: State) -> Wrench:
+        """Six rows on the frame's joint."""
+        return self._residual.wrench(state)
+
+
+@dataclass(frozen=True, eq=False)
+class Orientation(Goal):
+    """Turn a frame to an orientation; its place is free.
+
+    The error is the rotation vector that leads from the target to the frame, in world axes [rad].
+
+    Attributes:
+        frame: name of the frame, segment or joint.
+        target: quaternion (x, y, z, w) or rotation matrix (3, 3) of the frame in the world.
+        weight: factor on the squared error [1/rad^2].
+
+    Raises:
+        InputError: the target is not a rotation.
+    """
+
+    frame: str
+    target: ArrayLike
+    _: KW_ONLY
+    weight: float = 1.0
+    _target: Any = field(init=False, repr=False)
+    _residual: PlacementResidual = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        where = f"Orientation({self.frame!r})"
+        object.__setattr__(self, "_target", inputs.target_rotation(self.target, f"{where}: target"))
+        object.__setattr__(self, "weight", inputs.positive(self.weight, f"{where}: weight"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Orientation:
+        """Find the frame."""
+        place = inputs.find_place(scene, self.frame, "Orientation")
+        return filled(self, _residual=PlacementResidual.build(place, self._target, position=False))
+
+    @property
+    def angular(self) -> Mask:
+        """(3,) all rows are in radians."""
+        return self._residual.angular
+
+    def error(self, state: State) -> Array:
+        """(3,) difference in orientation [rad]."""
+        return self._residual.value(state)
+
+    def jacobian(self, state: State) -> Wrench:
+        """Three rows on the frame's joint."""
+        return self._residual.wrench(state)

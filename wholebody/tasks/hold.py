@@ -1,0 +1,75 @@
+"""A frame that does not move."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from wholebody.figures.state import State, Wrench
+from wholebody.geometry.placement import PlacementLike
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Constraint, Mask, Surroundings, filled
+from wholebody.tasks.residuals import PlacementResidual, placement_between
+
+
+@dataclass(frozen=True, eq=False)
+class Hold(Constraint):
+    """Keep a frame at a place, in the world or relative to another frame of the figure.
+
+    Relative to another frame it closes a loop: two hands that carry one box, or the opposite hand on a two-handed tool.
+
+    Attributes:
+        frame: name of the frame, segment or joint.
+        at: where to keep it: (x, y, z) with the axes of the world or of `relative_to`, (x, y, z, qx, qy, qz, qw), a
+            matrix (4, 4) or a pin.SE3; metres. None keeps it where it is at the start.
+        orientation: False holds only the frame's origin and leaves it free to turn.
+        relative_to: name of the frame it must keep its place to; None for the world.
+
+    Raises:
+        InputError: `at` is none of these, or not in metres.
+    """
+
+    frame: str
+    at: PlacementLike | None = None
+    _: KW_ONLY
+    orientation: bool = True
+    relative_to: str | None = None
+    _at: Any = field(init=False, repr=False, default=None)
+    _residual: PlacementResidual = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if self.at is not None:
+            object.__setattr__(self, "_at", inputs.target_placement(self.at, f"Hold({self.frame!r}): at"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Hold:
+        """Find the frames, and where they are at the start."""
+        place = inputs.find_place(scene, self.frame, "Hold")
+        base = inputs.find_base(scene, self.relative_to, self.frame, "Hold")
+        at = self._at if self._at is not None else placement_between(scene, start, place, base)
+        return filled(self, _residual=PlacementResidual.build(place, at, base, orientation=self.orientation))
+
+    @property
+    def lower(self) -> Array:
+        """(m,) zeros."""
+        return np.zeros(6 if self.orientation else 3)
+
+    @property
+    def upper(self) -> Array:
+        """(m,) zeros."""
+        return np.zeros(6 if self.orientation else 3)
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) the last three of six rows are in radians."""
+        return self._residual.angular
+
+    def value(self, state: State) -> Array:
+        """(m,) difference in place [m] and orientation [rad]."""
+        return self._residual.value(state)
+
+    def jacobian(self, state: State) -> Wrench:
+        """Rows between the joint of the frame and that of the other."""
+        return self._residual.wrench(state)

@@ -1,0 +1,183 @@
+"""Checks of what people write into a term, and the search for the frames they name."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.geometry.placement import PlacementLike, placement
+from wholebody.tasks.base import Array, Surroundings
+
+FARTHEST = 100.0
+"""Distance [m] beyond which a place is taken for a slip of units: 0.1 m is 100 in millimetres, and nobody reaches 100 m."""
+
+SHORTEST_DIRECTION = 1e-9
+"""Length below which a vector has no direction: a millionth of a millimetre if it came from two points in metres."""
+
+
+class Place(NamedTuple):
+    """A frame of the model and the joint that carries it."""
+
+    frame: int
+    joint: int
+
+
+WORLD = Place(0, 0)
+"""Where nothing moves: Pinocchio's frame and joint 0."""
+
+
+def find_place(scene: Surroundings, name: str, where: str) -> Place:
+    """Look up a frame, or the joint of that name.
+
+    Args:
+        scene: the scene whose figure is meant.
+        name: a frame to reach with, a segment, or a joint.
+        where: the term that asks, for the message.
+
+    Raises:
+        UnknownNameError: the figure has neither.
+    """
+    model = scene.model
+    try:
+        frame = int(scene.figure.frame_id(name))
+    except UnknownNameError as error:
+        if not (isinstance(name, str) and model.existJointName(name)):
+            raise UnknownNameError(error.kind, error.name, error.known, where) from None
+        frame = int(model.getFrameId(name))
+    return Place(frame, int(model.frames[frame].parentJoint))
+
+
+def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> Place:
+    """Look up the frame that another is placed in; None is the world.
+
+    Raises:
+        UnknownNameError: the figure has no such frame.
+        InputError: both are carried by one joint, so nothing can move them to each other.
+    """
+    if name is None:
+        return WORLD
+    base = find_place(scene, name, where)
+    if base.joint == find_place(scene, moved, where).joint:
+        raise InputError(f"{where}: {moved!r} cannot move relative to {name!r}; name frames with a joint between them")
+    return base
+
+
+def find_dofs(scene: Surroundings, names: tuple[str, ...], where: str) -> Any:
+    """Tangent indices (k,) of joints and groups.
+
+    Raises:
+        UnknownNameError: the figure has no such joint or group.
+    """
+    try:
+        return np.asarray(scene.figure.dofs(names), dtype=np.intp)
+    except UnknownNameError as error:
+        raise UnknownNameError(error.kind, error.name, error.known, where) from None
+
+
+def numbers(value: object, shape: tuple[int, ...], where: str) -> Array:
+    """Read-only array of this shape with finite numbers.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{where} takes numbers of shape {shape}, not {value!r}") from None
+    if array.shape != shape:
+        raise InputError(f"{where} has shape {shape}, not {array.shape}; give {int(np.prod(shape))} numbers")
+    if not np.isfinite(array).all():
+        raise InputError(f"{where} is {array.tolist()}; give finite numbers")
+    array.flags.writeable = False
+    return array
+
+
+def point(value: object, where: str) -> Array:
+    """Place in space (3,), metres.
+
+    Raises:
+        InputError: not three finite numbers, or so far away that it cannot be in metres.
+    """
+    array = numbers(value, (3,), where)
+    check_reachable(array, where)
+    return array
+
+
+def check_reachable(place: Array, where: str) -> None:
+    """Refuse a place that cannot be in metres.
+
+    Raises:
+        InputError: it is farther than `FARTHEST` from the origin.
+    """
+    distance = float(np.linalg.norm(place))
+    if distance > FARTHEST:
+        raise InputError(f"{where} is {distance:.0f} m away; lengths are in metres, so divide millimetres by 1000")
+
+
+def direction(value: object, where: str) -> Array:
+    """Unit vector (3,) along the given one.
+
+    Raises:
+        InputError: not three finite numbers, or all of them zero.
+    """
+    array = numbers(value, (3,), where)
+    length = float(np.linalg.norm(array))
+    if length < SHORTEST_DIRECTION:
+        raise InputError(f"{where} is {array.tolist()} and has no direction; give a vector that is not zero")
+    unit = array / length
+    unit.flags.writeable = False
+    return unit
+
+
+def positive(value: object, where: str) -> float:
+    """A number greater than zero.
+
+    Raises:
+        InputError: it is none.
+    """
+    number = float(numbers(value, (), where))
+    if number <= 0.0:
+        raise InputError(f"{where} is {number:g}; give a positive number, or leave the term out")
+    return number
+
+
+def not_negative(value: object, where: str) -> float:
+    """A number that is zero or more.
+
+    Raises:
+        InputError: it is none.
+    """
+    number = float(numbers(value, (), where))
+    if number < 0.0:
+        raise InputError(f"{where} is {number:g}; give zero or more")
+    return number
+
+
+def target_placement(at: PlacementLike, where: str) -> Any:
+    """Placement (pin.SE3) that somebody wrote in any of the forms of `wholebody.geometry.placement.placement`.
+
+    Raises:
+        InputError: it is in none of them, or too far away to be in metres.
+    """
+    result = placement(at, where)
+    check_reachable(result.translation, where)
+    return result
+
+
+def target_rotation(value: ArrayLike, where: str) -> Any:
+    """Rotation, as a pin.SE3 without translation, from a quaternion (x, y, z, w) or a matrix (3, 3).
+
+    Raises:
+        InputError: it is neither, or not a rotation.
+    """
+    shape = np.shape(value)
+    if shape == (4,):
+        return target_placement((0.0, 0.0, 0.0, *numbers(value, (4,), where).tolist()), where)
+    if shape == (3, 3):
+        matrix = np.eye(4)
+        matrix[:3, :3] = numbers(value, (3, 3), where)
+        return target_placement(matrix, where)
+    raise InputError(f"{where} takes a quaternion (x, y, z, w) or a matrix (3, 3), not something of shape {shape}")

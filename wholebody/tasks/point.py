@@ -1,0 +1,63 @@
+"""A point of the figure at a place."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wholebody.figures.state import State, Wrench
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Goal, Mask, Surroundings, filled
+from wholebody.tasks.residuals import point_rows
+
+
+@dataclass(frozen=True, eq=False)
+class Point(Goal):
+    """Bring a point of a frame to a place; the orientation is free.
+
+    The error is the place of the point minus the target, in world axes [m].
+
+    Attributes:
+        frame: name of the frame, segment or joint.
+        target: (3,) place in the world [m].
+        offset: (3,) the point in the frame's own axes [m].
+        weight: factor on the squared error [1/m^2].
+
+    Raises:
+        InputError: a value is not finite, of the wrong shape or not in metres.
+    """
+
+    frame: str
+    target: ArrayLike
+    _: KW_ONLY
+    offset: ArrayLike = (0.0, 0.0, 0.0)
+    weight: float = 1.0
+    _place: inputs.Place = field(init=False, repr=False)
+    _target: Array = field(init=False, repr=False)
+    _offset: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        where = f"Point({self.frame!r})"
+        object.__setattr__(self, "_target", inputs.point(self.target, f"{where}: target"))
+        object.__setattr__(self, "_offset", inputs.point(self.offset, f"{where}: offset"))
+        object.__setattr__(self, "weight", inputs.positive(self.weight, f"{where}: weight"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Point:
+        """Find the frame."""
+        return filled(self, _place=inputs.find_place(scene, self.frame, "Point"))
+
+    @property
+    def angular(self) -> Mask:
+        """(3,) no row is in radians."""
+        return np.zeros(3, dtype=bool)
+
+    def error(self, state: State) -> Array:
+        """(3,) from the target to the point [m]."""
+        return np.asarray(state.frame(self._place.frame).act(self._offset) - self._target)
+
+    def jacobian(self, state: State) -> Wrench:
+        """Three forces along the world's axes, through the point."""
+        return Wrench(point_rows(state.frame(self._place.frame).act(self._offset)), self._place.joint)

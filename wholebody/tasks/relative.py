@@ -1,0 +1,69 @@
+"""Two frames that keep their places to each other."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any
+
+from wholebody.figures.state import State, Wrench
+from wholebody.geometry.placement import PlacementLike
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Goal, Mask, Surroundings, filled
+from wholebody.tasks.residuals import PlacementResidual, placement_between
+
+
+@dataclass(frozen=True, eq=False)
+class Relative(Goal):
+    """Bring a frame to a place relative to another frame of the figure, if it can be.
+
+    Use it for two hands on one object. Where it must hold always, use `Hold` with `relative_to`. The error is the place
+    minus the target [m], then the rotation vector from the target's orientation to the frame's [rad], both in the axes
+    of `to`.
+
+    Attributes:
+        frame: name of the frame, segment or joint that is placed.
+        to: name of the frame it is placed relative to.
+        placement: where it should be in the axes of `to`: (x, y, z), (x, y, z, qx, qy, qz, qw), a matrix (4, 4) or a
+            pin.SE3; metres. None keeps it as at the start.
+        orientation: False leaves the frame free to turn about its origin.
+        weight: factor on the squared error [1/m^2 and 1/rad^2].
+
+    Raises:
+        InputError: the placement is none of these, or not in metres.
+    """
+
+    frame: str
+    to: str
+    placement: PlacementLike | None = None
+    _: KW_ONLY
+    orientation: bool = True
+    weight: float = 1.0
+    _placement: Any = field(init=False, repr=False, default=None)
+    _residual: PlacementResidual = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        where = f"Relative({self.frame!r}, {self.to!r})"
+        if self.placement is not None:
+            object.__setattr__(self, "_placement", inputs.target_placement(self.placement, f"{where}: placement"))
+        object.__setattr__(self, "weight", inputs.positive(self.weight, f"{where}: weight"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Relative:
+        """Find the frames, and where they are to each other at the start."""
+        place = inputs.find_place(scene, self.frame, "Relative")
+        base = inputs.find_base(scene, self.to, self.frame, "Relative")
+        target = self._placement if self._placement is not None else placement_between(scene, start, place, base)
+        return filled(self, _residual=PlacementResidual.build(place, target, base, orientation=self.orientation))
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) the last three of six rows are in radians."""
+        return self._residual.angular
+
+    def error(self, state: State) -> Array:
+        """(m,) difference in place [m] and orientation [rad]."""
+        return self._residual.value(state)
+
+    def jacobian(self, state: State) -> Wrench:
+        """Rows between the two joints."""
+        return self._residual.wrench(state)

@@ -1,0 +1,122 @@
+"""Differences between where a frame is and where it should be, and their exact derivatives.
+
+A spatial velocity V = (v, w) has its linear part at the world's origin. A point p that moves with a joint has the
+velocity v + w x p, so its rows are ``[I, -skew(p)]``. A rotation R that moves with the joint becomes ``exp(w dt) R``;
+the rotation vector log3(R T') of its difference from a target T has the derivative J' w, in world axes, where
+J = Jlog3(R T') is the inverse of the right Jacobian of SO(3) and its transpose that of the left one (Chirikjian 2011,
+"Stochastic Models, Information Theory, and Lie Groups", vol. 2, section 10.6; Forster et al. 2017, "On-Manifold
+Preintegration for Real-Time Visual-Inertial Odometry", section III).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.figures.state import State, Wrench
+from wholebody.tasks.base import Array, Mask, Surroundings
+from wholebody.tasks.inputs import WORLD, Place
+
+
+def point_rows(point: Array) -> Array:
+    """Wrenches (3, 6) whose rows are the velocity of a moving point in the world's axes.
+
+    Written out because numpy's cross product costs twenty times as much on three rows.
+    """
+    rows: Array = np.eye(3, 6)
+    fill_point_rows(rows, point)
+    return rows
+
+
+def fill_point_rows(rows: Array, point: Array) -> None:
+    """Write -skew(point) into columns 3 to 5 of the first three rows, whose diagonal there is already zero."""
+    x, y, z = point.tolist()
+    rows[0, 4] = z
+    rows[0, 5] = -y
+    rows[1, 3] = -z
+    rows[1, 5] = x
+    rows[2, 3] = y
+    rows[2, 4] = -x
+
+
+class PlacementResidual(NamedTuple):
+    """How far one frame is from its place relative to another, in the axes of that other frame.
+
+    Rows: place (3, metres) where `position`, then rotation vector (3, radians) where `orientation`.
+
+    Attributes:
+        place: the frame that moves.
+        base: the frame it is compared in; the world by default.
+        target: (3,) place of the frame's origin in the base.
+        undo: rotation back from the target, as a placement without translation.
+        position: whether the place counts.
+        orientation: whether the rotation counts.
+    """
+
+    place: Place
+    base: Place
+    target: Array
+    undo: Any
+    position: bool
+    orientation: bool
+
+    @classmethod
+    def build(
+        cls, place: Place, target: Any, base: Place = WORLD, *, position: bool = True, orientation: bool = True
+    ) -> PlacementResidual:
+        """Compare `place` with the pin.SE3 `target` in the base."""
+        undo = pin.SE3(target.rotation.T, np.zeros(3))
+        return cls(place, base, target.translation.copy(), undo, position, orientation)
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) which rows are radians."""
+        return np.array([False] * 3 * self.position + [True] * 3 * self.orientation)
+
+    def value(self, state: State) -> Array:
+        """(m,) the difference."""
+        place = state.frame(self.place.frame)
+        if self.base.frame:
+            place = state.frame(self.base.frame).actInv(place)
+        if not self.orientation:
+            return np.asarray(place.translation - self.target)
+        if not self.position:
+            return np.asarray(pin.log3((place * self.undo).rotation))
+        result = np.empty(6)
+        np.subtract(place.translation, self.target, out=result[:3])
+        result[3:] = pin.log3((place * self.undo).rotation)
+        return result
+
+    def wrench(self, state: State) -> Wrench:
+        """Derivative of `value`: m rows between the two joints."""
+        place = state.frame(self.place.frame)
+        if self.base.frame:
+            rows = self._relative_rows(place, state.frame(self.base.frame))
+        else:
+            rows = np.zeros((3 * (self.position + self.orientation), 6))
+            if self.position:
+                rows[0, 0] = rows[1, 1] = rows[2, 2] = 1.0
+                fill_point_rows(rows, place.translation)
+            if self.orientation:
+                rows[-3:, 3:] = pin.Jlog3((place * self.undo).rotation).T
+        return Wrench(rows, self.place.joint, self.base.joint)
+
+    def _relative_rows(self, place: Any, base: Any) -> Array:
+        """Rows on the velocity of the frame minus that of the base, both at the world's origin, in the base's axes."""
+        turn = base.rotation.T
+        blocks = []
+        if self.position:
+            blocks.append(turn @ point_rows(place.translation))
+        if self.orientation:
+            rows = np.zeros((3, 6))
+            rows[:, 3:] = pin.Jlog3((base.actInv(place) * self.undo).rotation).T @ turn
+            blocks.append(rows)
+        return np.concatenate(blocks)
+
+
+def placement_between(scene: Surroundings, q: Array, place: Place, base: Place) -> Any:
+    """Placement (pin.SE3) of one frame in another at the posture q (nq,)."""
+    state = State(scene.model).update(q)
+    return state.frame(base.frame).actInv(state.frame(place.frame))
