@@ -1,0 +1,140 @@
+"""From sex, stature and mass to the lengths, masses and radii of a body.
+
+Lengths and masses are fractions (de Leva 1996; ANSUR II), radii are linear fits to ANSUR II,
+``r = c0 + cq sqrt(mass / stature) + cH stature``; the tables in ``figures/data`` name the source of every column.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures.tables import keyed, table
+
+Array = NDArray[np.float64]
+
+STATURE_RANGE = (1.3, 2.2)
+"""Metres. The fits come from adults of 1.4 to 2.0 m; beyond this range they are no longer a body."""
+
+MASS_RANGE = (25.0, 250.0)
+"""Kilograms."""
+
+BODY_MASS_INDEX_RANGE = (13.0, 60.0)
+"""kg / m^2. Outside, stature and mass do not belong to one living person: most likely a wrong unit."""
+
+_SEXES = {"male": "M", "female": "F"}
+
+# Expected mass at a stature, log-log fit to ANSUR II: mass = a stature^b.
+_EXPECTED_MASS = {"M": (27.41, 1.999), "F": (23.00, 2.192)}
+
+
+@dataclass(frozen=True)
+class Body:
+    """One person: everything else follows from these three.
+
+    Attributes:
+        sex: "male" or "female".
+        stature: metres.
+        mass: kilograms.
+    """
+
+    sex: str
+    stature: float
+    mass: float
+
+    @property
+    def column(self) -> str:
+        """Suffix of the tables' columns for this sex: "M" or "F"."""
+        return _SEXES[self.sex]
+
+    def segment(self, name: str, quantity: str) -> float:
+        """Return a number of the segment table for this sex, as it stands there (mostly a fraction of the stature)."""
+        return float(_row("segments", "name", name)[f"{quantity}_{self.column}"])
+
+    def length(self, segment: str) -> float:
+        """Length of a segment, metres."""
+        return self.segment(segment, "length") * self.stature
+
+    def segment_mass(self, segment: str) -> float:
+        """Mass of a segment, kilograms; all of them add up to the mass of the body."""
+        total = sum(float(row[f"mass_{self.column}"]) for row in table("segments"))
+        return self.segment(segment, "mass") / total * self.mass
+
+    def center_of_mass(self, segment: str) -> Array:
+        """Centre of mass of a segment in its own frame, shape (3,), metres."""
+        return self.length(segment) * np.array([self.segment(segment, f"com_{axis}") for axis in "xyz"])
+
+    def inertia(self, segment: str) -> Array:
+        """Principal moments about the centre of mass, along x, y, z, shape (3,), kg m^2: ``m (k l)^2``."""
+        gyration = np.array([self.segment(segment, f"k{axis}") for axis in "xyz"])
+        return self.segment_mass(segment) * (gyration * self.length(segment)) ** 2
+
+    def radius(self, part: str) -> float:
+        """Radius of a body part, metres: circumference / 2 pi, or half a breadth (``*_y``) or depth (``*_x``)."""
+        row = _row("radii_ansur", "part", part)
+        c0, cq, ch = (float(row[f"{self.column}_fit_{name}"]) for name in ("c0", "cq", "cH"))
+        return c0 + cq * math.sqrt(self.mass / self.stature) + ch * self.stature
+
+
+def body(sex: str = "male", stature: float | None = None, mass: float | None = None) -> Body:
+    """Return a checked `Body`.
+
+    Args:
+        sex: "male" or "female".
+        stature: metres; the median of the sex if left out.
+        mass: kilograms; if left out, the median of the sex, or the mass expected at the stature that was given.
+
+    Raises:
+        InputError: an unknown sex, or a number that no person has.
+    """
+    if not isinstance(sex, str) or sex.lower() not in _SEXES:
+        raise InputError(f"sex is {sex!r}; give 'male' or 'female'")
+    sex = sex.lower()
+    column = _SEXES[sex]
+    median = keyed("design_cases", "case")[f"{column}50"]
+    if mass is None and stature is not None:
+        factor, exponent = _EXPECTED_MASS[column]
+        mass = factor * _number("stature", stature, STATURE_RANGE, "m") ** exponent
+    height = _number("stature", float(median["stature_m"]) if stature is None else stature, STATURE_RANGE, "m")
+    weight = _number("mass", float(median["mass_kg_same_percentile"]) if mass is None else mass, MASS_RANGE, "kg")
+    index = weight / height**2
+    if not BODY_MASS_INDEX_RANGE[0] <= index <= BODY_MASS_INDEX_RANGE[1]:
+        low, high = (limit * height**2 for limit in BODY_MASS_INDEX_RANGE)
+        raise InputError(
+            f"mass {weight:g} kg does not go with stature {height:g} m; give a mass between {low:.0f} and {high:.0f} kg"
+        )
+    return Body(sex, height, weight)
+
+
+def design_cases() -> Mapping[str, Body]:
+    """Small, median and large women and men (5th, 50th, 95th percentile of stature and mass): "F5" ... "M95"."""
+    return {
+        row["case"]: body(
+            "male" if row["sex"] == "M" else "female", float(row["stature_m"]), float(row["mass_kg_same_percentile"])
+        )
+        for row in table("design_cases")
+    }
+
+
+def _row(name: str, column: str, key: str) -> Mapping[str, str]:
+    rows = keyed(name, column)
+    if key not in rows:
+        raise UnknownNameError("segment" if name == "segments" else "body part", key, rows)
+    return rows[key]
+
+
+def _number(name: str, value: Any, limits: tuple[float, float], unit: str) -> float:
+    low, high = limits
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not low <= number <= high:
+        raise InputError(f"{name} is {value!r}; give a number between {low:g} and {high:g} {unit}")
+    return number

@@ -1,0 +1,326 @@
+"""A figure: an articulated body with its geometry, and its joints by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures.reach_cones import ReachCone
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+ROOT_JOINT = "root_joint"
+
+
+class Chain(NamedTuple):
+    """Joints from the root outwards, and the frame at the end."""
+
+    joints: tuple[str, ...]
+    tip: str
+
+
+class JointCone(NamedTuple):
+    """Reach cone of a limb.
+
+    Attributes:
+        cone: directions that the limb can take.
+        reference: frame in which the cone stands.
+        limb: frame that carries the limb.
+        axis: (3,) unit direction of the limb in its own frame.
+    """
+
+    cone: ReachCone
+    reference: str
+    limb: str
+    axis: Array
+
+
+class ExcludedPair(NamedTuple):
+    """Two pieces that are never tested, and why."""
+
+    a: str
+    b: str
+    reason: str
+
+
+class Limits(NamedTuple):
+    """Limits of the joints with one degree of freedom that have them.
+
+    Attributes:
+        idx_q: (n,) places in the posture.
+        idx_v: (n,) places in the tangent.
+        lower: (n,) radians or metres.
+        upper: (n,)
+    """
+
+    idx_q: Indices
+    idx_v: Indices
+    lower: Array
+    upper: Array
+
+
+class Description(NamedTuple):
+    """What a figure knows beyond its model and geometry; all of it by name.
+
+    Attributes:
+        groups: group to joints, without the root.
+        chains: limbs, from the root outwards.
+        frames: names that people reach with.
+        segments: links with mass or geometry.
+        postures: name to a function that computes the posture of a figure.
+        cones: reach cones of ball joints.
+        collision_groups: segment to the group whose parts are never tested against each other; may be empty.
+        effort: joint to weight of its effort; joints that are not named have 1.
+        excluded: pairs of pieces that are not tested, with the reason.
+    """
+
+    groups: Mapping[str, tuple[str, ...]]
+    chains: Mapping[str, Chain]
+    frames: tuple[str, ...]
+    segments: tuple[str, ...]
+    postures: Mapping[str, Callable[[Figure], Array]]
+    cones: Mapping[str, JointCone] = MappingProxyType({})
+    collision_groups: Mapping[str, str] = MappingProxyType({})
+    effort: Mapping[str, float] = MappingProxyType({})
+    excluded: tuple[ExcludedPair, ...] = ()
+
+
+class Figure:
+    """An articulated body: Pinocchio's model and geometry, and names for everything one asks of them.
+
+    Attributes:
+        name: such as "human".
+        model: Pinocchio's model; `model.nq` numbers make a posture, `model.nv` a displacement.
+        geometry: the convex pieces and the pairs of them that can touch. A piece is called "<segment>" or "<segment>:<k>".
+        visual: what is drawn.
+        detail: "spheres", "capsules", "hulls", or "own" for the geometry of a URDF.
+        root: "free" (a floating base) or "fixed".
+        groups: group to joint names, without the root.
+        chains: limb to its joints from the root outwards, and the frame at its tip.
+        frames: names that people reach with.
+        segments: names of the links; they are frames too.
+        cones: reach cones of shoulders and hips.
+        collision_groups: segment to collision group ("torso_head", "left_arm", ...).
+        excluded_pairs: pairs of pieces that are never tested, with the reason.
+        limits: joint limits as arrays.
+        effort_weights: (nv,) weight of each degree of freedom in the effort; 0 for the root.
+        neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        model: pin.Model,
+        geometry: pin.GeometryModel,
+        detail: str,
+        description: Description,
+        visual: pin.GeometryModel | None = None,
+    ) -> None:
+        """Assemble a figure; `wholebody.load` is the usual way to get one."""
+        self.name, self.model, self.geometry, self.detail = name, model, geometry, detail
+        self.visual = geometry if visual is None else visual
+        self.groups = MappingProxyType(dict(description.groups))
+        self.chains = MappingProxyType(dict(description.chains))
+        self.frames, self.segments = description.frames, description.segments
+        self.cones = MappingProxyType(dict(description.cones))
+        self.collision_groups = MappingProxyType(dict(description.collision_groups))
+        self.excluded_pairs = description.excluded
+        self._description = description
+        self._made: dict[str, Array] = {}
+        first = model.joints[1] if model.njoints > 1 else None
+        self.root = "free" if first is not None and first.nq == 7 else "fixed"
+        self._frame_ids = {frame.name: index for index, frame in reversed(list(enumerate(model.frames)))}
+        self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
+        self.limits = _limits(model)
+        root = self.dofs(["root"]) if self.root == "free" else []
+        self.effort_weights = np.ones(model.nv)
+        for joint, weight in description.effort.items():
+            if joint in self._joint_ids:
+                self.effort_weights[self.dofs([joint])] = weight
+        self.neutral_weights = np.ones(model.nv)
+        self.effort_weights[root] = self.neutral_weights[root] = 0.0
+
+    def __repr__(self) -> str:
+        return (
+            f"Figure({self.name!r}, detail={self.detail!r}, root={self.root!r}, nq={self.model.nq}, nv={self.model.nv}, "
+            f"pieces={self.geometry.ngeoms}, pairs={len(self.geometry.collisionPairs)})"
+        )
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints in the model's order, without the free root."""
+        return tuple(name for name in list(self.model.names)[1:] if name != ROOT_JOINT)
+
+    @property
+    def postures(self) -> tuple[str, ...]:
+        """Names of the postures; the first one is where a problem starts if nothing else is said."""
+        return tuple(self._description.postures)
+
+    def posture(self, name: str) -> Array:
+        """Return a copy of a named posture, shape (nq,).
+
+        Raises:
+            UnknownNameError: with the nearest names.
+        """
+        if name not in self._description.postures:
+            raise UnknownNameError("posture", name, self.postures)
+        if name not in self._made:
+            self._made[name] = self._description.postures[name](self)
+        return self._made[name].copy()
+
+    @property
+    def neutral(self) -> Array:
+        """The posture of least discomfort, shape (nq,): the first named one."""
+        return self.posture(self.postures[0])
+
+    def frame_id(self, name: str) -> int:
+        """Return the index of a frame, a segment or a joint in `model.frames`.
+
+        Raises:
+            UnknownNameError: with the nearest names.
+        """
+        if name not in self._frame_ids:
+            raise UnknownNameError("frame", name, {*self.frames, *self.segments})
+        return self._frame_ids[name]
+
+    def joint_id(self, name: str) -> int:
+        """Return the index of a joint in the model; "root" is the free root.
+
+        Raises:
+            UnknownNameError: with the nearest names.
+        """
+        if name == "root" and self.root == "free":
+            return 1
+        if name not in self._joint_ids:
+            raise UnknownNameError("joint", name, self.joints)
+        return self._joint_ids[name]
+
+    def joint_names(self, names: str | Iterable[str]) -> tuple[str, ...]:
+        """Return joint names with groups replaced by their joints, each once, in the order given.
+
+        Raises:
+            UnknownNameError: neither a joint nor a group.
+        """
+        found: dict[str, None] = {}
+        for name in [names] if isinstance(names, str) else names:
+            if name in self.groups:
+                found.update(dict.fromkeys(self.groups[name]))
+            elif name in self._joint_ids or (name == "root" and self.root == "free"):
+                found[name] = None
+            else:
+                raise UnknownNameError("joint or group", name, {*self.joints, *self.groups, "root"})
+        return tuple(found)
+
+    def dofs(self, names: str | Iterable[str]) -> Indices:
+        """Return the places in the tangent, ascending, of joints and groups; "root" is the six of a free root.
+
+        Raises:
+            UnknownNameError: neither a joint nor a group.
+        """
+        places: set[int] = set()
+        for name in self.joint_names(names):
+            joint = self.model.joints[self.joint_id(name)]
+            places.update(range(joint.idx_v, joint.idx_v + joint.nv))
+        return np.array(sorted(places), dtype=np.intp)
+
+    def joint_values(self, q: Array) -> dict[str, float]:
+        """Return the value of each one-degree joint by name: radians, or metres for sliding joints."""
+        q = self._checked(q)
+        values = {}
+        for name in self.joints:
+            joint = self.model.joints[self._joint_ids[name]]
+            if joint.nq == 1:
+                values[name] = float(q[joint.idx_q])
+            elif (joint.nq, joint.nv) == (2, 1):
+                values[name] = float(np.arctan2(q[joint.idx_q + 1], q[joint.idx_q]))
+        return values
+
+    def with_joints(self, q: Array, values: Mapping[str, float]) -> Array:
+        """Return a copy of the posture q with some joints at other values.
+
+        Args:
+            q: (nq,).
+            values: joint name to radians (metres for sliding joints).
+
+        Raises:
+            UnknownNameError: a joint that does not exist.
+            InputError: a value that is not finite, or a joint with more than one degree of freedom.
+        """
+        q = self._checked(q).copy()
+        for name, value in values.items():
+            joint = self.model.joints[self.joint_id(name)]
+            number = float(value)
+            if not np.isfinite(number):
+                raise InputError(f"joint {name!r} is {value!r}; give a finite number")
+            if joint.nq == 1:
+                q[joint.idx_q] = number
+            elif (joint.nq, joint.nv) == (2, 1):
+                q[joint.idx_q : joint.idx_q + 2] = np.cos(number), np.sin(number)
+            else:
+                raise InputError(f"joint {name!r} has {joint.nv} degrees of freedom; set its part of the posture itself")
+        return q
+
+    def tangent_bounds(self, q: Array) -> tuple[Array, Array]:
+        """Return lower and upper bound, each (nv,), of the displacement of q within the limits; infinite where unlimited.
+
+        Where q is beyond a limit, both bounds have the sign of the way back.
+        """
+        lower, upper = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
+        idx_q, idx_v, low, high = self.limits
+        lower[idx_v], upper[idx_v] = low - q[idx_q], high - q[idx_q]
+        return lower, upper
+
+    def within_limits(self, q: Array, tolerance: float = 1e-9) -> bool:
+        """Whether every limited joint is within its limits, to a tolerance for rounding."""
+        value = self._checked(q)[self.limits.idx_q]
+        return bool(((value >= self.limits.lower - tolerance) & (value <= self.limits.upper + tolerance)).all())
+
+    def clamp(self, q: Array) -> Array:
+        """Return a copy of q with every limited joint moved to its nearest allowed value."""
+        q = self._checked(q).copy()
+        q[self.limits.idx_q] = np.clip(q[self.limits.idx_q], self.limits.lower, self.limits.upper)
+        return q
+
+    def reduced(self, joints: str | Sequence[str], posture: str | Array | None = None) -> Figure:
+        """Return a figure that keeps only some joints; the others are locked, and pairs that cannot move are dropped.
+
+        Args:
+            joints: joints and groups to keep; "root" keeps a free root, which is locked otherwise.
+            posture: where the others are locked: a name or an array (nq,); the first posture if left out.
+
+        Raises:
+            UnknownNameError: neither a joint nor a group, or an unknown posture.
+            InputError: no joint is left.
+        """
+        from wholebody.figures.reduction import reduce_figure
+
+        q = self.neutral if posture is None else self.posture(posture) if isinstance(posture, str) else posture
+        return reduce_figure(self, self.joint_names(joints), self._checked(q))
+
+    def describe(self) -> Description:
+        """Return what the figure knows beyond model and geometry, to build another one from it."""
+        return self._description
+
+    def _checked(self, q: Any) -> Array:
+        posture = np.asarray(q, dtype=float)
+        if posture.shape != (self.model.nq,):
+            raise InputError(f"a posture has shape ({self.model.nq},), not {posture.shape}; start from figure.posture(...)")
+        return posture
+
+
+def _limits(model: pin.Model) -> Limits:
+    rows = []
+    for joint in list(model.joints)[1:]:
+        if joint.nq == joint.nv == 1:
+            low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+            if np.isfinite(low) or np.isfinite(high):
+                rows.append((joint.idx_q, joint.idx_v, low, high))
+    columns = np.array(rows).reshape(-1, 4).T
+    return Limits(columns[0].astype(np.intp), columns[1].astype(np.intp), columns[2].copy(), columns[3].copy())

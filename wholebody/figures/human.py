@@ -1,0 +1,126 @@
+"""The person: a free root and 49 revolute joints (55 degrees of freedom), scaled from sex, stature and mass.
+
+Structure after Abdel-Malek & Arora, Human Motion Simulation: Predictive Dynamics (2013), fig. 2.26: spine 4 x 3, neck
+3 + 2, arms clavicle 2, shoulder 3, elbow 2, wrist 2, legs hip 3, knee 1, ankle 2, toe 1. Every joint's positive
+direction means the same on both sides: flexion, abduction, inward rotation, elevation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from wholebody.errors import UnknownNameError
+from wholebody.figures import human_capsules, human_hulls, human_spheres
+from wholebody.figures.anthropometry import Body, body
+from wholebody.figures.blueprint import Blueprint, Joint, Landmark, Link, Solid, place
+from wholebody.figures.measures import Measures
+from wholebody.figures.tables import table
+
+DETAILS: dict[str, Callable[[Measures], tuple[Solid, ...]]] = {
+    "spheres": human_spheres.solids,
+    "capsules": human_capsules.solids,
+    "hulls": human_hulls.solids,
+}
+
+
+
+def blueprint(person: Body | None = None, detail: str = "capsules") -> Blueprint:
+    """Return the blueprint of a person.
+
+    Args:
+        person: from `wholebody.figures.anthropometry.body`; the median man if left out.
+        detail: "spheres", "capsules" or "hulls": the collision pieces.
+
+    Raises:
+        UnknownNameError: another detail.
+    """
+    person = person or body()
+    return Blueprint(
+        name="human",
+        title=f"{person.sex}, stature {person.stature:g} m, mass {person.mass:g} kg; written by wholebody from its tables",
+        links=_links(person),
+        joints=_joints(person),
+        landmarks=landmarks(Measures(person)),
+        solids=human_solids(person, detail),
+    )
+
+
+def human_solids(person: Body, detail: str) -> tuple[Solid, ...]:
+    """Return the collision pieces of a person in one detail.
+
+    Raises:
+        UnknownNameError: a detail other than "spheres", "capsules", "hulls".
+    """
+    if detail not in DETAILS:
+        raise UnknownNameError("detail", detail, DETAILS)
+    return DETAILS[detail](Measures(person))
+
+
+def _links(person: Body) -> tuple[Link, ...]:
+    massive = {row["name"] for row in table("segments")}
+    names = ["pelvis", *(row["child_segment"] for row in table("joints"))]
+    return tuple(_link(person, name) if name in massive else Link(name) for name in names)
+
+
+def _link(person: Body, segment: str) -> Link:
+    x, y, z = (float(value) for value in person.center_of_mass(segment))
+    ix, iy, iz = (float(value) for value in person.inertia(segment))
+    return Link(segment, person.segment_mass(segment), (x, y, z), (ix, iy, iz))
+
+
+def _joints(person: Body) -> tuple[Joint, ...]:
+    rows = table("joints")
+    child = {row["name"]: row["child_segment"] for row in rows} | {"root": "pelvis"}
+    joints = []
+    for row in rows:
+        x, y, z = (float(row[f"o{axis}_{person.column}"]) * person.stature for axis in "xyz")
+        a, b, c = (float(value) for value in row["axis"].split())
+        low, high = math.radians(float(row["lower_deg"])), math.radians(float(row["upper_deg"]))
+        joints.append(
+            Joint(row["name"], child[row["parent"]], row["child_segment"], place(x, y, z), (a, b, c), low, high)
+        )
+    return tuple(joints)
+
+
+def landmarks(size: Measures) -> tuple[Landmark, ...]:
+    """Frames to reach with.
+
+    - ``<side>_palm``: on the skin in the middle of the palm; x along the fingers, z out of the palm.
+    - ``<side>_index_tip``: end of the index finger; axes as the palm.
+    - ``<side>_shoulder`` ... ``<side>_ankle``: joint centres, on the segment nearer the root, with its axes.
+    - ``<side>_heel``, ``<side>_ball``, ``<side>_sole``, ``<side>_toe_tip``: on the ground below the foot; x forward, z up.
+    - ``head_top``: on the vertex; ``gaze``: between the eyes, x in the direction of looking.
+    """
+    marks = [
+        Landmark("head_top", "head", place(size.head_x, 0.0, size.head_top)),
+        Landmark("gaze", "head", place(size.eye_x, 0.0, size.eye_z)),
+    ]
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        # Hanging hand: fingers -z, palm towards the thigh, which is -y on the left.
+        palm = np.column_stack([[0.0, 0.0, -1.0], [sign, 0.0, 0.0], [0.0, -sign, 0.0]])
+        length, thick, index = size.palm_length, size.palm_half_thickness, size.index
+        marks += [
+            Landmark(f"{side}_palm", f"{side}_hand", place(0.0, -sign * thick, -0.6 * length, palm)),
+            Landmark(f"{side}_index_tip", f"{side}_hand", place(index.x, 0.0, -index.tip, palm)),
+            Landmark(f"{side}_shoulder", f"{side}_clavicle", place(*size.joint(f"{side}_shoulder_flexion"))),
+            Landmark(f"{side}_elbow", f"{side}_upper_arm", place(*size.joint(f"{side}_elbow_flexion"))),
+            Landmark(f"{side}_wrist", f"{side}_forearm", place(*size.joint(f"{side}_wrist_flexion"))),
+            Landmark(f"{side}_hip", "pelvis", place(*size.joint(f"{side}_hip_flexion"))),
+            Landmark(f"{side}_knee", f"{side}_thigh", place(*size.joint(f"{side}_knee_flexion"))),
+            Landmark(f"{side}_ankle", f"{side}_shank", place(*size.joint(f"{side}_ankle_dorsiflexion"))),
+            Landmark(f"{side}_heel", f"{side}_foot", place(size.heel_x, 0.0, size.sole)),
+            Landmark(f"{side}_sole", f"{side}_foot", place(0.5 * (size.heel_x + size.toe_joint_x), 0.0, size.sole)),
+            Landmark(f"{side}_ball", f"{side}_foot", place(size.toe_joint_x, 0.0, size.sole)),
+            Landmark(f"{side}_toe_tip", f"{side}_toes", place(size.toe_length, 0.0, -size.toe_half_height)),
+        ]
+    return tuple(marks)
+
+
+def reference_posture_names() -> tuple[str, ...]:
+    """Joint names in the order of the tables (spine, right arm, left arm, neck, right leg, left leg)."""
+    return tuple(row["name"] for row in table("joints"))
+
+

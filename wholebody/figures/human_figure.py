@@ -1,0 +1,103 @@
+"""The person as a figure: groups, chains, cones, postures."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from wholebody.figures import postures
+from wholebody.figures.anthropometry import body
+from wholebody.figures.assembly import geometry_of, model_of
+from wholebody.figures.blueprint import Blueprint
+from wholebody.figures.figure import Chain, Description, ExcludedPair, Figure, JointCone
+from wholebody.figures.human import blueprint
+from wholebody.figures.human_pairs import body_pairs, collision_group, sphere_pairs
+from wholebody.figures.reach_cones import ReachCone
+from wholebody.figures.tables import table
+
+
+def human_figure(
+    sex: str = "male", stature: float | None = None, mass: float | None = None, detail: str = "capsules"
+) -> Figure:
+    """Return the person.
+
+    Args:
+        sex: "male" or "female".
+        stature: metres; the median of the sex if left out.
+        mass: kilograms; the median, or what is expected at the stature that was given.
+        detail: "spheres" (39, for whole motions), "capsules" (with boxes for hands and feet), "hulls" (convex polyhedra).
+
+    Raises:
+        InputError: an impossible body.
+        UnknownNameError: an unknown detail.
+    """
+    return figure_of(blueprint(body(sex, stature, mass), detail), detail)
+
+
+def figure_of(plan: Blueprint, detail: str) -> Figure:
+    """Return the figure of a human blueprint, whole or with some joints fixed."""
+    model = model_of(plan)
+    tested, excluded = (sphere_pairs if detail == "spheres" else body_pairs)(plan.solids)
+    geometry = geometry_of(model, plan.solids, tested)
+    joints = {joint.name for joint in plan.joints if joint.axis is not None}
+    segments = tuple(link.name for link in plan.links if link.mass)
+    description = Description(
+        groups=human_groups(joints),
+        chains=human_chains(joints),
+        frames=tuple(mark.name for mark in plan.landmarks),
+        segments=segments,
+        postures={name: partial(postures.stand, attitude=attitude) for name, attitude in postures.HUMAN.items()},
+        cones=human_cones(),
+        collision_groups={segment: collision_group(segment) for segment in segments},
+        effort={row["name"]: float(row["effort_weight"]) for row in table("joints")},
+        excluded=tuple(ExcludedPair(*entry) for entry in excluded),
+    )
+    return Figure(plan.name, model, geometry, detail, description)
+
+
+def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
+    """Return the joint groups; the upper body is spine and arms (requirement of self-avoidance), not the neck."""
+    names = [row["name"] for row in table("joints") if row["name"] in joints]
+    groups = {"spine": tuple(name for name in names if name.startswith("spine"))}
+    groups["neck"] = tuple(name for name in names if name.startswith("neck"))
+    for side in ("left", "right"):
+        for limb, parts in _LIMBS.items():
+            starts = tuple(f"{side}_{part}_" for part in parts)
+            groups[f"{side}_{limb}"] = tuple(name for name in names if name.startswith(starts))
+    groups["arms"] = groups["left_arm"] + groups["right_arm"]
+    groups["legs"] = groups["left_leg"] + groups["right_leg"]
+    groups["upper_body"] = groups["spine"] + groups["arms"]
+    groups["lower_body"] = groups["legs"]
+    return {name: members for name, members in groups.items() if members}
+
+
+_LIMBS = {"arm": ("clavicle", "shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "ankle", "toe")}
+
+
+def human_chains(joints: set[str]) -> dict[str, Chain]:
+    """Return the limbs from the root outwards, with their tips."""
+    groups = human_groups(joints)
+    tips = {
+        "spine": "thorax",
+        "neck": "head_top",
+        "left_arm": "left_index_tip",
+        "right_arm": "right_index_tip",
+        "left_leg": "left_toe_tip",
+        "right_leg": "right_toe_tip",
+    }
+    return {name: Chain(groups[name], tip) for name, tip in tips.items() if name in groups}
+
+
+def human_cones() -> dict[str, JointCone]:
+    """Return the reach cones of shoulders (humerus in the thorax) and hips (femur in the pelvis)."""
+    down = np.array([0.0, 0.0, -1.0])
+    cones = {}
+    for joint, reference, limb in (("shoulder", "thorax", "upper_arm"), ("hip", "pelvis", "thigh")):
+        rows = [row for row in table("reach_cones") if row["joint"] == joint]
+        point = {row["vertex"]: [float(row[axis]) for axis in "xyz"] for row in rows}
+        visible = point.pop("visible_point")
+        right = ReachCone(list(point.values()), visible)
+        cones[f"right_{joint}"] = JointCone(right, reference, f"right_{limb}", down)
+        cones[f"left_{joint}"] = JointCone(right.mirrored(), reference, f"left_{limb}", down)
+    return cones

@@ -1,0 +1,93 @@
+"""Which pieces of the person can touch: everything across the body, but not neighbours, which overlap where flesh meets."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+from wholebody.figures.blueprint import Solid
+from wholebody.figures.human_spheres import sphere_names
+from wholebody.figures.tables import table
+
+TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")
+
+Pairs = tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str, str], ...]]
+"""Pairs that are tested, and (a, b, reason) of those that are not."""
+
+_TRUNK = "parts of the trunk and head meet along the spine"
+_NEIGHBOURS = "neighbours that overlap at their joint"
+_SHOULDER = "the shoulder lies on the ribs"
+_HIP = "the thigh presses on pelvis and belly"
+_THIGHS = "the upper thighs rest against each other"
+_SAME = "same segment"
+
+_NEXT = {
+    frozenset(pair)
+    for pair in (
+        ("clavicle", "upper_arm"),
+        ("upper_arm", "forearm"),
+        ("forearm", "hand"),
+        ("thigh", "shank"),
+        ("shank", "foot"),
+        ("foot", "toes"),
+        ("shank", "toes"),
+    )
+}
+
+
+def body_pairs(solids: tuple[Solid, ...]) -> Pairs:
+    """Return tested and excluded pairs of the capsules' and hulls' pieces."""
+    tested, excluded = [], []
+    for a, b in combinations(solids, 2):
+        reason = _reason(a, b) or _reason(b, a)
+        if reason:
+            excluded.append((a.name, b.name, reason))
+        else:
+            tested.append((a.name, b.name))
+    return tuple(tested), tuple(excluded)
+
+
+def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
+    """Return tested and excluded pairs of the 39 spheres: across the five groups only, without the named exclusions."""
+    names = sphere_names()
+    group = {names[row["name"]]: row["group"] for row in table("spheres39")}
+    named = {frozenset((names[row["a"]], names[row["b"]])) for row in table("sphere_exclusions")}
+    tested, excluded = [], []
+    for a, b in combinations(solids, 2):
+        if group[a.name] == group[b.name]:
+            excluded.append((a.name, b.name, "same group of spheres"))
+        elif frozenset((a.name, b.name)) in named:
+            excluded.append((a.name, b.name, "limbs meet the trunk"))
+        else:
+            tested.append((a.name, b.name))
+    return tuple(tested), tuple(excluded)
+
+
+def _reason(a: Solid, b: Solid) -> str | None:
+    """Why the pair (a, b), in this order, is not tested; None if it is."""
+    if a.segment == b.segment:
+        return _SAME
+    if a.segment in TRUNK and b.segment in TRUNK:
+        return _TRUNK
+    side_a, _, part_a = a.segment.partition("_")
+    side_b, _, part_b = b.segment.partition("_")
+    if side_a == side_b and frozenset((part_a, part_b)) in _NEXT:
+        return _NEIGHBOURS
+    if part_b == "clavicle" and (part_a == "clavicle" or (a.segment in TRUNK and a.segment != "head")):
+        return _SHOULDER
+    if b.name.endswith("_upper_arm:0") and a.segment in ("thorax", "lower_thorax", "neck"):
+        return _SHOULDER
+    if part_b == "thigh" and a.segment == "pelvis":
+        return _HIP
+    if b.name.endswith("_thigh:0") and a.segment in ("lower_lumbar", "upper_lumbar"):
+        return _HIP
+    if a.name.endswith("_thigh:0") and b.name.endswith("_thigh:0"):
+        return _THIGHS
+    return None
+
+
+def collision_group(segment: str) -> str:
+    """Group of a segment for self-collision: "torso_head", "left_arm", "right_arm", "left_leg" or "right_leg"."""
+    side, _, part = segment.partition("_")
+    if side in ("left", "right") and part != "clavicle":
+        return f"{side}_{'arm' if part in ('upper_arm', 'forearm', 'hand') else 'leg'}"
+    return "torso_head"

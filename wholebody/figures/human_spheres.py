@@ -1,0 +1,44 @@
+"""The 39 spheres in five groups that whole motions are tested with (Degenhardt's thesis, section 3.3.1).
+
+Layout and radii are estimates calibrated on ANSUR II; other builds scale the radius with the square root of mass per stature.
+"""
+
+from __future__ import annotations
+
+import math
+
+import coal
+
+from wholebody.figures.blueprint import Solid, place
+from wholebody.figures.measures import Measures
+from wholebody.figures.tables import table
+
+# Mass per stature of the median man and woman of ANSUR II, kg / m, for which the table's radii hold.
+_MEDIAN = {"M": 48.2, "F": 41.1}
+
+
+def solids(size: Measures) -> tuple[Solid, ...]:
+    """Return the 39 spheres of a person; the feet's are lifted to rest on the soles' plane."""
+    person = size.body
+    build = math.sqrt(person.mass / person.stature / _MEDIAN[person.column])
+    count: dict[str, int] = {}
+    spheres = []
+    for row in table("spheres39"):
+        segment = row["segment"]
+        k = count[segment] = count.get(segment, -1) + 1
+        radius = float(row[f"radius_{person.column}"]) * person.stature * build
+        x, y, z = (float(row[f"offset_{axis}"]) * person.stature for axis in "xyz")
+        if segment.endswith("_foot"):
+            z = size.sole + radius
+        spheres.append(Solid(f"{segment}:{k}", segment, coal.Sphere(radius), place(x, y, z)))
+    return tuple(spheres)
+
+
+def sphere_names() -> dict[str, str]:
+    """Name of the piece in the figure ("left_forearm:1") of each sphere's name in the tables ("left_forearm")."""
+    count: dict[str, int] = {}
+    names = {}
+    for row in table("spheres39"):
+        k = count[row["segment"]] = count.get(row["segment"], -1) + 1
+        names[row["name"]] = f"{row['segment']}:{k}"
+    return names

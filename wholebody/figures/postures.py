@@ -1,0 +1,147 @@
+"""Named postures of the person, in degrees, and where the root stands for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from wholebody.figures.figure import Figure
+
+Array = NDArray[np.float64]
+
+GAP = 0.004
+"""Metres that a named posture leaves between any two pieces; elbows and legs are moved outwards where a build needs it."""
+
+_SPREAD_STEP = math.radians(1.0)
+_SPREAD_STEPS = 45
+
+
+class Attitude(NamedTuple):
+    """Joint angles in degrees and the pitch of the pelvis; the lowest piece is then put on the ground.
+
+    A name without a side, such as "shoulder_abduction", means both sides.
+    """
+
+    degrees: Mapping[str, float]
+    pitch: float = 0.0
+
+
+_ARMS = {"shoulder_abduction": 11.0, "elbow_flexion": 15.0}
+
+HUMAN: dict[str, Attitude] = {
+    "standing": Attitude(_ARMS),
+    "a_pose": Attitude({"shoulder_abduction": 45.0}),
+    "t_pose": Attitude({"shoulder_abduction": 90.0}),
+    "arms_forward": Attitude({"shoulder_flexion": 90.0}),
+    "hands_up": Attitude({"shoulder_flexion": 165.0, "elbow_flexion": 10.0}),
+    "sitting": Attitude(
+        {"hip_flexion": 90.0, "knee_flexion": 90.0, "hip_abduction": 6.0, "shoulder_abduction": 16.0, "elbow_flexion": 20.0}
+    ),
+    "squatting": Attitude(
+        {
+            "hip_flexion": 105.0,
+            "hip_abduction": 15.0,
+            "knee_flexion": 110.0,
+            "ankle_dorsiflexion": 30.0,
+            "spine1_flexion": 10.0,
+            "spine2_flexion": 10.0,
+            "shoulder_flexion": 80.0,
+            "elbow_flexion": 15.0,
+        },
+        pitch=25.0,
+    ),
+    "kneeling": Attitude({"knee_flexion": 90.0, "ankle_dorsiflexion": -50.0, **_ARMS}),
+    "lunge": Attitude(
+        {
+            "left_hip_flexion": 70.0,
+            "left_knee_flexion": 70.0,
+            "right_hip_flexion": -15.0,
+            "right_knee_flexion": 45.0,
+            "right_ankle_dorsiflexion": 20.0,
+            "right_toe_extension": 40.0,
+            **_ARMS,
+        }
+    ),
+    "prone": Attitude({"shoulder_abduction": 25.0, "elbow_flexion": 0.0, "ankle_dorsiflexion": -50.0}, pitch=90.0),
+    "supine": Attitude({"shoulder_abduction": 25.0, "elbow_flexion": 0.0, "ankle_dorsiflexion": -20.0}, pitch=-90.0),
+}
+
+
+def stand(figure: Figure, attitude: Attitude) -> Array:
+    """Return the posture (nq,) of an attitude: pelvis above the origin, lowest piece on z = 0, no piece in another."""
+    q = pin.neutral(figure.model)
+    values: dict[str, float] = {}
+    for name, degrees in attitude.degrees.items():
+        for joint in (name, f"left_{name}", f"right_{name}"):
+            if joint in figure.joints:
+                values[joint] = math.radians(degrees)
+    q = figure.with_joints(q, values)
+    spread = [name for name in figure.joints if name.endswith("_abduction") and not name.startswith("neck")]
+    free = q
+    for step in range(_SPREAD_STEPS):
+        close = _close_segments(figure, free)
+        if not close:
+            break
+        moved = {
+            name: figure.joint_values(free)[name] + _SPREAD_STEP
+            for name in spread
+            if any(_moves(name, segment) for segment in close)
+        }
+        free = figure.with_joints(free, moved)
+        del step
+    if figure.root == "free":
+        half = math.radians(attitude.pitch) / 2.0
+        free[3:7] = 0.0, math.sin(half), 0.0, math.cos(half)
+        free[2] = -lowest(figure, free)
+    return free
+
+
+def _moves(abduction: str, segment: str) -> bool:
+    """Whether an abduction joint moves a segment outwards."""
+    side, part, _ = abduction.split("_")
+    arm = ("upper_arm", "forearm", "hand")
+    leg = ("thigh", "shank", "foot", "toes")
+    return segment.startswith(side) and segment.endswith(arm if part == "shoulder" else leg)
+
+
+def _close_segments(figure: Figure, q: Array) -> set[str]:
+    data, geometry = figure.model.createData(), figure.geometry
+    geometry_data = pin.GeometryData(geometry)
+    pin.updateGeometryPlacements(figure.model, data, geometry, geometry_data, q)
+    pin.computeDistances(geometry, geometry_data)
+    close: set[str] = set()
+    for pair, result in zip(geometry.collisionPairs, geometry_data.distanceResults, strict=True):
+        if result.min_distance < GAP:
+            close.update(geometry.geometryObjects[k].name.partition(":")[0] for k in (pair.first, pair.second))
+    return close
+
+
+def lowest(figure: Figure, q: Array) -> float:
+    """Height of the lowest point of all pieces, metres."""
+    data = figure.model.createData()
+    geometry_data = pin.GeometryData(figure.geometry)
+    pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry_data, q)
+    return min(
+        _lowest_of(piece.geometry, placement)
+        for piece, placement in zip(figure.geometry.geometryObjects, geometry_data.oMg, strict=True)
+    )
+
+
+def _lowest_of(shape: Any, placement: pin.SE3) -> float:
+    height, row = float(placement.translation[2]), np.asarray(placement.rotation)[2]
+    kind = type(shape).__name__
+    if kind == "Sphere":
+        return height - float(shape.radius)
+    if kind == "Capsule":
+        return height - float(shape.radius) - abs(float(row[2])) * float(shape.halfLength)
+    if kind == "Box":
+        return height - float(np.abs(row) @ np.asarray(shape.halfSide))
+    if kind == "Ellipsoid":
+        return height - float(np.linalg.norm(row * np.asarray(shape.radii)))
+    return height + float((np.asarray(shape.points()) @ row).min())
