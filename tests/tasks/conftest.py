@@ -8,6 +8,7 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio as pin
+import pytest
 
 from wholebody.errors import UnknownNameError
 
@@ -61,6 +62,7 @@ class StandInFigure:
         return low, high
 
 
+@pytest.fixture
 def humanoid() -> Any:
     """A scene of Pinocchio's humanoid with box feet, free-flyer root."""
     model = pin.buildSampleModelHumanoid()
@@ -76,7 +78,11 @@ def humanoid() -> Any:
     return SimpleNamespace(figure=StandInFigure(model), model=model, geometry=geometry)
 
 
-def random_posture(model: pin.Model, rng: np.random.Generator, spread: float = 1.0) -> Any:
-    """A posture far from neutral, root included."""
-    q = pin.integrate(model, pin.neutral(model), spread * rng.normal(size=model.nv))
-    return q
+@pytest.fixture
+def random_posture() -> Any:
+    """A function that draws postures far from neutral, root included."""
+
+    def draw(model: pin.Model, rng: np.random.Generator, spread: float = 1.0) -> Any:
+        return pin.integrate(model, pin.neutral(model), spread * rng.normal(size=model.nv))
+
+    return draw

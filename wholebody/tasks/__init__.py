@@ -1,22 +1,43 @@
 """What can be asked of a posture: goals, constraints, bounds and measures, one small class each."""
 
+from wholebody.tasks.axis import Axis
+from wholebody.tasks.balance import Balance
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
+from wholebody.tasks.bounds import Freeze, StepLimit
+from wholebody.tasks.center_of_mass import CenterOfMass
+from wholebody.tasks.discomfort import Discomfort
+from wholebody.tasks.displacement import Displacement
 from wholebody.tasks.effort import Effort
 from wholebody.tasks.frame import Frame, Orientation
 from wholebody.tasks.hold import Hold
+from wholebody.tasks.plane import Plane
 from wholebody.tasks.point import Point
+from wholebody.tasks.posture import Posture
+from wholebody.tasks.potential_energy import PotentialEnergy
+from wholebody.tasks.reach_cones import ReachCones
 from wholebody.tasks.relative import Relative
 
 __all__ = [
+    "Axis",
+    "Balance",
     "Bound",
+    "CenterOfMass",
     "Constraint",
+    "Discomfort",
+    "Displacement",
     "Effort",
     "Frame",
+    "Freeze",
     "Goal",
     "Hold",
     "Measure",
     "Orientation",
+    "Plane",
     "Point",
+    "Posture",
+    "PotentialEnergy",
+    "ReachCones",
     "Relative",
+    "StepLimit",
     "Term",
 ]

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures.state import State
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.tasks.base import Array, Surroundings
 
 FARTHEST = 100.0
-"""Distance [m] beyond which a place is taken for a slip of units: 0.1 m is 100 in millimetres, and nobody reaches 100 m."""
+"""Distance [m] beyond which a place is taken for a slip of units: in millimetres it is a tenth of a metre."""
 
 SHORTEST_DIRECTION = 1e-9
 """Length below which a vector has no direction: a millionth of a millimetre if it came from two points in metres."""
@@ -65,7 +67,7 @@ def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> 
     return base
 
 
-def find_dofs(scene: Surroundings, names: tuple[str, ...], where: str) -> Any:
+def find_dofs(scene: Surroundings, names: Sequence[str], where: str) -> Any:
     """Tangent indices (k,) of joints and groups.
 
     Raises:
@@ -75,6 +77,11 @@ def find_dofs(scene: Surroundings, names: tuple[str, ...], where: str) -> Any:
         return np.asarray(scene.figure.dofs(names), dtype=np.intp)
     except UnknownNameError as error:
         raise UnknownNameError(error.kind, error.name, error.known, where) from None
+
+
+def angular_dofs(model: Any) -> Any:
+    """(nv,) which degrees of freedom are in radians: those that turn something."""
+    return np.abs(State(model).jacobian[3:]).max(axis=0) > 0.5
 
 
 def numbers(value: object, shape: tuple[int, ...], where: str) -> Array:

@@ -1,0 +1,149 @@
+"""A direction of the figure along a direction or towards a place: gaze, palm, the barrel of a tool.
+
+Let t1 and t2 be two directions at right angles to the axis a, all turning with the frame, and d the direction asked
+for. With x = (t1 . d, t2 . d), s its length, c = a . d and theta = atan2(s, c), the error is theta x / s: the angle,
+spread over the two directions in which it can be made smaller. This is the azimuthal equidistant projection of the
+sphere (Snyder 1987, "Map Projections: A Working Manual", chapter 25). Its derivative along the error is 1 at every
+angle, so none is a trap; across the error it is theta / s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass, field
+from math import atan2, hypot, pi, sin
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from wholebody.errors import InputError
+from wholebody.figures.state import State, Wrench
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Goal, Mask, Surroundings, filled
+
+STEEPEST = pi / sin(pi / 180.0)
+"""Largest derivative across the error, reached one degree before the opposite direction.
+
+The exact one is infinite at the opposite direction, where a step of any size can go any way round. Capping it keeps the
+rows in a range that QP solvers handle, and leaves the gradient of the squared error exact, which has no part across.
+"""
+
+NO_ANGLE = 1e-12
+"""Sine below which the error has no direction of its own, so the first of the two is taken."""
+
+TOUCHING = 1e-6
+"""Distance [m] below which a place has no direction from the frame; the goal then counts as met."""
+
+
+@dataclass(frozen=True, eq=False)
+class Axis(Goal):
+    """Turn an axis of a frame into a direction, or point it towards a place; turning about the axis is free.
+
+    The error has two rows whose length is the angle between the two, from 0 to pi [rad]. From the exactly opposite
+    direction the figure turns about a fixed direction of the frame.
+
+    Attributes:
+        frame: name of the frame, segment or joint.
+        axis: (3,) the axis in the frame, such as (1, 0, 0); any length.
+        direction: (3,) where it should point in the world; any length.
+        toward: (3,) the place in the world it should point to, seen from the frame's origin [m].
+        weight: factor on the squared error [1/rad^2].
+
+    Raises:
+        InputError: neither or both of `direction` and `toward` are given, or a vector has no direction.
+    """
+
+    frame: str
+    axis: ArrayLike
+    _: KW_ONLY
+    direction: ArrayLike | None = None
+    toward: ArrayLike | None = None
+    weight: float = 1.0
+    _basis: Array = field(init=False, repr=False)
+    _wanted: Array = field(init=False, repr=False)
+    _place: inputs.Place = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        where = f"Axis({self.frame!r})"
+        if (self.direction is None) == (self.toward is None):
+            raise InputError(f"{where} takes either a direction or a place to point toward; give one of the two")
+        object.__setattr__(self, "_basis", _frame_about(inputs.direction(self.axis, f"{where}: axis")))
+        if self.direction is None:
+            wanted = inputs.point(self.toward, f"{where}: toward")
+        else:
+            wanted = inputs.direction(self.direction, f"{where}: direction")
+        object.__setattr__(self, "_wanted", wanted)
+        object.__setattr__(self, "weight", inputs.positive(self.weight, f"{where}: weight"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Axis:
+        """Find the frame."""
+        return filled(self, _place=inputs.find_place(scene, self.frame, "Axis"))
+
+    @property
+    def angular(self) -> Mask:
+        """(2,) both rows are in radians."""
+        return np.ones(2, dtype=bool)
+
+    def error(self, state: State) -> Array:
+        """(2,) the angle along the two directions at right angles to the axis [rad]."""
+        frame = state.frame(self._place.frame)
+        direction, distance = self._way(frame)
+        if distance < TOUCHING:
+            return np.zeros(2)
+        across = self._basis @ (direction @ frame.rotation)
+        x, y, along = across.tolist()
+        sine = hypot(x, y)
+        angle = atan2(sine, along)
+        if sine < NO_ANGLE:
+            return np.array((angle, 0.0))
+        return np.array((x, y)) * (angle / sine)
+
+    def jacobian(self, state: State) -> Wrench:
+        """Two rows: moments, and forces where the direction depends on where the frame is."""
+        frame = state.frame(self._place.frame)
+        direction, distance = self._way(frame)
+        if distance < TOUCHING:
+            return Wrench(np.zeros((2, 6)), self._place.joint)
+        axes = self._basis @ frame.rotation.T
+        x, y, along = (axes @ direction).tolist()
+        sine = hypot(x, y)
+        gain = self._gain(sine, along)
+        ux, uy = (x / sine, y / sine) if sine > NO_ANGLE else (1.0, 0.0)
+        fall = along - gain
+        # theta' = c s' - s c' and (x/s)' is the part of x' across x, over s.
+        change = np.array(((gain + fall * ux * ux, fall * ux * uy, -x), (fall * ux * uy, gain + fall * uy * uy, -y)))
+        on_direction = change @ axes
+        rows = np.zeros((2, 6))
+        rows[:, 3:] = on_direction @ pin.skew(direction)
+        if self.toward is not None:
+            # The direction turns as the frame's origin moves: d' = -(1 - d d') v / distance, and v = v_o - p x w.
+            move = (np.outer(on_direction @ direction, direction) - on_direction) / distance
+            rows[:, :3] = move
+            rows[:, 3:] -= move @ pin.skew(frame.translation)
+        return Wrench(rows, self._place.joint)
+
+    def _way(self, frame: Any) -> tuple[Array, float]:
+        """Unit vector asked for, and how far away the place is that it points to; inf for a direction."""
+        if self.toward is None:
+            return self._wanted, np.inf
+        way = self._wanted - frame.translation
+        distance = float(np.sqrt(way @ way))
+        return way / max(distance, TOUCHING), distance
+
+    @staticmethod
+    def _gain(sine: float, along: float) -> float:
+        """Derivative across the error: the angle over its sine."""
+        if sine < NO_ANGLE:
+            return 1.0 if along > 0.0 else STEEPEST
+        return min(atan2(sine, along) / sine, STEEPEST)
+
+
+def _frame_about(axis: Array) -> Array:
+    """(3, 3) rows: two directions at right angles to a unit vector, and the vector itself."""
+    helper = np.zeros(3)
+    helper[int(np.argmin(np.abs(axis)))] = 1.0
+    first = np.cross(axis, helper)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(axis, first), axis])

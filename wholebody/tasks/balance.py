@@ -1,0 +1,80 @@
+"""The centre of mass over the feet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass, field
+
+import numpy as np
+
+from wholebody.errors import InputError
+from wholebody.figures.state import State
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Constraint, Mask, Surroundings, filled
+from wholebody.tasks.support import convex_polygon, edges, shrunk, standing_points
+
+
+@dataclass(frozen=True, eq=False)
+class Balance(Constraint):
+    """Keep the centre of mass over the support polygon of the feet, so that the figure can stand still.
+
+    The polygon is the convex hull of the places where the feet stand at the start; hold the feet there. A row for each
+    edge: the distance of the centre of mass from it, seen from above, positive inside [m].
+
+    Attributes:
+        feet: names of the segments that carry the figure, with what hangs on them, such as toes.
+        margin: least distance from the edges [m].
+
+    Raises:
+        InputError: no feet are named, or the margin is negative.
+    """
+
+    feet: Sequence[str] = ("left_foot", "right_foot")
+    _: KW_ONLY
+    margin: float = 0.0
+    _normals: Array = field(init=False, repr=False)
+    _offsets: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if isinstance(self.feet, str) or not self.feet:
+            raise InputError(f"Balance: feet is {self.feet!r}; give a list of names")
+        object.__setattr__(self, "margin", inputs.not_negative(self.margin, "Balance: margin"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Balance:
+        """Find where the feet stand.
+
+        Raises:
+            UnknownNameError: the figure has no such foot.
+            InputError: the feet have no pieces, stand on a line, or leave no room for the margin.
+        """
+        corners = convex_polygon(standing_points(scene, start, self.feet)[:, :2])
+        if len(shrunk(corners, self.margin)) == 0:
+            raise InputError(
+                f"Balance: a margin of {self.margin:g} m leaves nothing of the support polygon; make it smaller"
+            )
+        normals, offsets = edges(corners)
+        return filled(self, _normals=normals, _offsets=offsets)
+
+    @property
+    def lower(self) -> Array:
+        """(m,) the margin."""
+        return np.full(len(self._offsets), self.margin)
+
+    @property
+    def upper(self) -> Array:
+        """(m,) inf."""
+        return np.full(len(self._offsets), np.inf)
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) no row is in radians."""
+        return np.zeros(len(self._offsets), dtype=bool)
+
+    def value(self, state: State) -> Array:
+        """(m,) distance inside each edge [m]."""
+        return np.asarray(self._normals @ state.center_of_mass()[:2] - self._offsets)
+
+    def jacobian(self, state: State) -> Array:
+        """(m, nv)."""
+        return np.asarray(self._normals @ state.center_of_mass_jacobian()[:2])

@@ -1,0 +1,104 @@
+"""Bounds on how far the joints move: those that do not move at all, and those that move only so fast."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass, field
+
+import numpy as np
+
+from wholebody.errors import InputError
+from wholebody.figures.state import State
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Bound, Surroundings, filled
+
+
+class Freeze(Bound):
+    """Keep joints as they are at the start, such as the lower body while the upper body works.
+
+    Attributes:
+        joints: names of joints and groups; "root" for the figure's place in the world.
+    """
+
+    _lower: Array
+    _upper: Array
+
+    def __init__(self, *joints: str) -> None:
+        """Name what does not move.
+
+        Raises:
+            InputError: nothing is named, or a name is not a string.
+        """
+        if not joints or not all(isinstance(name, str) for name in joints):
+            raise InputError(f"Freeze takes names, not {joints!r}; write Freeze('left_leg', 'right_leg', 'root')")
+        self.joints = joints
+
+    def __repr__(self) -> str:
+        """Return the call that builds it."""
+        return f"Freeze({', '.join(map(repr, self.joints))})"
+
+    def resolve(self, scene: Surroundings, start: Array) -> Freeze:
+        """Find the joints."""
+        upper = np.full(scene.model.nv, np.inf)
+        upper[inputs.find_dofs(scene, self.joints, "Freeze")] = 0.0
+        return filled(self, _upper=upper, _lower=-upper)
+
+    def bounds(self, state: State, dt: float | None) -> tuple[Array, Array]:
+        """Zero for what is frozen."""
+        return self._lower, self._upper
+
+
+@dataclass(frozen=True, eq=False)
+class StepLimit(Bound):
+    """Bound how far a step of length dt moves: velocity times dt. A solve without a time step is not bounded.
+
+    Attributes:
+        velocity: of the joints [rad/s; m/s for sliding joints].
+        joints: other velocities for joints and groups, by name; a later name overrides an earlier one.
+        root_velocity: of the figure's place in the world, along each of its own axes [m/s].
+        root_turn: of its orientation, about each of its own axes [rad/s].
+
+    Raises:
+        InputError: a velocity is not a positive number.
+    """
+
+    velocity: float = np.inf
+    _: KW_ONLY
+    joints: Mapping[str, float] = field(default_factory=dict)
+    root_velocity: float = np.inf
+    root_turn: float = np.inf
+    _velocity: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        for name in ("velocity", "root_velocity", "root_turn"):
+            object.__setattr__(self, name, _speed(getattr(self, name), f"StepLimit: {name}"))
+        speeds = {name: _speed(speed, f"StepLimit: joints[{name!r}]") for name, speed in self.joints.items()}
+        object.__setattr__(self, "joints", speeds)
+
+    def resolve(self, scene: Surroundings, start: Array) -> StepLimit:
+        """Find the joints.
+
+        Raises:
+            UnknownNameError: the figure has no such joint or group.
+            InputError: a velocity of the root is given and the figure is fixed to the world.
+        """
+        velocity = np.full(scene.model.nv, self.velocity)
+        if scene.figure.root == "free":
+            root = inputs.find_dofs(scene, ("root",), "StepLimit")
+            velocity[root[:3]], velocity[root[3:]] = self.root_velocity, self.root_turn
+        elif np.isfinite((self.root_velocity, self.root_turn)).any():
+            raise InputError("StepLimit: this figure is fixed to the world; leave root_velocity and root_turn out")
+        for name, speed in self.joints.items():
+            velocity[inputs.find_dofs(scene, (name,), "StepLimit")] = speed
+        return filled(self, _velocity=velocity)
+
+    def bounds(self, state: State, dt: float | None) -> tuple[Array, Array]:
+        """Velocity times dt to either side; none where dt is None."""
+        reach = np.full_like(self._velocity, np.inf) if dt is None else self._velocity * dt
+        return -reach, reach
+
+
+def _speed(value: object, where: str) -> float:
+    """Return a positive number; inf stands for no bound."""
+    return np.inf if value == np.inf else inputs.positive(value, where)

@@ -1,0 +1,57 @@
+"""The centre of mass at a place."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wholebody.errors import InputError
+from wholebody.figures.state import State
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Goal, Mask
+
+
+@dataclass(frozen=True, eq=False)
+class CenterOfMass(Goal):
+    """Bring the figure's centre of mass to a place, or above one.
+
+    The error is the centre of mass minus the target, in world axes [m].
+
+    Attributes:
+        target: (3,) place in the world [m].
+        axes: "xyz", or "xy" to leave the height free.
+        weight: factor on the squared error [1/m^2].
+
+    Raises:
+        InputError: the target is not in metres, or the axes are others.
+    """
+
+    target: ArrayLike
+    _: KW_ONLY
+    axes: Literal["xy", "xyz"] = "xyz"
+    weight: float = 1.0
+    _target: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if self.axes not in ("xy", "xyz"):
+            raise InputError(f"CenterOfMass: axes is {self.axes!r}; give 'xyz', or 'xy' to leave the height free")
+        target = inputs.point(self.target, "CenterOfMass: target")
+        object.__setattr__(self, "_target", target[: len(self.axes)])
+        object.__setattr__(self, "weight", inputs.positive(self.weight, "CenterOfMass: weight"))
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) no row is in radians."""
+        return np.zeros(len(self.axes), dtype=bool)
+
+    def error(self, state: State) -> Array:
+        """(2,) or (3,) from the target to the centre of mass [m]."""
+        return np.asarray(state.center_of_mass()[: len(self.axes)] - self._target)
+
+    def jacobian(self, state: State) -> Array:
+        """(2, nv) or (3, nv)."""
+        return state.center_of_mass_jacobian()[: len(self.axes)]

@@ -1,0 +1,46 @@
+"""How far the joints are from neutral."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from wholebody.figures.state import State
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Measure, Surroundings, filled
+from wholebody.tasks.distance import SquaredDistance
+
+
+@dataclass(frozen=True, eq=False)
+class Displacement(Measure):
+    """Squared displacement of every joint from the neutral posture, weighted by joint [rad^2].
+
+    ``sum_i w_i (q_i - q_i_neutral)^2``, the joint displacement of Abdel-Malek and Arora 2013 ("Human Motion Simulation:
+    Predictive Dynamics", chapter 3), with the figure's `neutral_weights` for w.
+
+    Attributes:
+        weight: factor on the measure [1/rad^2].
+    """
+
+    weight: float = 1.0
+    _distance: SquaredDistance = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the value."""
+        object.__setattr__(self, "weight", inputs.positive(self.weight, "Displacement: weight"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Displacement:
+        """Take the neutral posture and the weights of the figure."""
+        figure = scene.figure
+        return filled(self, _distance=SquaredDistance.build(scene.model, figure.neutral, figure.neutral_weights))
+
+    def value(self, state: State) -> float:
+        """The displacement [rad^2]."""
+        return self._distance.value(state)
+
+    def gradient(self, state: State) -> Array:
+        """(nv,) derivative [rad]."""
+        return self._distance.gradient(state)
+
+    def curvature(self, state: State) -> Array:
+        """(nv,) second derivative; exact for joints of one degree of freedom."""
+        return self._distance.curvature

@@ -1,0 +1,85 @@
+"""A frame that stays in a plane, or on one side of it."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wholebody.errors import InputError
+from wholebody.figures.state import State, Wrench
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Constraint, Mask, Surroundings, filled
+
+
+@dataclass(frozen=True, eq=False)
+class Plane(Constraint):
+    """Keep the origin of a frame or joint in a plane.
+
+    The value is the distance (x - p) . n from the plane [m]. An elbow or a wrist that may leave its path only sideways
+    moves in the plane through its place, normal to the direction of its path (eqs. 3.2 and 3.3 of the thesis on
+    collision avoidance in motion capture clips, there squared and compared with a tolerance).
+
+    Attributes:
+        frame: name of the frame, segment or joint.
+        normal: (3,) direction at right angles to the plane, in the world; any length.
+        point: (3,) a place in the plane [m]; None for where the frame is at the start.
+        side: "on" keeps it in the plane, "above" lets it leave to the side that the normal points to.
+
+    Raises:
+        InputError: the normal has no direction, the point is not in metres, or the side is another word.
+    """
+
+    frame: str
+    normal: ArrayLike
+    _: KW_ONLY
+    point: ArrayLike | None = None
+    side: Literal["on", "above"] = "on"
+    _normal: Array = field(init=False, repr=False)
+    _point: Array | None = field(init=False, repr=False, default=None)
+    _place: inputs.Place = field(init=False, repr=False)
+    _height: float = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        where = f"Plane({self.frame!r})"
+        if self.side not in ("on", "above"):
+            raise InputError(f"{where}: side is {self.side!r}; give 'on' or 'above'")
+        object.__setattr__(self, "_normal", inputs.direction(self.normal, f"{where}: normal"))
+        if self.point is not None:
+            object.__setattr__(self, "_point", inputs.point(self.point, f"{where}: point"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Plane:
+        """Find the frame, and the plane through where it is at the start."""
+        place = inputs.find_place(scene, self.frame, "Plane")
+        point = self._point
+        if point is None:
+            point = State(scene.model).update(start).frame(place.frame).translation
+        return filled(self, _place=place, _height=float(self._normal @ point))
+
+    @property
+    def lower(self) -> Array:
+        """(1,) zero."""
+        return np.zeros(1)
+
+    @property
+    def upper(self) -> Array:
+        """(1,) zero, or inf for one side."""
+        return np.zeros(1) if self.side == "on" else np.full(1, np.inf)
+
+    @property
+    def angular(self) -> Mask:
+        """(1,) the row is not in radians."""
+        return np.zeros(1, dtype=bool)
+
+    def value(self, state: State) -> Array:
+        """(1,) distance from the plane [m]."""
+        return np.array((self._normal @ state.frame(self._place.frame).translation - self._height,))
+
+    def jacobian(self, state: State) -> Wrench:
+        """One force along the normal."""
+        x, y, z = state.frame(self._place.frame).translation.tolist()
+        a, b, c = self._normal.tolist()
+        return Wrench(np.array(((a, b, c, y * c - z * b, z * a - x * c, x * b - y * a),)), self._place.joint)

@@ -1,0 +1,82 @@
+"""Joints in the places they have in a known posture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass, field
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures.state import State
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Goal, Mask, Surroundings, filled
+
+
+@dataclass(frozen=True, eq=False)
+class Posture(Goal):
+    """Bring all joints, or some, to a posture.
+
+    The error is the tangent vector from that posture to the present one [rad; m for the root's place and for sliding
+    joints].
+
+    Attributes:
+        target: name of one of the figure's postures, or a posture (nq,).
+        joints: names of joints and groups that take part; None for all, the root included.
+        weight: factor on the squared error [1/rad^2 and 1/m^2].
+
+    Raises:
+        InputError: the posture has the wrong shape, is not finite, or has a quaternion that is not of unit length.
+    """
+
+    target: str | ArrayLike
+    _: KW_ONLY
+    joints: Sequence[str] | None = None
+    weight: float = 1.0
+    _q: Array = field(init=False, repr=False)
+    _dofs: Array = field(init=False, repr=False)
+    _angular: Mask = field(init=False, repr=False)
+    _constant: Array | None = field(init=False, repr=False, default=None)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        object.__setattr__(self, "weight", inputs.positive(self.weight, "Posture: weight"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Posture:
+        """Look up the posture and the joints."""
+        model = scene.model
+        dofs = np.arange(model.nv) if self.joints is None else inputs.find_dofs(scene, self.joints, "Posture")
+        curved = [joint for joint in model.joints[1:] if joint.nq != joint.nv]
+        bent = {index for joint in curved for index in range(joint.idx_v, joint.idx_v + joint.nv)}
+        constant = None if bent.intersection(dofs.tolist()) else np.eye(model.nv)[dofs]
+        return filled(
+            self, _q=self._find(scene), _dofs=dofs, _angular=inputs.angular_dofs(model)[dofs], _constant=constant
+        )
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) all but the root's place and sliding joints."""
+        return self._angular
+
+    def error(self, state: State) -> Array:
+        """(m,) from the posture to the present one."""
+        return np.asarray(pin.difference(state.model, self._q, state.q)[self._dofs])
+
+    def jacobian(self, state: State) -> Array:
+        """(m, nv)."""
+        if self._constant is not None:
+            return self._constant
+        return np.asarray(pin.dDifference(state.model, self._q, state.q, pin.ARG1)[self._dofs])
+
+    def _find(self, scene: Surroundings) -> Array:
+        if isinstance(self.target, str):
+            try:
+                return np.asarray(scene.figure.posture(self.target), dtype=float)
+            except UnknownNameError as error:
+                raise UnknownNameError(error.kind, error.name, error.known, "Posture") from None
+        q = inputs.numbers(self.target, (scene.model.nq,), "Posture: target")
+        if not pin.isNormalized(scene.model, q, 1e-6):
+            raise InputError("Posture: target holds a quaternion that is not of unit length; use pin.normalize")
+        return q

@@ -1,0 +1,96 @@
+"""How much the segments are raised or lowered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.figures.state import State
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Measure, Surroundings, filled
+from wholebody.tasks.distance import LEAST_CURVATURE
+
+GRAVITY = 9.80665
+"""Standard acceleration of gravity [m/s^2] (CGPM 1901)."""
+
+
+class _Bodies(NamedTuple):
+    """What the joints carry: joint indices, the centre of each mass in its joint, squared weights, rest heights."""
+
+    joints: NDArray[np.intp]
+    centres: tuple[Array, ...]
+    weights: Array
+    heights: Array
+    support: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PotentialEnergy(Measure):
+    """Squared change of the potential energy of every segment from the neutral posture [J^2].
+
+    ``sum_k (m_k g)^2 (h_k - h_k_neutral)^2`` with h the height of a segment's centre of mass: the delta potential
+    energy of Yang, Marler, Kim, Arora and Abdel-Malek 2004 ("Multi-Objective Optimization for Upper Body Posture
+    Prediction"), over all segments. The neutral posture stands where the root is at the start.
+
+    Attributes:
+        weight: factor on the measure [1/J^2].
+    """
+
+    weight: float = 1.0
+    _bodies: _Bodies = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the value."""
+        object.__setattr__(self, "weight", inputs.positive(self.weight, "PotentialEnergy: weight"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> PotentialEnergy:
+        """Weigh the segments, and find their heights in the neutral posture."""
+        model = scene.model
+        neutral = np.array(scene.figure.neutral, dtype=float)
+        if scene.figure.root == "free":
+            root = model.joints[1]
+            neutral[root.idx_q : root.idx_q + root.nq] = start[root.idx_q : root.idx_q + root.nq]
+        state = State(model).update(neutral)
+        joints = np.array([k for k in range(1, model.njoints) if model.inertias[k].mass > 0.0], dtype=np.intp)
+        centres = tuple(np.array(model.inertias[int(k)].lever) for k in joints)
+        weights = np.array([(model.inertias[int(k)].mass * GRAVITY) ** 2 for k in joints])
+        heights = _centres(state, joints, centres)[:, 2]
+        return filled(self, _bodies=_Bodies(joints, centres, weights, heights, state.support[joints]))
+
+    def value(self, state: State) -> float:
+        """The measure [J^2]."""
+        bodies = self._bodies
+        rise = _centres(state, bodies.joints, bodies.centres)[:, 2] - bodies.heights
+        return float(bodies.weights @ (rise * rise))
+
+    def gradient(self, state: State) -> Array:
+        """(nv,) derivative [J^2/rad and J^2/m]."""
+        bodies = self._bodies
+        centres = _centres(state, bodies.joints, bodies.centres)
+        wrenches = _lifts(centres) * (2.0 * bodies.weights * (centres[:, 2] - bodies.heights))[:, None]
+        # All that hangs on a joint acts on it: sum the wrenches first, then one product with each of its columns.
+        return np.asarray(((bodies.support.T @ wrenches) * state.jacobian.T).sum(axis=1))
+
+    def curvature(self, state: State) -> Array:
+        """(nv,) diagonal of the Gauss-Newton matrix of the heights [J^2/rad^2 and J^2/m^2]."""
+        bodies = self._bodies
+        rows = (_lifts(_centres(state, bodies.joints, bodies.centres)) @ state.jacobian) * bodies.support
+        return np.asarray(2.0 * (bodies.weights @ (rows * rows)) + LEAST_CURVATURE)
+
+
+def _centres(state: State, joints: NDArray[np.intp], centres: tuple[Array, ...]) -> Array:
+    """(k, 3) centres of mass in the world."""
+    places = state.data.oMi
+    return np.array([places[joint].act(centre) for joint, centre in zip(joints.tolist(), centres, strict=True)])
+
+
+def _lifts(centres: Array) -> Array:
+    """(k, 6) wrenches of upward unit forces at the centres: [z, c x z]."""
+    rows = np.zeros((len(centres), 6))
+    rows[:, 2] = 1.0
+    rows[:, 3] = centres[:, 1]
+    rows[:, 4] = -centres[:, 0]
+    return rows

@@ -1,0 +1,100 @@
+"""Ball joints within their reach cones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures.state import State
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Constraint, Mask, Surroundings, filled
+
+
+class _Limb(NamedTuple):
+    cone: Any
+    reference: inputs.Place
+    limb: inputs.Place
+    axis: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ReachCones(Constraint):
+    """Keep the direction of limbs inside the spherical polygons that bound what their joints allow.
+
+    Limits of three revolute joints in a row allow directions that a shoulder or a hip does not (Wilhelms and Van Gelder
+    2001, "Fast and Easy Reach-Cone Joint Limits", Journal of Graphics Tools 6(2)). The value is the signed angle from
+    the limb's direction to the nearest edge of its polygon, positive inside [rad].
+
+    Attributes:
+        names: names of the figure's cones; None for all of them.
+    """
+
+    names: Sequence[str] | None = None
+    _limbs: tuple[_Limb, ...] = field(init=False, repr=False)
+    _joints: NDArray[np.intp] = field(init=False, repr=False)
+    _against: NDArray[np.intp] = field(init=False, repr=False)
+
+    def resolve(self, scene: Surroundings, start: Array) -> ReachCones:
+        """Find the cones and the frames they belong to.
+
+        Raises:
+            UnknownNameError: the figure has no cone of that name.
+            InputError: the figure has no cones.
+        """
+        cones = scene.figure.cones
+        if not cones:
+            raise InputError("ReachCones: this figure has no reach cones; leave the constraint out")
+        limbs = []
+        for name in cones if self.names is None else self.names:
+            if name not in cones:
+                raise UnknownNameError("reach cone", name, cones, "ReachCones")
+            cone = cones[name]
+            reference = inputs.find_place(scene, cone.reference, "ReachCones")
+            limb = inputs.find_place(scene, cone.limb, "ReachCones")
+            limbs.append(_Limb(cone.cone, reference, limb, inputs.direction(cone.axis, f"ReachCones: axis of {name}")))
+        return filled(
+            self,
+            _limbs=tuple(limbs),
+            _joints=np.array([limb.limb.joint for limb in limbs], dtype=np.intp),
+            _against=np.array([limb.reference.joint for limb in limbs], dtype=np.intp),
+        )
+
+    @property
+    def lower(self) -> Array:
+        """(m,) zeros."""
+        return np.zeros(len(self._limbs))
+
+    @property
+    def upper(self) -> Array:
+        """(m,) inf."""
+        return np.full(len(self._limbs), np.inf)
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) all rows are in radians."""
+        return np.ones(len(self._limbs), dtype=bool)
+
+    def value(self, state: State) -> Array:
+        """(m,) signed angle to the edge of each cone, positive inside [rad]."""
+        result = np.empty(len(self._limbs))
+        for row, limb in enumerate(self._limbs):
+            turn = state.frame(limb.reference.frame).rotation
+            result[row] = limb.cone.signed_angle((state.frame(limb.limb.frame).rotation @ limb.axis) @ turn)[0]
+        return result
+
+    def jacobian(self, state: State) -> Array:
+        """(m, nv)."""
+        wrenches = np.zeros((len(self._limbs), 6))
+        for row, limb in enumerate(self._limbs):
+            turn = state.frame(limb.reference.frame).rotation
+            direction = state.frame(limb.limb.frame).rotation @ limb.axis
+            # The direction turns as w x d, so the angle changes by g . (w x d) = w . (d x g).
+            x, y, z = direction.tolist()
+            a, b, c = (turn @ limb.cone.signed_angle(direction @ turn)[1]).tolist()
+            wrenches[row, 3:] = (y * c - z * b, z * a - x * c, x * b - y * a)
+        return state.rows(wrenches, self._joints, self._against)

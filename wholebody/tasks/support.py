@@ -1,0 +1,125 @@
+"""The support polygon: where the ground carries a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.errors import InputError
+from wholebody.figures.state import State
+from wholebody.geometry.cores import core_of
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Array, Surroundings
+
+STANDING_HEIGHT = 0.01
+"""Height [m] above a foot's lowest point up to which its corners stand on the ground: soles are rounded by as much."""
+
+THINNEST = 1e-4
+"""Width [m] below which a polygon is a line that nobody stands on."""
+
+
+def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:
+    """Places (n, 3) where the feet stand at the posture q: the lowest corners of their pieces.
+
+    What hangs on a foot, such as toes, belongs to it.
+
+    Raises:
+        UnknownNameError: the figure has no such foot.
+        InputError: a foot has no pieces.
+    """
+    state = State(scene.model).update(q)
+    points = []
+    for foot in feet:
+        joint = inputs.find_place(scene, foot, "Balance").joint
+        pieces = [piece for piece in scene.geometry.geometryObjects if joint in scene.model.supports[piece.parentJoint]]
+        if not pieces or joint == 0:
+            raise InputError(f"Balance: {foot!r} has no pieces to stand on; name segments with geometry as feet")
+        lows = np.vstack(
+            [low_points(piece.geometry, state.data.oMi[piece.parentJoint] * piece.placement) for piece in pieces]
+        )
+        points.append(lows[lows[:, 2] <= lows[:, 2].min() + STANDING_HEIGHT])
+    return np.vstack(points)
+
+
+def low_points(geometry: Any, placement: pin.SE3) -> Array:
+    """Candidates (n, 3) for the lowest points of a piece: all corners, or the lowest points of its balls.
+
+    Args:
+        geometry: a coal shape.
+        placement: where its origin is in the world.
+    """
+    core = core_of(geometry)
+    if len(core.points) == 0:
+        # An ellipsoid's lowest point: the image of the ball's point whose normal is mapped to -z.
+        pull = np.asarray(geometry.radii) * placement.rotation[2]
+        lowest = placement.rotation @ (np.asarray(geometry.radii) * pull) / np.linalg.norm(pull)
+        return np.array([placement.translation - lowest])
+    corners = core.points @ placement.rotation.T + placement.translation
+    corners[:, 2] -= core.radius
+    return np.asarray(corners)
+
+
+def convex_polygon(points: Array) -> Array:
+    """Corners (k, 2) of the convex hull of points (n, 2), anticlockwise.
+
+    Andrew's monotone chain (1979, "Another efficient algorithm for convex hulls in two dimensions"), on micrometres: an
+    edge between two points that differ by rounding alone would have no direction.
+
+    Raises:
+        InputError: the points lie on a line.
+    """
+    ordered = sorted({(round(float(x), 6), round(float(y), 6)) for x, y in points})
+    hull = _half_hull(ordered)[:-1] + _half_hull(ordered[::-1])[:-1]
+    corners = np.array(hull).reshape(-1, 2)
+    if len(corners) < 3 or _width(corners) < THINNEST:
+        raise InputError(
+            "Balance: the feet stand on a line, not an area; name more feet, or load a figure with more detail"
+        )
+    return corners
+
+
+def edges(corners: Array) -> tuple[Array, Array]:
+    """Inward unit normals (k, 2) and offsets (k,) of a convex polygon: inside, normals @ x >= offsets."""
+    along = np.roll(corners, -1, axis=0) - corners
+    normals = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+    return normals, np.einsum("ij,ij->i", normals, corners)
+
+
+def shrunk(corners: Array, margin: float) -> Array:
+    """Corners (m, 2) of the polygon with a margin cut off on every side, empty when nothing is left.
+
+    Clips by one edge after the other (Sutherland and Hodgman 1974, "Reentrant polygon clipping").
+    """
+    rest = corners
+    for normal, offset in zip(*edges(corners), strict=True):
+        inside = rest @ normal - offset - margin
+        kept = []
+        for i in range(len(rest)):
+            a, b = inside[i - 1], inside[i]
+            if (a >= 0.0) != (b >= 0.0):
+                kept.append(rest[i - 1] + (rest[i] - rest[i - 1]) * (a / (a - b)))
+            if b >= 0.0:
+                kept.append(rest[i])
+        rest = np.array(kept).reshape(-1, 2)
+    return rest
+
+
+def _half_hull(ordered: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    hull: list[tuple[float, float]] = []
+    for x, y in ordered:
+        while len(hull) > 1:
+            (ax, ay), (bx, by) = hull[-2:]
+            if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                break
+            hull.pop()
+        hull.append((x, y))
+    return hull
+
+
+def _width(corners: Array) -> float:
+    """Least extent of a polygon over the directions of its normals."""
+    normals, offsets = edges(corners)
+    return float((corners @ normals.T - offsets).max(axis=0).min())
