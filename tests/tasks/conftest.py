@@ -66,12 +66,15 @@ class StandInFigure:
 def humanoid() -> Any:
     """A scene of Pinocchio's humanoid with box feet, free-flyer root."""
     model = pin.buildSampleModelHumanoid()
+    data = model.createData()
+    pin.forwardKinematics(model, data, pin.neutral(model))
     geometry = pin.GeometryModel()
     box = coal.Box(0.24, 0.1, 0.04)
     for side in ("l", "r"):
         joint = model.getJointId(f"{side}leg_wrist2_joint")
         frame = model.addFrame(pin.Frame(f"{side}foot", joint, 0, pin.SE3.Identity(), pin.FrameType.BODY))
-        placement = pin.SE3(np.eye(3), np.array([0.05, 0.0, -0.06]))
+        sole = pin.SE3(np.eye(3), data.oMi[joint].translation + np.array([0.05, 0.0, -0.06]))
+        placement = data.oMi[joint].actInv(sole)
         geometry.addGeometryObject(pin.GeometryObject(f"{side}foot", joint, frame, placement, box))
     tip = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.7, 1.1), np.array([0.02, 0.01, -0.2]))
     model.addFrame(pin.Frame("tip", model.getJointId("larm_wrist2_joint"), 0, tip, pin.FrameType.OP_FRAME))

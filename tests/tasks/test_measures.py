@@ -1,0 +1,127 @@
+"""Values of the measures against numbers worked out by hand or from the papers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody import tasks
+from wholebody.figures.state import State
+
+
+def test_effort_is_the_weighted_squared_displacement_from_the_start(humanoid: Any, random_posture: Any) -> None:
+    rng = np.random.default_rng(0)
+    start = random_posture(humanoid.model, rng)
+    step = rng.normal(size=humanoid.model.nv)
+    effort = tasks.Effort().resolve(humanoid, start)
+    state = State(humanoid.model)
+    assert effort.value(state.update(start)) == 0.0
+    moved = state.update(pin.integrate(humanoid.model, start, step))
+    np.testing.assert_allclose(effort.value(moved), np.sum(humanoid.figure.effort_weights * step**2))
+
+
+def test_weights_on_the_root_bend_the_gradient(humanoid: Any, random_posture: Any) -> None:
+    rng = np.random.default_rng(1)
+    humanoid.figure.effort_weights[:6] = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    effort = tasks.Effort().resolve(humanoid, random_posture(humanoid.model, rng))
+    state = State(humanoid.model)
+    q = random_posture(humanoid.model, rng)
+    gradient = effort.gradient(state.update(q))
+    for direction in rng.normal(size=(10, humanoid.model.nv)):
+        ahead, behind = (
+            effort.value(state.update(pin.integrate(humanoid.model, q, h * direction))) for h in (1e-6, -1e-6)
+        )
+        np.testing.assert_allclose(gradient @ direction, (ahead - behind) / 2e-6, rtol=1e-6)
+
+
+def test_displacement_is_zero_only_in_the_neutral_posture(humanoid: Any) -> None:
+    displacement = tasks.Displacement().resolve(humanoid, humanoid.figure.neutral)
+    state = State(humanoid.model).update(humanoid.figure.neutral)
+    assert displacement.value(state) == 0.0
+    q = humanoid.figure.neutral.copy()
+    q[7 + 3] += 0.5
+    np.testing.assert_allclose(displacement.value(state.update(q)), 0.25 * humanoid.figure.neutral_weights[6 + 3])
+
+
+def penalty(humanoid: Any, ratio: float) -> float:
+    """Discomfort of one joint at a ratio of its range from the upper limit, without the term of neutral."""
+    figure = humanoid.figure
+    figure.neutral_weights[:] = 0.0
+    term = tasks.Discomfort().resolve(humanoid, figure.neutral)
+    q = figure.neutral.copy()
+    q[12] = figure.limits.upper[5] - ratio * (figure.limits.upper[5] - figure.limits.lower[5])
+    state = State(humanoid.model)
+    return float(term.value(state.update(q)) - term.value(state.update(figure.neutral)))
+
+
+def test_discomfort_rises_from_0_to_1_in_the_last_tenth_of_the_range(humanoid: Any) -> None:
+    # [(sin(5 r + pi/2) + 1) / 2]^100 worked out with bc to six digits.
+    for ratio, expected in [(0.0, 1.0), (0.01, 0.939407), (0.05, 0.208757), (0.1, 0.001807), (0.2, 0.0)]:
+        np.testing.assert_allclose(penalty(humanoid, ratio), expected, atol=2e-6)
+
+
+def test_discomfort_is_bounded_and_quiet_beyond_limits(humanoid: Any) -> None:
+    for ratio in (-1e-6, -0.1, -1.0, -1e6):
+        np.testing.assert_allclose(penalty(humanoid, ratio), 1.0, atol=1e-6)
+    term = tasks.Discomfort().resolve(humanoid, humanoid.figure.neutral)
+    state = State(humanoid.model)
+    for size in (10.0, 1e8):
+        q = humanoid.figure.neutral + np.r_[np.zeros(7), np.full(humanoid.model.nv - 6, size)]
+        state.update(q)
+        assert np.isfinite(term.value(state))
+        assert np.isfinite(term.gradient(state)).all()
+        assert (term.curvature(state) > 0.0).all()
+
+
+def test_discomfort_counts_the_stiffest_joint_over_its_range_as_one(humanoid: Any) -> None:
+    figure = humanoid.figure
+    figure.limits.lower[:], figure.limits.upper[:] = -1.0, 1.0
+    figure.neutral_weights[6:] = 2.0
+    figure.neutral_weights[6 + 4] = 50.0
+    term = tasks.Discomfort().resolve(humanoid, figure.neutral)
+    state = State(humanoid.model)
+    rest = term.value(state.update(figure.neutral))
+    q = figure.neutral.copy()
+    q[7 + 4] = 0.5
+    np.testing.assert_allclose(term.value(state.update(q)) - rest, 0.25**2, atol=1e-12)
+    q = figure.neutral.copy()
+    q[7 + 5] = 0.5
+    np.testing.assert_allclose(term.value(state.update(q)) - rest, 0.25**2 * 2.0 / 50.0, atol=1e-12)
+
+
+def test_raising_the_whole_body_costs_the_weight_of_each_segment_times_the_height(humanoid: Any) -> None:
+    model = humanoid.model
+    q = humanoid.figure.neutral
+    term = tasks.PotentialEnergy().resolve(humanoid, q)
+    state = State(model)
+    assert term.value(state.update(q)) == 0.0
+    raised = q.copy()
+    raised[:3] += (0.3, -0.2, 0.5)
+    expected = sum((inertia.mass * 9.80665 * 0.5) ** 2 for inertia in list(model.inertias)[1:])
+    np.testing.assert_allclose(term.value(state.update(raised)), expected)
+    # Where the figure stands at the start does not matter.
+    elsewhere = tasks.PotentialEnergy().resolve(humanoid, raised)
+    assert elsewhere.value(state.update(raised)) == 0.0
+
+
+def test_squared_changes_are_those_of_the_potential_energies_of_the_segments(
+    humanoid: Any, random_posture: Any
+) -> None:
+    model = humanoid.model
+    q = random_posture(model, np.random.default_rng(8))
+    start = humanoid.figure.neutral
+    term = tasks.PotentialEnergy().resolve(humanoid, start)
+    total = 0.0
+    for joint in range(1, model.njoints):
+        # Pinocchio's own potential energy of a model in which all but one body has lost its mass.
+        alone = model.copy()
+        for other in range(1, model.njoints):
+            if other != joint:
+                alone.inertias[other] = pin.Inertia.Zero()
+        alone.gravity.linear = np.array([0.0, 0.0, -9.80665])
+        data = alone.createData()
+        energies = [pin.computePotentialEnergy(alone, data, posture) for posture in (q, start)]
+        total += (energies[0] - energies[1]) ** 2
+    np.testing.assert_allclose(term.value(State(model).update(q)), total)

@@ -1,0 +1,89 @@
+"""Bad input is refused in one sentence that says where and how to mend it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from wholebody import InputError, UnknownNameError, tasks
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: tasks.Point("tip", (550.0, -250.0, 950.0)), r"Point\('tip'\): target is 1126 m away; .* millimetres"),
+        (lambda: tasks.Point("tip", (0.0, NAN, 0.0)), r"Point\('tip'\): target is .*nan.*; give finite numbers"),
+        (lambda: tasks.Point("tip", (0.0, 1.0)), r"Point\('tip'\): target has shape \(3,\), not \(2,\)"),
+        (lambda: tasks.Point("tip", "here"), r"Point\('tip'\): target takes numbers"),
+        (lambda: tasks.Point("tip", (0, 0, 0), offset=(0, 0)), "offset has shape"),
+        (lambda: tasks.Point("tip", (0, 0, 0), weight=0), "weight is 0; give a positive number"),
+        (lambda: tasks.Point("tip", (0, 0, 0), weight=-1), "weight is -1; give a positive number"),
+        (lambda: tasks.Point("tip", (0, 0, 0), weight=NAN), "weight is nan; give finite"),
+        (lambda: tasks.Frame("tip", (0, 0, 0, 0, 0, 0, 2)), r"Frame\('tip'\): target.*quaternion"),
+        (lambda: tasks.Frame("tip", (0, 0, 2000.0)), "2000 m away"),
+        (lambda: tasks.Frame("tip", (0, 0)), r"Frame\('tip'\)"),
+        (lambda: tasks.Orientation("tip", (0, 0, 0)), "takes a quaternion"),
+        (lambda: tasks.Orientation("tip", (0, 0, 0, 0.5)), "quaternion"),
+        (lambda: tasks.Orientation("tip", np.diag([1.0, 1.0, -1.0])), r"Orientation\('tip'\)"),
+        (lambda: tasks.Axis("tip", (1, 0, 0)), "either a direction or a place"),
+        (lambda: tasks.Axis("tip", (1, 0, 0), direction=(0, 0, 1), toward=(0, 0, 1)), "either a direction or a place"),
+        (lambda: tasks.Axis("tip", (0, 0, 0), direction=(0, 0, 1)), "axis is .* has no direction"),
+        (lambda: tasks.Axis("tip", (1, 0, 0), toward=(0, 0, 1e3)), "1000 m away"),
+        (lambda: tasks.CenterOfMass((0, 0, 0), axes="z"), "axes is 'z'"),
+        (lambda: tasks.Plane("tip", (0, 0, 0)), "no direction"),
+        (lambda: tasks.Plane("tip", (0, 0, 1), side="below"), "side is 'below'; give 'on' or 'above'"),
+        (lambda: tasks.Hold("tip", (0, 0, NAN)), r"Hold\('tip'\): at"),
+        (lambda: tasks.Effort(0.0), "Effort: weight is 0"),
+        (lambda: tasks.Discomfort("much"), "Discomfort: weight takes numbers"),
+        (lambda: tasks.PotentialEnergy(-1.0), "PotentialEnergy: weight is -1"),
+        (lambda: tasks.Displacement(NAN), "Displacement: weight is nan"),
+    ],
+)
+def test_values_are_checked_when_a_term_is_written(make: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda name: tasks.Point(name, (0, 0, 0)),
+        lambda name: tasks.Frame(name, (0, 0, 0)),
+        lambda name: tasks.Orientation(name, np.eye(3)),
+        lambda name: tasks.Axis(name, (1, 0, 0), direction=(1, 0, 0)),
+        lambda name: tasks.Relative("tip", name),
+        lambda name: tasks.Relative(name, "tip"),
+        lambda name: tasks.Hold(name),
+        lambda name: tasks.Hold("tip", relative_to=name),
+        lambda name: tasks.Plane(name, (0, 0, 1)),
+        lambda name: tasks.Balance((name,)),
+        lambda name: tasks.Posture("standing", joints=[name]),
+        lambda name: tasks.StepLimit(joints={name: 1.0}),
+    ],
+)
+def test_unknown_names_come_with_the_nearest(make: Any, humanoid: Any) -> None:
+    with pytest.raises(
+        UnknownNameError, match=r"^[A-Z]\w+: no .* is called 'larm_elbow_join'; did you mean .*larm_elbow_joint"
+    ):
+        make("larm_elbow_join").resolve(humanoid, humanoid.figure.neutral)
+
+
+def test_other_mistakes_are_found_when_the_figure_is_known(humanoid: Any) -> None:
+    q = humanoid.figure.neutral
+    with pytest.raises(UnknownNameError, match="Posture: no posture is called 'standin'; did you mean standing"):
+        tasks.Posture("standin").resolve(humanoid, q)
+    with pytest.raises(InputError, match=r"Posture: target has shape \(35,\)"):
+        tasks.Posture(q[1:]).resolve(humanoid, q)
+    with pytest.raises(InputError, match="quaternion that is not of unit length"):
+        tasks.Posture(2.0 * q).resolve(humanoid, q)
+    with pytest.raises(InputError, match="Relative: 'tip' cannot move relative to 'larm_effector_body'"):
+        tasks.Relative("tip", "larm_effector_body").resolve(humanoid, q)
+    with pytest.raises(InputError, match="has no reach cones"):
+        tasks.ReachCones().resolve(humanoid, q)
+    humanoid.figure.cones = {"left_shoulder": None}
+    with pytest.raises(UnknownNameError, match="ReachCones: no reach cone is called 'left_sholder'"):
+        tasks.ReachCones(("left_sholder",)).resolve(humanoid, q)
