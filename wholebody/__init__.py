@@ -4,10 +4,10 @@ The public names are loaded when they are first used, so that ``import wholebody
 
     import wholebody as wb
 
-    figure = wb.load("human")
-    scene = wb.Scene(figure)
+    scene = wb.Scene(wb.load("human"))
     scene.add(wb.Box((1.2, 0.7, 0.04)), name="table", at=(0.6, 0.0, 0.72))
-    solution = wb.solve(wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.55, -0.25, 0.95))]))
+    problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.55, -0.25, 0.95))])
+    solution = wb.solve(problem, method="qp")
 """
 
 from __future__ import annotations
@@ -25,33 +25,113 @@ from wholebody.errors import (
 from wholebody.version import __version__
 
 if TYPE_CHECKING:
-    from wholebody.figures.figure import Figure as Figure
-
-_LAZY: dict[str, str] = {
-    "Figure": "wholebody.figures.figure",
-}
+    from wholebody.assessment import Assessment, assess
+    from wholebody.figures import Figure, load
+    from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+    from wholebody.methods.qp.method import QP
+    from wholebody.methods.solve import solve
+    from wholebody.problem import Problem, Solution
+    from wholebody.scene import Scene
+    from wholebody.taskfile import Task, read_task
+    from wholebody.tasks import (
+        Axis,
+        Balance,
+        Bound,
+        CenterOfMass,
+        Constraint,
+        Discomfort,
+        Displacement,
+        Effort,
+        Frame,
+        Freeze,
+        Goal,
+        Hold,
+        Measure,
+        Orientation,
+        Plane,
+        Point,
+        Posture,
+        PotentialEnergy,
+        ReachCones,
+        Relative,
+        StepLimit,
+    )
+    from wholebody.view import Viewer
 
 __all__ = [
+    "QP",
+    "Assessment",
+    "Axis",
+    "Balance",
+    "Bound",
+    "Box",
+    "Capsule",
+    "CenterOfMass",
+    "Constraint",
+    "Discomfort",
+    "Displacement",
+    "Effort",
+    "Ellipsoid",
+    "Figure",
     "FileFormatError",
+    "Frame",
+    "Freeze",
+    "Goal",
+    "HalfSpace",
+    "Hold",
+    "Hull",
     "InputError",
+    "Measure",
+    "Mesh",
     "MissingPackageError",
+    "Orientation",
+    "Plane",
+    "Point",
+    "Posture",
+    "PotentialEnergy",
+    "Problem",
+    "ReachCones",
+    "Relative",
+    "Scene",
+    "Shape",
+    "Solution",
+    "Sphere",
+    "StepLimit",
+    "Task",
     "UnknownNameError",
+    "Viewer",
     "WholebodyError",
     "__version__",
-    *_LAZY,
+    "assess",
+    "load",
+    "read_task",
+    "solve",
 ]
+
+_MODULES = {
+    "wholebody.assessment": "Assessment assess",
+    "wholebody.figures": "Figure load",
+    "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
+    "wholebody.methods.qp.method": "QP",
+    "wholebody.methods.solve": "solve",
+    "wholebody.problem": "Problem Solution",
+    "wholebody.scene": "Scene",
+    "wholebody.taskfile": "Task read_task",
+    "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
+    "Hold Measure Orientation Plane Point Posture PotentialEnergy ReachCones Relative StepLimit",
+    "wholebody.view": "Viewer",
+}
+_HOME = {name: module for module, names in _MODULES.items() for name in names.split()}
 
 
 def __getattr__(name: str) -> object:
     """Load a public name on its first use (PEP 562)."""
-    try:
-        module = _LAZY[name]
-    except KeyError:
-        raise AttributeError(f"module 'wholebody' has no attribute {name!r}") from None
-    value = getattr(import_module(module), name)
+    if name not in _HOME:
+        raise AttributeError(f"module 'wholebody' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_LAZY})
+    return sorted({*globals(), *__all__})
