@@ -1,0 +1,155 @@
+"""The figure's pieces and the things around it: one node per joint, its pieces fixed children."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.view import drawing, style
+from wholebody.view.stage import Moment, Stage
+from wholebody.view.style import Color
+from wholebody.view.subject import Subject
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Body:
+    """One piece as it is drawn.
+
+    Attributes:
+        carrier: node that moves with the joint.
+        path: node of the piece, below the carrier.
+        joint: index of the joint.
+        thing: name of the object it is part of; None for the figure's own.
+        color: when it touches nothing.
+        plate: whether it is a half-space, of which only a plate is drawn.
+    """
+
+    carrier: str
+    path: str
+    joint: int
+    thing: str | None
+    color: Color
+    plate: bool
+
+    def state_color(self, state: Color) -> Color:
+        """Colour when it touches: the figure's pieces take it on, things are tinted, half-spaces stay as they are."""
+        if self.plate:
+            return self.color
+        amount = style.TINT if self.thing is not None else 1.0
+        return style.tinted(self.color, state, amount)
+
+
+class Bodies:
+    """All pieces of a scene on the stage, in the order of its geometry model."""
+
+    def __init__(self, scene: Subject, see_through: Collection[str]) -> None:
+        """Read the scene.
+
+        Args:
+            scene: what to draw.
+            see_through: names of things that should not hide the figure.
+        """
+        self.scene = scene
+        self.see_through = frozenset(see_through)
+        self.revision = scene.revision
+        self.all: list[Body] = []
+        numbers = {name: number for number, name in enumerate(scene.objects)}
+        names = scene.model.names
+        for piece, owner in zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True):
+            thing = owner if owner in numbers else None
+            color = self._thing_color(thing, numbers[thing], piece) if thing is not None else style.FIGURE
+            folder = f"{style.OBJECT_NODE}/{node(thing)}" if thing is not None else style.FIGURE_NODE
+            carrier = f"{folder}/{node(names[piece.parentJoint])}"
+            piece.geometry.computeLocalAABB()  # coal leaves the box undefined until it is asked for
+            plate = type(piece.geometry).__name__ == "Halfspace"
+            self.all.append(Body(carrier, f"{carrier}/{node(piece.name)}", int(piece.parentJoint), thing, color, plate))
+        self.carriers = {body.carrier: body.joint for body in self.all}
+        self._things = [index for index, body in enumerate(self.all) if body.thing is not None]
+
+    def _thing_color(self, thing: str, number: int, piece: Any) -> Color:
+        given = getattr(self.scene.objects[thing], "color", None)
+        if given is not None:
+            color: Color = tuple(float(part) for part in given)  # type: ignore[assignment]
+        elif type(piece.geometry).__name__ == "Halfspace":
+            upward = float((piece.placement.rotation @ piece.geometry.n)[2]) > 0.9
+            color = style.FLOOR if upward else style.with_opacity(style.object_color(number), style.SEE_THROUGH)
+        else:
+            color = style.object_color(number)
+        return style.with_opacity(color, style.SEE_THROUGH) if thing in self.see_through else color
+
+    def build(self, stage: Stage) -> None:
+        """Put every piece on the stage, in place of those that were there."""
+        stage.remove(style.FIGURE_NODE)
+        stage.remove(style.OBJECT_NODE)
+        for body, piece in zip(self.all, self.scene.geometry.geometryObjects, strict=True):
+            stage.put(body.path, drawing.piece(piece.geometry, body.path, body.color))
+            stage.place(body.path, piece.placement.homogeneous)
+        floor = next((index for index, body in enumerate(self.all) if body.plate and body.color[:3] == style.FLOOR[:3]), None)
+        stage.set("/Ground", "visible", floor is None)  # what shows shadows where there is no floor
+        grid = np.eye(4)
+        if floor is not None:
+            piece = self.scene.geometry.geometryObjects[floor]
+            top = drawing.plate_placement(np.asarray(piece.geometry.n), float(piece.geometry.d))
+            grid = piece.placement.homogeneous @ top
+            grid[:3, 3] += grid[:3, 2] * style.PLATE[2] / 2
+        grid[:3, 3] += 0.0015 * grid[:3, 2]  # m: clear of the floor, else the two flicker
+        stage.place("/Grid", grid)
+
+    def pose(self, moment: Moment, data: Any) -> None:
+        """Place the joints where `data` has them, and the things where the scene has them now."""
+        for path, joint in self.carriers.items():
+            moment.transforms[path] = data.oMi[joint].homogeneous
+        pieces = self.scene.geometry.geometryObjects
+        for index in self._things:
+            moment.transforms[self.all[index].path] = pieces[index].placement.homogeneous
+        for body in self.all:
+            moment.colors[body.path] = body.color
+
+    def ghost(self, stage: Stage, number: int, data: Any, color: Color) -> None:
+        """Draw the figure and what it carries once more, transparent, at the posture of `data`."""
+        root = f"{style.GHOST_NODE}/{number}"
+        for body, piece in zip(self.all, self.scene.geometry.geometryObjects, strict=True):
+            if body.joint == 0 and body.thing is not None:
+                continue
+            path = f"{root}{body.path}"
+            stage.put(path, drawing.piece(piece.geometry, path, color, shadow=False))
+            stage.place(path, piece.placement.homogeneous)
+            stage.place(f"{root}{body.carrier}", data.oMi[body.joint].homogeneous)
+
+    def corners(self, data: Any, *, things: bool) -> Array:
+        """Corners (n, 3) in the world of the boxes around the pieces, of the figure or of the things; no half-spaces."""
+        chosen = [n for n, body in enumerate(self.all) if not body.plate and (body.thing is not None) == things]
+        return np.concatenate([np.zeros((0, 3)), *(self._box(index, data) for index in chosen)])
+
+    def tops(self, data: Any) -> dict[str, tuple[str, Array]]:
+        """Where the name of each thing goes: by node, the name and the top middle (3,) of its boxes; no half-spaces."""
+        found: dict[str, list[Array]] = {}
+        for index in self._things:
+            body = self.all[index]
+            if not body.plate and body.thing is not None:
+                found.setdefault(body.thing, []).append(self._box(index, data))
+        tops = {}
+        for name, boxes in found.items():
+            corners = np.concatenate(boxes)
+            low, high = corners.min(axis=0), corners.max(axis=0)
+            tops[f"{style.NAME_NODE}/{node(name)}"] = (name, np.array([*(low + high)[:2] / 2, high[2]]))
+        return tops
+
+    def _box(self, index: int, data: Any) -> Array:
+        """Corners (8, 3) in the world of the box around a piece."""
+        piece = self.scene.geometry.geometryObjects[index]
+        low, high = piece.geometry.aabb_local.min_, piece.geometry.aabb_local.max_
+        local = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+        place = data.oMi[self.all[index].joint] * piece.placement
+        return np.asarray(local @ place.rotation.T + place.translation)
+
+
+def node(name: str) -> str:
+    """A name as a node of the page's tree, where a slash would begin a child."""
+    return name.replace("/", "|")

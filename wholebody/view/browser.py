@@ -1,0 +1,257 @@
+"""A headless Chromium, spoken to over two pipes with its DevTools protocol: no port, and it ends when we do."""
+
+from __future__ import annotations
+
+import atexit
+import base64
+import fcntl
+import json
+import os
+import select
+import shutil
+import signal
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from wholebody.errors import MissingPackageError, WholebodyError
+
+_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "chromium-headless-shell")
+_FLAGS = (
+    "--headless",
+    "--no-sandbox",  # a container has none to offer; the one page opened is our own, and it has no network
+    "--disable-gpu",
+    "--enable-unsafe-swiftshader",
+    "--disable-dev-shm-usage",
+    "--disable-quic",
+    "--no-first-run",
+    "--no-default-browser-check",
+    "--disable-extensions",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-features=Translate,OptimizationHints,MediaRouter",
+    "--hide-scrollbars",
+    "--mute-audio",
+    "--force-device-scale-factor=1",
+    "--force-color-profile=srgb",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+    "--remote-debugging-pipe",
+)
+
+
+class BrowserError(WholebodyError):
+    """The headless browser did not do what was asked of it."""
+
+
+def find_chromium() -> str | None:
+    """Path of a Chromium or Chrome: what WHOLEBODY_CHROMIUM names, else the first on the PATH; None without any."""
+    named = os.environ.get("WHOLEBODY_CHROMIUM")
+    if named:
+        return shutil.which(named)
+    return next((path for name in _NAMES if (path := shutil.which(name))), None)
+
+
+class Browser:
+    """One headless Chromium with one page.
+
+    Attributes:
+        errors: JavaScript errors of the page since it was opened.
+        requests: addresses the page asked for since it was opened.
+    """
+
+    def __init__(self, size: tuple[int, int] = (960, 720), timeout: float = 60.0) -> None:
+        """Start Chromium.
+
+        Args:
+            size: width and height of the page, pixels.
+            timeout: longest wait for any answer, seconds.
+
+        Raises:
+            MissingPackageError: there is no Chromium.
+            BrowserError: it did not start.
+        """
+        executable = find_chromium()
+        if executable is None:
+            raise MissingPackageError(
+                "pictures and movies need Chromium, and none was found; run: apt-get install chromium "
+                "(or name one in WHOLEBODY_CHROMIUM); save() writes HTML without a browser"
+            )
+        self.timeout = timeout
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        self._number = 0
+        self._partial = b""
+        self._session: str | None = None
+        self._answers: dict[int, dict[str, Any]] = {}
+        self._loaded = False
+        self._pid: int | None = None
+        self._folder = Path(tempfile.mkdtemp(prefix="wholebody-browser-"))
+        self._start(executable)
+        atexit.register(self.close)
+        try:
+            target = self._call("Target.createTarget", url="about:blank")["targetId"]
+            self._session = self._call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+            for domain in ("Page", "Runtime", "Network"):
+                self._call(f"{domain}.enable")
+            self.resize(size)
+        except BaseException:
+            self.close()
+            raise
+
+    def _start(self, executable: str) -> None:
+        """Spawn Chromium with the reading end of one pipe as its descriptor 3, the writing end of another as 4."""
+        theirs_in, self._out = os.pipe()
+        self._in, theirs_out = os.pipe()
+        high_in = fcntl.fcntl(theirs_in, fcntl.F_DUPFD_CLOEXEC, 10)  # clear of 3 and 4, so that neither dup2 hits the other
+        high_out = fcntl.fcntl(theirs_out, fcntl.F_DUPFD_CLOEXEC, 10)
+        actions = [(os.POSIX_SPAWN_OPEN, fd, os.devnull, flag, 0) for fd, flag in ((0, os.O_RDONLY), (1, os.O_WRONLY), (2, os.O_WRONLY))]
+        actions += [(os.POSIX_SPAWN_DUP2, high_in, 3), (os.POSIX_SPAWN_DUP2, high_out, 4)]  # type: ignore[list-item]
+        command = [executable, *_FLAGS, f"--user-data-dir={self._folder / 'profile'}", "about:blank"]
+        try:
+            self._pid = os.posix_spawn(executable, command, os.environ, file_actions=actions, setpgroup=0)
+        except OSError as error:
+            raise BrowserError(f"{executable} could not be started: {error}") from None
+        finally:
+            for descriptor in (theirs_in, theirs_out, high_in, high_out):
+                os.close(descriptor)
+
+    def resize(self, size: tuple[int, int]) -> None:
+        """Give the page another width and height, pixels."""
+        self._call("Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=False)
+
+    def open(self, url: str) -> None:
+        """Open an address and wait until the page of a `Viewer` has drawn what it was sent.
+
+        Raises:
+            BrowserError: the page did not load, or has an error.
+        """
+        self.errors.clear()
+        self.requests.clear()
+        self._loaded = False
+        if error := self._call("Page.navigate", url=url).get("errorText"):
+            raise BrowserError(f"the browser could not open {url}: {error}")
+        end = time.monotonic() + self.timeout
+        while not self._loaded:
+            self._receive(end)
+        self.until("window.wholebody !== undefined && window.wholebody.ready")
+
+    def open_html(self, page: str) -> None:
+        """Open a page from its HTML, as a file without network."""
+        path = self._folder / "page.html"
+        path.write_text(page, encoding="utf-8")
+        self.open(path.as_uri())
+
+    def until(self, condition: str) -> None:
+        """Wait until a JavaScript expression is true.
+
+        Raises:
+            BrowserError: it did not become true in time, or the page has an error.
+        """
+        end = time.monotonic() + self.timeout
+        while not self.evaluate(condition):
+            if self.errors:
+                raise BrowserError(f"the page failed: {self.errors[0]}")
+            if time.monotonic() > end:
+                raise BrowserError(f"the page did not come to `{condition}` within {self.timeout:g} s")
+            time.sleep(0.02)
+
+    def evaluate(self, expression: str) -> Any:
+        """Value of a JavaScript expression in the page; promises are awaited.
+
+        Raises:
+            BrowserError: it throws.
+        """
+        answer = self._call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in answer:
+            raise BrowserError(f"the page failed: {_message(answer['exceptionDetails'])}")
+        return answer["result"].get("value")
+
+    def capture(self) -> bytes:
+        """PNG of the drawing, without the controls on top of it."""
+        if self.errors:
+            raise BrowserError(f"the page failed: {self.errors[0]}")
+        data: str = self.evaluate("viewer.capture_image()")
+        return base64.b64decode(data.partition(",")[2])
+
+    def close(self) -> None:
+        """End Chromium and remove its temporary files. Doing it again does nothing."""
+        if self._pid is None:
+            return
+        atexit.unregister(self.close)
+        pid, self._pid = self._pid, None
+        os.close(self._out)  # Chromium ends when its pipe does
+        os.close(self._in)
+        if not _ended(pid, 3.0):
+            os.killpg(pid, signal.SIGKILL)
+            _ended(pid, 3.0)
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def __enter__(self) -> Browser:
+        """Return the browser."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
+
+    # ---- the protocol: JSON messages, each ended by a zero byte
+
+    def _call(self, method: str, **params: Any) -> dict[str, Any]:
+        self._number += 1
+        message: dict[str, Any] = {"id": self._number, "method": method, "params": params}
+        if self._session is not None:
+            message["sessionId"] = self._session
+        rest = memoryview(json.dumps(message).encode() + b"\0")
+        try:
+            while rest:
+                rest = rest[os.write(self._out, rest) :]
+        except OSError:
+            raise BrowserError("the browser has ended; make a new one") from None
+        end = time.monotonic() + self.timeout
+        while self._number not in self._answers:
+            self._receive(end)
+        answer = self._answers.pop(self._number)
+        if "error" in answer:
+            raise BrowserError(f"the browser refused {method}: {answer['error'].get('message')}")
+        result: dict[str, Any] = answer["result"]
+        return result
+
+    def _receive(self, end: float) -> None:
+        """Take in what the browser says next."""
+        if not select.select([self._in], [], [], max(end - time.monotonic(), 0.0))[0]:
+            raise BrowserError(f"the browser did not answer within {self.timeout:g} s")
+        chunk = os.read(self._in, 1 << 20)
+        if not chunk:
+            raise BrowserError("the browser ended unexpectedly; try it by hand: chromium --headless --dump-dom about:blank")
+        *whole, self._partial = (self._partial + chunk).split(b"\0")
+        for text in whole:
+            message = json.loads(text)
+            params = message.get("params", {})
+            if "id" in message:
+                self._answers[message["id"]] = message
+            elif message["method"] == "Runtime.exceptionThrown":
+                self.errors.append(_message(params["exceptionDetails"]))
+            elif message["method"] == "Network.requestWillBeSent":
+                self.requests.append(params["request"]["url"])
+            elif message["method"] == "Page.loadEventFired":
+                self._loaded = True
+
+
+def _message(details: dict[str, Any]) -> str:
+    text = details.get("exception", {}).get("description") or details.get("text", "unknown error")
+    return str(text).splitlines()[0]
+
+
+def _ended(pid: int, timeout: float) -> bool:
+    """Wait for a child process; False if it still runs after `timeout` seconds."""
+    end = time.monotonic() + timeout
+    while time.monotonic() < end:
+        try:
+            if os.waitpid(pid, os.WNOHANG)[0] == pid:
+                return True
+        except ChildProcessError:
+            return True
+        time.sleep(0.01)
+    return False

@@ -1,0 +1,155 @@
+"""The commands that the page understands, as msgpack: meshcat's own, and `label` and `look` of page.js."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.view.server import ANIMATION, CAMERA, DELETE, OBJECT, PROPERTY, STOP, TRANSFORM, Command
+
+Array = NDArray[np.float64]
+_FLOATS, _INTEGERS = 0x17, 0x16  # msgpack extension types: Float32Array, Uint32Array
+
+
+def floats(values: Any) -> Any:
+    """Numbers as the page's Float32Array, in C order."""
+    return _extension(_FLOATS, np.ascontiguousarray(values, dtype="<f4").tobytes())
+
+
+def integers(values: Any) -> Any:
+    """Numbers as the page's Uint32Array, in C order."""
+    return _extension(_INTEGERS, np.ascontiguousarray(values, dtype="<u4").tobytes())
+
+
+def set_object(path: str, three: Mapping[str, Any]) -> Command:
+    """Put a three.js object (its JSON form) at a node."""
+    return Command(OBJECT, path, "", _pack({"type": "set_object", "path": path, "object": dict(three)}))
+
+
+def label(path: str, text: str, color: str, size: float) -> Command:
+    """Put a text at a node, upright and as large from near as from far.
+
+    Args:
+        path: the node.
+        text: one line.
+        color: of the letters, as in CSS.
+        size: height, as a fraction of the distance at which it is looked at.
+    """
+    return Command(OBJECT, path, "", _pack({"type": "label", "path": path, "text": text, "color": color, "size": size}))
+
+
+def set_transform(path: str, matrix: Array) -> Command:
+    """Place a node: matrix (4, 4) relative to its parent node, scale allowed."""
+    return Command(TRANSFORM, path, "", _transform_head(path) + np.asarray(matrix, dtype="<f4").T.tobytes())
+
+
+@lru_cache(maxsize=8192)
+def set_property(path: str, name: str, value: Any) -> Command:
+    """Set a property of a node's three.js object; `color` takes red, green, blue, alpha and reaches all below."""
+    payload = _pack({"type": "set_property", "path": path, "property": name, "value": value})
+    return Command(PROPERTY, path, name, payload)
+
+
+def delete(path: str) -> Command:
+    """Remove a node and all below it."""
+    return Command(DELETE, path, "", _pack({"type": "delete", "path": path}))
+
+
+def look(target: Array, fov: float, *, eye: Array | None = None, direction: Array | None = None,
+         points: Array | None = None, margin: float = 1.0) -> Command:
+    """Aim the camera at a target, from `eye`, or from `direction` so that all `points` (n, 3) are in the picture.
+
+    Args:
+        target: (3,) what is in the middle.
+        fov: vertical angle of view, degrees.
+        eye: (3,) where the camera is.
+        direction: (3,) from the target towards the camera.
+        points: (n, 3) what must be seen.
+        margin: how much wider than the points the picture is, 1 being exact.
+    """
+    command: dict[str, Any] = {"type": "look", "target": np.asarray(target, dtype=float).tolist(), "fov": float(fov)}
+    if eye is not None:
+        command["eye"] = np.asarray(eye, dtype=float).tolist()
+    else:
+        command["direction"] = np.asarray(direction, dtype=float).tolist()
+        command["points"] = np.asarray(points, dtype=float).round(6).ravel().tolist()
+        command["margin"] = float(margin)
+    return Command(CAMERA, "", "", _pack(command))
+
+
+class Track(NamedTuple):
+    """Values of one property of one node over time.
+
+    Attributes:
+        path: the node.
+        name: the property, as three.js names it: "position", "material.color".
+        kind: "vector3", "quaternion", "color", "number" or "bool".
+        values: (n, size) one row a frame; n booleans for "bool".
+        steps: whether the value jumps at each frame instead of passing smoothly to the next.
+    """
+
+    path: str
+    name: str
+    kind: str
+    values: Any
+    steps: bool = False
+
+    def lower(self, times: Array) -> dict[str, Any]:
+        """Return the track as three.js reads it."""
+        if self.kind == "bool":
+            values: Any = [bool(value) for value in np.ravel(self.values)]
+        else:
+            values = floats(self.values)
+        track = {"name": f".{self.name}", "type": self.kind, "times": floats(times), "values": values}
+        if self.steps:
+            track["interpolation"] = 2300  # three.js: InterpolateDiscrete
+        return track
+
+
+def set_animation(tracks: Sequence[Track], dt: float, frames: int, repetitions: float) -> Command:
+    """Let the page play a motion by its own clock.
+
+    Args:
+        tracks: what changes.
+        dt: seconds from frame to frame.
+        frames: how many there are.
+        repetitions: how often it is played; infinity for ever.
+    """
+    times = np.arange(frames) * dt
+    clips: dict[str, list[dict[str, Any]]] = {}
+    for track in tracks:
+        clips.setdefault(track.path, []).append(track.lower(times))
+    animations = [
+        {"path": path, "clip": {"fps": 1, "name": path, "tracks": lowered}} for path, lowered in clips.items()
+    ]
+    options = {"play": True, "repetitions": float(repetitions)}
+    return Command(ANIMATION, "", "", _pack({"type": "set_animation", "animations": animations, "options": options}))
+
+
+def stop_animation() -> Command:
+    """End the motion; what it moved goes back to where it was before."""
+    empty = {"type": "set_animation", "animations": [], "options": {"play": False}}
+    return Command(ANIMATION, "", STOP, _pack(empty))
+
+
+@lru_cache(maxsize=4096)
+def _transform_head(path: str) -> bytes:
+    """All of a set_transform message before its 64 bytes of numbers: packing it each time costs ten times as much."""
+    message = _pack({"type": "set_transform", "path": path, "matrix": _extension(_FLOATS, bytes(64))})
+    return message[:-64]
+
+
+def _extension(code: int, data: bytes) -> Any:
+    import umsgpack
+
+    return umsgpack.Ext(code, data)
+
+
+def _pack(message: dict[str, Any]) -> bytes:
+    import umsgpack
+
+    return bytes(umsgpack.packb(message))

@@ -1,0 +1,251 @@
+"""Convex pieces (coal) and markers as three.js objects, in the JSON form that the page loads."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError
+from wholebody.view import style
+from wholebody.view.commands import floats, integers
+from wholebody.view.style import Color
+
+Array = NDArray[np.float64]
+Three = dict[str, Any]
+_FRONT, _BOTH = 0, 2
+_AROUND, _ALONG = 32, 8
+
+
+def piece(geometry: Any, name: str, color: Color, *, shadow: bool = True) -> Three:
+    """A piece as it is, in its own coordinates.
+
+    Args:
+        geometry: coal's Sphere, Capsule, Box, Ellipsoid, Convex, Halfspace, Cylinder, Cone or a BVHModel.
+        name: an identifier that nothing else in the page has.
+        color: red, green, blue, alpha.
+        shadow: whether it throws a shadow.
+
+    Raises:
+        InputError: a geometry that cannot be drawn.
+    """
+    shape, scale, center, flat = _shape(geometry, name)
+    if type(geometry).__name__ == "Halfspace":
+        shadow = False
+    return _mesh(name, shape, _material(color, flat=flat), matrix=_matrix(scale, center), shadow=shadow)
+
+
+def _shape(geometry: Any, name: str) -> tuple[Three, tuple[float, float, float], Array | None, bool]:
+    """Three.js geometry, scale, placement (4, 4) or None, and whether its faces are flat."""
+    kind = type(geometry).__name__
+    one = (1.0, 1.0, 1.0)
+    if kind == "Sphere":
+        return _ball(float(geometry.radius)), one, None, False
+    if kind == "Ellipsoid":
+        a, b, c = (float(r) for r in geometry.radii)
+        return _ball(1.0), (a, b, c), None, False
+    if kind == "Box":
+        width, height, depth = (2 * float(side) for side in geometry.halfSide)
+        return {"type": "BoxGeometry", "width": width, "height": height, "depth": depth}, one, None, True
+    if kind == "Capsule":
+        return _triangles(*capsule_surface(float(geometry.radius), float(geometry.halfLength))), one, None, False
+    if kind in ("Cylinder", "Cone"):
+        top = float(geometry.radius) if kind == "Cylinder" else 0.0
+        size = {"radiusTop": top, "radiusBottom": float(geometry.radius), "height": 2 * float(geometry.halfLength)}
+        return {"type": "CylinderGeometry", **size, "radialSegments": _AROUND}, one, _ALONG_Z, False
+    if kind == "Halfspace":
+        width, height, depth = style.PLATE
+        plate = {"type": "BoxGeometry", "width": width, "height": height, "depth": depth}
+        return plate, one, plate_placement(np.asarray(geometry.n), float(geometry.d)), True
+    if kind == "Convex":
+        return _triangles(np.asarray(geometry.points()), convex_faces(geometry), None), one, None, True
+    if kind.startswith("BVHModel"):
+        faces = [[geometry.tri_indices(i)[k] for k in range(3)] for i in range(geometry.num_tris)]
+        return _triangles(np.asarray(geometry.vertices()), np.array(faces, dtype=np.uint32), None), one, None, True
+    raise InputError(f"{name}: coal's {kind} cannot be drawn; turn it into convex pieces")
+
+
+_ALONG_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
+"""Three.js has its cylinders along y; coal along z."""
+
+
+def plate_placement(normal: Array, offset: float) -> Array:
+    """Placement (4, 4) of the plate that stands for the half-space n.x <= d: its upper face lies in the plane."""
+    placement = np.eye(4)
+    placement[:3, :3] = _turned_to(normal)
+    placement[:3, 3] = normal * (offset - style.PLATE[2] / 2)
+    return placement
+
+
+def _turned_to(direction: Array) -> Array:
+    """A rotation (3, 3) whose third column is the direction, of any length; the identity for z.
+
+    In plain floats: NumPy's cross product of two vectors takes 20 us, and there are dozens of arrows a frame.
+    """
+    x, y, z = (float(part) for part in direction)
+    length = math.sqrt(x * x + y * y + z * z)
+    x, y, z = x / length, y / length, z / length
+    sign = 1.0 if z >= 0 else -1.0  # Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017
+    a, b = -1.0 / (sign + z), x * y * -1.0 / (sign + z)
+    return np.array(
+        [[1.0 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]], dtype=float
+    )
+
+
+def arrow_placement(start: Array, direction: Array, length: float) -> Array:
+    """Placement (4, 4), scale included, that lays the unit arrow from `start` along `direction`; long ones stay slender."""
+    placement = np.eye(4)
+    width = min(length, style.WIDEST_ARROW)
+    placement[:3, :3] = _turned_to(direction) * (width, width, length)
+    placement[:3, 3] = start
+    return placement
+
+
+def rod_placement(start: Array, end: Array, radius: float) -> Array | None:
+    """Placement (4, 4) of the rod of radius 1 and length 1 between two points; None where they are the same."""
+    span = end - start
+    length = float(np.linalg.norm(span))
+    if length < 1e-6:
+        return None
+    placement = np.eye(4)
+    placement[:3, :3] = _turned_to(span) * (radius, radius, length)
+    placement[:3, 3] = start
+    return placement
+
+
+def capsule_surface(radius: float, half_length: float) -> tuple[Array, NDArray[np.uint32], Array]:
+    """Vertices, faces and normals of a capsule along z; rings of half a sphere, drawn apart."""
+    polar = np.linspace(0.0, np.pi / 2, _ALONG + 1)
+    polar = np.concatenate([polar, np.pi - polar[::-1]])
+    lift = np.repeat([half_length, -half_length], _ALONG + 1)
+    return revolved(np.column_stack([radius * np.sin(polar), lift + radius * np.cos(polar)]),
+                    np.column_stack([np.sin(polar), np.cos(polar)]))
+
+
+def revolved(profile: Array, normals: Array, around: int = _AROUND) -> tuple[Array, NDArray[np.uint32], Array]:
+    """Surface of revolution about z.
+
+    Args:
+        profile: (n, 2) distance from the axis and height, from the top down.
+        normals: (n, 2) the same of the outward normal.
+        around: steps of a turn.
+
+    Returns:
+        Vertices (n * around, 3), faces (m, 3) that wind outwards, normals (n * around, 3).
+    """
+    angle = np.arange(around) * 2 * np.pi / around
+    turn = np.column_stack([np.cos(angle), np.sin(angle)])
+    vertices = np.concatenate([profile[:, None, :1] * turn, np.broadcast_to(profile[:, None, 1:], (len(profile), around, 1))], 2)
+    outward = np.concatenate([normals[:, None, :1] * turn, np.broadcast_to(normals[:, None, 1:], (len(profile), around, 1))], 2)
+    ring, step = np.meshgrid(np.arange(len(profile) - 1), np.arange(around), indexing="ij")
+    here, beside = ring * around + step, ring * around + (step + 1) % around
+    below, across = here + around, beside + around
+    faces = np.concatenate([np.stack([here, below, across], -1), np.stack([here, across, beside], -1)])
+    return vertices.reshape(-1, 3), faces.reshape(-1, 3).astype(np.uint32), outward.reshape(-1, 3)
+
+
+def convex_faces(convex: Any) -> NDArray[np.uint32]:
+    """Triangles (m, 3) of a coal Convex, wound outwards."""
+    points = np.asarray(convex.points())
+    corners = [convex.polygons(i) for i in range(convex.num_polygons)]
+    faces = np.array([[corner[0], corner[1], corner[2]] for corner in corners], dtype=np.uint32)
+    a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - points.mean(axis=0)) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return faces
+
+
+# ---- markers: small things on top of the picture, never lit, never hidden
+
+
+def arrow(name: str, color: tuple[float, float, float], slender: float = 1.0) -> Three:
+    """An arrow of length 1 along z from the origin; thinner with a smaller `slender`."""
+    shaft, head = 0.045 * slender, 0.12 * slender
+    outline = np.array([[0.0, 1.0], [head, 0.68], [shaft, 0.68], [shaft, 0.0], [0.0, 0.0]])
+    vertices, faces, normals = revolved(outline, np.broadcast_to([1.0, 0.0], outline.shape), 16)  # unlit: any normal will do
+    return _mesh(name, _triangles(vertices, faces, normals), _overlay((*color, 1.0)), order=6)
+
+
+def rod(name: str, color: tuple[float, float, float]) -> Three:
+    """A rod of radius 1 and length 1 along z from the origin."""
+    shape = {"type": "CylinderGeometry", "radiusTop": 1.0, "radiusBottom": 1.0, "height": 1.0, "radialSegments": 12}
+    middle = _ALONG_Z.copy()
+    middle[2, 3] = 0.5
+    return _mesh(name, shape, _overlay((*color, 1.0)), matrix=middle, order=5)
+
+
+def ball(name: str, color: tuple[float, float, float], radius: float) -> Three:
+    """A small ball."""
+    return _mesh(name, _ball(radius), _overlay((*color, 1.0)), order=7)
+
+
+# ---- three.js
+
+
+def _ball(radius: float) -> Three:
+    return {"type": "SphereGeometry", "radius": radius, "widthSegments": _AROUND, "heightSegments": 24}
+
+
+def _triangles(vertices: Array, faces: NDArray[np.uint32], normals: Array | None) -> Three:
+    def attribute(values: Any, pack: Any, kind: str, size: int) -> Three:
+        return {"itemSize": size, "type": kind, "array": pack(values), "normalized": False}
+
+    attributes = {"position": attribute(vertices, floats, "Float32Array", 3)}
+    if normals is not None:
+        attributes["normal"] = attribute(normals, floats, "Float32Array", 3)
+    index = attribute(faces, integers, "Uint32Array", 1)
+    return {"type": "BufferGeometry", "data": {"attributes": attributes, "index": index}}
+
+
+def _material(color: Color, *, flat: bool) -> Three:
+    return {
+        "type": "MeshPhongMaterial",
+        "color": _number(color),
+        "opacity": color[3],
+        "transparent": color[3] < 1.0,
+        "flatShading": flat,
+        "shininess": 18,
+        "specular": 0x1E1E1E,
+        "side": _FRONT,
+    }
+
+
+def _overlay(color: Color) -> Three:
+    return {
+        "type": "MeshBasicMaterial",
+        "color": _number(color),
+        "depthTest": False,
+        "transparent": True,  # three.js draws transparent things last: on top
+        "side": _FRONT,
+    }
+
+
+def _number(color: Color) -> int:
+    red, green, blue = (round(255 * min(max(part, 0.0), 1.0)) for part in color[:3])
+    return red << 16 | green << 8 | blue
+
+
+def _matrix(scale: tuple[float, float, float], placement: Array | None) -> list[float]:
+    matrix = np.eye(4) if placement is None else placement
+    return [float(value) for value in (matrix @ np.diag([*scale, 1.0])).T.ravel()]
+
+
+def _mesh(name: str, shape: Three, material: Three, *, matrix: Any = None, order: int = 0, shadow: bool = True) -> Three:
+    """A three.js mesh. The name is its uuid: animations tell objects apart by it, and the file stays the same each time."""
+    made: Three = {
+        "uuid": name,
+        "type": "Mesh",
+        "geometry": f"{name}#geometry",
+        "material": f"{name}#material",
+        "matrix": _matrix((1.0, 1.0, 1.0), matrix) if not isinstance(matrix, list) else matrix,
+        "renderOrder": order,
+        "userData": {"shadow": shadow and order == 0},
+    }
+    return {
+        "metadata": {"version": 4.5, "type": "Object"},
+        "geometries": [{"uuid": f"{name}#geometry", **shape}],
+        "materials": [{"uuid": f"{name}#material", **material}],
+        "object": made,
+    }

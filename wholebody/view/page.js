@@ -1,0 +1,212 @@
+// What wholebody adds to meshcat's viewer: its own light, ground and background, labels, a camera that is aimed,
+// commands carried out strictly in order, and a bar to play and scrub a motion.
+"use strict";
+(function () {
+  const THREE = MeshCat.THREE;
+  const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+  const obey = viewer.handle_command.bind(viewer);
+  const page = { ready: false, seek: seek, play: play };
+  window.viewer = viewer;
+  window.wholebody = page;
+
+  // meshcat lets everything throw a shadow; ghosts and the floor should not.
+  const put = viewer.set_object.bind(viewer);
+  viewer.set_object = function (path, object) {
+    if (object.userData && object.userData.shadow === false) object.castShadow = false;
+    put(path, object);
+  };
+
+  // meshcat's world is z up; three's is y up, and the scene is turned to match.
+  const three = p => new THREE.Vector3(p[0], p[2], -p[1]);
+
+  function dress() {
+    for (const name of ["SpotLight", "PointLightNegativeX", "PointLightPositiveX", "AmbientLight", "FillLight"]) {
+      viewer.scene_tree.find(["Lights", name, "<object>"]).object.visible = false;
+    }
+    const sky = new THREE.HemisphereLight(0xffffff, 0xb9b2a8, 0.72);
+    sky.position.set(0, 0, 1);
+    viewer.set_object(["Lights", "Sky"], sky);
+    const sun = new THREE.DirectionalLight(0xfff6e8, 0.42);
+    sun.position.set(2.2, -1.6, 4.5);
+    sun.castShadow = true;
+    sun.shadow.mapSize.set(2048, 2048);
+    Object.assign(sun.shadow.camera, { left: -3, right: 3, top: 3, bottom: -3, near: 0.5, far: 12 });
+    sun.shadow.bias = -0.0004;
+    sun.shadow.normalBias = 0.012;
+    sun.shadow.radius = 3;
+    viewer.set_object(["Lights", "Sun"], sun);
+    const fill = new THREE.DirectionalLight(0xdfe8ff, 0.16);
+    fill.position.set(-2, 2.5, 1.5);
+    viewer.set_object(["Lights", "Fill"], fill);
+
+    viewer.set_property(["Background"], "top_color", [0.96, 0.97, 0.98]);
+    viewer.set_property(["Background"], "bottom_color", [0.80, 0.83, 0.86]);
+    viewer.scene_tree.find(["Axes"]).object.visible = false;
+    const grid = new THREE.GridHelper(6, 12, 0xa3a9b0, 0xbcc1c7);
+    grid.rotateX(Math.PI / 2);
+    viewer.set_object(["Grid"], grid);
+    viewer.set_transform(["Grid"], [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0.0015, 1]);
+    const shade = new THREE.Mesh(new THREE.PlaneGeometry(6, 6), new THREE.ShadowMaterial({ opacity: 0.18 }));
+    shade.receiveShadow = true;
+    shade.renderOrder = -1;
+    viewer.set_object(["Ground"], shade);
+  }
+
+  // A sprite of constant size on the screen: dark text on a light plate, always in front.
+  function label(cmd) {
+    const unit = 44, pad = 18;
+    const canvas = document.createElement("canvas");
+    let ctx = canvas.getContext("2d");
+    const font = `500 ${unit}px "Helvetica Neue", Arial, "DejaVu Sans", sans-serif`;
+    ctx.font = font;
+    const width = Math.ceil(ctx.measureText(cmd.text).width) + 2 * pad, height = unit + 22;
+    canvas.width = width;
+    canvas.height = height;
+    ctx = canvas.getContext("2d");
+    ctx.font = font;
+    ctx.fillStyle = "rgba(255,255,255,0.82)";
+    const r = 16;
+    ctx.beginPath();
+    ctx.moveTo(r, 0);
+    ctx.arcTo(width, 0, width, height, r);
+    ctx.arcTo(width, height, 0, height, r);
+    ctx.arcTo(0, height, 0, 0, r);
+    ctx.arcTo(0, 0, width, 0, r);
+    ctx.fill();
+    ctx.fillStyle = cmd.color;
+    ctx.textBaseline = "middle";
+    ctx.fillText(cmd.text, pad, height / 2 + 2);
+    const texture = new THREE.CanvasTexture(canvas);
+    texture.minFilter = THREE.LinearFilter;
+    texture.generateMipmaps = false;
+    const sprite = new THREE.Sprite(new THREE.SpriteMaterial(
+      { map: texture, depthTest: false, depthWrite: false, transparent: true, sizeAttenuation: false }));
+    sprite.scale.set(cmd.size * width / height, cmd.size, 1);
+    sprite.center.set(0.5, -0.35);
+    sprite.renderOrder = 20;
+    sprite.userData.text = cmd.text;
+    viewer.set_object(cmd.path.split("/").filter(x => x), sprite);
+  }
+
+  // Look at a target: from `eye`, or from `direction`, so far away that every one of `points` is in the picture.
+  function look(cmd) {
+    const target = three(cmd.target);
+    const aspect = window.innerWidth / window.innerHeight;
+    const up = Math.tan(cmd.fov * Math.PI / 360), side = up * aspect;
+    let eye;
+    if (cmd.eye) {
+      eye = three(cmd.eye);
+    } else {
+      const back = three(cmd.direction).normalize();
+      const right = new THREE.Vector3(0, 1, 0).cross(back).normalize();
+      const above = back.clone().cross(right);
+      let distance = 0.3;
+      for (let i = 0; i + 2 < cmd.points.length; i += 3) {
+        const p = three(cmd.points.slice(i, i + 3)).sub(target);
+        const deep = p.dot(back);
+        distance = Math.max(distance, deep + cmd.margin * Math.abs(p.dot(right)) / side,
+                            deep + cmd.margin * Math.abs(p.dot(above)) / up);
+      }
+      eye = target.clone().addScaledVector(back, distance);
+    }
+    const camera = viewer.camera;
+    camera.fov = cmd.fov;
+    camera.near = 0.02;
+    camera.far = 200;
+    camera.position.copy(eye);
+    viewer.controls.target.copy(target);
+    viewer.controls.update();
+    const sun = viewer.scene_tree.find(["Lights", "Sun", "<object>"]).object;
+    sun.position.set(cmd.target[0] + 2.2, cmd.target[1] - 1.6, cmd.target[2] + 3.6);
+    sun.target.position.set(cmd.target[0], cmd.target[1], cmd.target[2]);
+    if (!sun.target.parent) sun.parent.add(sun.target);
+  }
+
+  viewer.handle_command = function (cmd) {
+    if (cmd.type === "label") label(cmd);
+    else if (cmd.type === "look") look(cmd);
+    else obey(cmd);
+    if (cmd.type === "set_animation") show_bar(cmd.animations.length > 0);
+    viewer.set_dirty();
+  };
+
+  // Carries out a bundle: every command after its length, in order, in one go.
+  page.take = function (bytes) {
+    const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+    for (let at = 0; at < bytes.byteLength;) {
+      const size = view.getUint32(at, true);
+      viewer.handle_command_bytearray(bytes.subarray(at + 4, at + 4 + size));
+      at += 4 + size;
+    }
+  };
+
+  // meshcat's own seek does nothing before the first play, and interpolates wrongly after the end.
+  function seek(time) {
+    const animator = viewer.animator;
+    animator.playing = false;
+    for (const action of animator.actions) {
+      action.play();
+      action.paused = true;
+      action.time = Math.min(action._clip.duration, Math.max(0, time));
+    }
+    animator.mixer.update(0);
+    animator.display_progress(time);
+    viewer.set_dirty();
+  }
+
+  function play() {
+    const animator = viewer.animator;
+    const from = animator.time < animator.duration - 1e-6 ? animator.time : 0;
+    seek(from);
+    for (const action of animator.actions) action.paused = false;
+    animator.play();
+  }
+
+  const bar = document.getElementById("bar");
+  const button = bar.querySelector("button"), slider = bar.querySelector("input"), clock = bar.querySelector("span");
+  button.onclick = () => {
+    if (viewer.animator.playing) seek(viewer.animator.time);
+    else play();
+  };
+  slider.oninput = () => seek(slider.value * viewer.animator.duration / slider.max);
+  function show_bar(on) {
+    bar.style.display = on ? "flex" : "none";
+  }
+  function tick() {
+    requestAnimationFrame(tick);
+    if (bar.style.display !== "flex") return;
+    const animator = viewer.animator;
+    button.textContent = animator.playing ? "\u2016" : "\u25b6";
+    slider.value = animator.duration ? animator.time / animator.duration * slider.max : 0;
+    clock.textContent = `${animator.time.toFixed(2)} / ${animator.duration.toFixed(2)} s`;
+  }
+
+  function connect() {
+    const socket = new WebSocket(`ws://${location.host}/socket`);
+    socket.binaryType = "arraybuffer";
+    let known = false;
+    socket.onopen = () => { known = true; page.ready = true; };
+    socket.onmessage = message => {
+      try {
+        page.take(new Uint8Array(message.data));
+      } finally {
+        socket.send("done");
+      }
+    };
+    // The program ended or was started anew: a fresh page gets the fresh picture.
+    socket.onclose = () => setTimeout(() => known ? again() : connect(), 1000);
+  }
+  function again() {
+    fetch(location.href).then(() => location.reload(), () => setTimeout(again, 1000));
+  }
+
+  dress();
+  const picture = document.getElementById("picture");
+  if (picture) {
+    page.take(Uint8Array.from(atob(picture.textContent.trim()), c => c.charCodeAt(0)));
+    page.ready = true;
+  } else {
+    connect();
+  }
+  tick();
+})();

@@ -1,0 +1,70 @@
+"""The page that shows the picture: live, fed over a socket, or one self-contained file that opens without a network."""
+
+from __future__ import annotations
+
+import base64
+import html
+import importlib.util
+from functools import lru_cache
+from pathlib import Path
+
+from wholebody.errors import MissingPackageError
+from wholebody.view.server import Command, bundle
+
+_TEMPLATE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<title>{title}</title>
+<link rel="icon" href="data:,">
+<style>
+body {{ margin: 0; background: #dfe3e7; }}
+#meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
+#bar {{ display: none; position: fixed; left: 50%; bottom: 18px; transform: translateX(-50%); gap: 12px; align-items: center;
+  width: min(640px, 90vw); box-sizing: border-box; padding: 8px 14px; border-radius: 10px; background: rgba(255,255,255,.85);
+  font: 13px "Helvetica Neue", Arial, sans-serif; color: #333a42; }}
+#bar button {{ width: 32px; height: 28px; border: 0; border-radius: 6px; background: #4f6f94; color: #fff; cursor: pointer; }}
+#bar input {{ flex: 1; }}
+</style>
+</head>
+<body>
+<div id="meshcat-pane"></div>
+<div id="bar"><button title="play or pause"></button><input type="range" min="0" max="1000" value="0"><span></span></div>
+{picture}
+<script>{meshcat}</script>
+<script>{page}</script>
+</body>
+</html>
+"""
+
+
+def live_page(title: str = "wholebody") -> str:
+    """HTML of a page that connects back to the server it came from."""
+    return _page(title, "")
+
+
+def static_page(commands: list[Command], title: str = "wholebody") -> str:
+    """HTML of a page that carries its picture with it and asks the network for nothing.
+
+    Args:
+        commands: what draws the picture, in order (`Store.commands`).
+        title: what the browser's tab is called.
+    """
+    data = base64.b64encode(bundle([command.payload for command in commands])).decode("ascii")
+    return _page(title, f'<script id="picture" type="application/octet-stream">{data}</script>')
+
+
+def _page(title: str, picture: str) -> str:
+    script = (Path(__file__).with_name("page.js")).read_text(encoding="utf-8")
+    return _TEMPLATE.format(title=html.escape(title), picture=picture, meshcat=_meshcat_script(), page=script)
+
+
+@lru_cache(maxsize=1)
+def _meshcat_script() -> str:
+    """meshcat's viewer with three.js in it, found without importing meshcat (which would take IPython along)."""
+    found = importlib.util.find_spec("meshcat")
+    folder = Path(found.origin).parent if found is not None and found.origin else None
+    script = folder / "viewer" / "dist" / "main.min.js" if folder is not None else None
+    if script is None or not script.is_file():
+        raise MissingPackageError("looking at a scene needs the package meshcat; run: pip install meshcat==0.3.2")
+    return script.read_text(encoding="utf-8")

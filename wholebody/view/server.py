@@ -1,0 +1,282 @@
+"""The process that serves the page and hands every drawing command to the browser tabs that show it.
+
+It runs apart from the program that draws, so that a long computation never freezes the page. It is started as a script
+and imports the standard library and tornado alone. Commands come in over its standard input, so nobody else can send any;
+what it has to tell goes out over its standard output, one JSON object a line. It listens on 127.0.0.1 only, and ends
+when its input ends or its parent is gone.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import struct
+import sys
+from typing import Any, NamedTuple
+
+OBJECT, TRANSFORM, PROPERTY, DELETE = b"o", b"t", b"p", b"d"
+CAMERA, ANIMATION = b"c", b"a"
+PUSH, SYNC, PAGE = b"e", b"s", b"h"
+STOP = "stop"
+HEADER = struct.Struct("<cHHI")
+HOSTS = ("127.0.0.1", "localhost")
+FIRST_PORT, PORTS = 7000, 100
+PARENT_POLL = 0.5  # s
+
+
+class Command(NamedTuple):
+    """One message: what it does, to which node, under which key, and the bytes for the page (msgpack).
+
+    An ANIMATION with the key STOP is told to open pages, and then forgotten; PUSH, SYNC and PAGE speak to the server.
+    """
+
+    op: bytes
+    path: str = ""
+    key: str = ""
+    payload: bytes = b""
+
+    def pack(self) -> bytes:
+        """Return the message as it travels: a header with the lengths, then the parts."""
+        path, key = self.path.encode(), self.key.encode()
+        return HEADER.pack(self.op, len(path), len(key), len(self.payload)) + path + key + self.payload
+
+
+class _Node:
+    __slots__ = ("object", "properties", "transform")
+
+    def __init__(self) -> None:
+        self.object: bytes | None = None
+        self.properties: dict[str, bytes] = {}
+        self.transform: bytes | None = None
+
+
+class Store:
+    """What a page has to be told to show the present picture: the last value of everything, never the history."""
+
+    def __init__(self) -> None:
+        """Begin with an empty picture."""
+        self.nodes: dict[str, _Node] = {}
+        self.camera: bytes | None = None
+        self.animation: bytes | None = None
+
+    def apply(self, command: Command) -> None:
+        """Take a command into the picture."""
+        op, path, key, payload = command
+        if op == TRANSFORM:
+            self._node(path).transform = payload
+        elif op == PROPERTY:
+            self._node(path).properties[key] = payload
+        elif op == OBJECT:
+            node = self._node(path)
+            node.object = payload
+            node.properties.clear()
+            self.nodes.pop(f"{path}/<object>", None)
+        elif op == DELETE:
+            for name in [name for name in self.nodes if name == path or name.startswith(path + "/")]:
+                del self.nodes[name]
+        elif op == CAMERA:
+            self.camera = payload
+        elif op == ANIMATION:
+            self.animation = None if key == STOP else payload
+
+    def _node(self, path: str) -> _Node:
+        node = self.nodes.get(path)
+        if node is None:
+            node = self.nodes[path] = _Node()
+        return node
+
+    def has(self, command: Command) -> bool:
+        """Whether the picture already is as the command would make it."""
+        node = self.nodes.get(command.path)
+        if node is None:
+            return False
+        if command.op == TRANSFORM:
+            return node.transform == command.payload
+        if command.op == PROPERTY:
+            return node.properties.get(command.key) == command.payload
+        return command.op == OBJECT and node.object == command.payload
+
+    def commands(self, *, motion: bool = True) -> list[Command]:
+        """Commands that build the picture in an empty page; the animation last, when all it moves is there.
+
+        Args:
+            motion: include the animation.
+        """
+        commands: list[Command] = []
+        for path, node in self.nodes.items():
+            if node.object is not None:
+                commands.append(Command(OBJECT, path, "", node.object))
+            commands.extend(Command(PROPERTY, path, key, payload) for key, payload in node.properties.items())
+            if node.transform is not None:
+                commands.append(Command(TRANSFORM, path, "", node.transform))
+        if self.camera is not None:
+            commands.append(Command(CAMERA, "", "", self.camera))
+        if motion and self.animation is not None:
+            commands.append(Command(ANIMATION, "", "", self.animation))
+        return commands
+
+
+def bundle(payloads: list[bytes]) -> bytes:
+    """One message for the page: every payload after its length, four bytes, little-endian."""
+    return b"".join(part for payload in payloads for part in (struct.pack("<I", len(payload)), payload))
+
+
+class Queue:
+    """What one tab has still to be told. A new transform or property replaces the one that waits, so no tab lags."""
+
+    def __init__(self) -> None:
+        """Begin with nothing waiting."""
+        self.waiting: list[bytes] = []
+        self._place: dict[tuple[bytes, str, str], int] = {}
+
+    def put(self, command: Command) -> None:
+        """Add a command."""
+        slot = (command.op, command.path, command.key)
+        if command.op in (TRANSFORM, PROPERTY):
+            if slot in self._place:
+                self.waiting[self._place[slot]] = command.payload
+                return
+            self._place[slot] = len(self.waiting)
+        else:
+            self._place.clear()
+        self.waiting.append(command.payload)
+
+    def take(self) -> list[bytes]:
+        """Return all that waits, in order, and forget it."""
+        taken, self.waiting = self.waiting, []
+        self._place.clear()
+        return taken
+
+
+def tell(**what: Any) -> None:
+    """Write one line for the parent."""
+    sys.stdout.write(json.dumps(what) + "\n")
+    sys.stdout.flush()
+
+
+class Hub:
+    """The picture, the page and the open tabs."""
+
+    def __init__(self) -> None:
+        """Begin without tabs."""
+        self.store = Store()
+        self.page = ""
+        self.tabs: set[Any] = set()
+        self.syncs: list[int] = []
+
+    async def listen(self, reader: asyncio.StreamReader) -> None:
+        """Take commands until the input ends."""
+        while True:
+            try:
+                op, path, key, size = HEADER.unpack(await reader.readexactly(HEADER.size))
+                node = (await reader.readexactly(path)).decode()
+                name = (await reader.readexactly(key)).decode()
+                self.take(Command(op, node, name, await reader.readexactly(size)))
+            except asyncio.IncompleteReadError:
+                return
+
+    def take(self, command: Command) -> None:
+        """Obey one command."""
+        if command.op == PAGE:
+            self.page = command.payload.decode()
+            tell(ready=True)
+        elif command.op == SYNC:
+            self.syncs.append(int(command.key))
+            self.settle()
+        elif command.op == PUSH:
+            for tab in self.tabs:
+                tab.send_waiting()
+        else:
+            self.store.apply(command)
+            for tab in self.tabs:
+                tab.queue.put(command)
+
+    def settle(self) -> None:
+        """Answer the pending questions whether every tab has drawn everything."""
+        if self.syncs and all(tab.idle for tab in self.tabs):
+            for number in self.syncs:
+                tell(sync=number, tabs=len(self.tabs))
+            self.syncs.clear()
+
+
+def make_application(hub: Hub) -> Any:
+    """The web side: the page at /, its socket at /socket, nothing else."""
+    import tornado.web
+    import tornado.websocket
+
+    class LocalOnly(tornado.web.RequestHandler):
+        """Refuses requests that reached 127.0.0.1 under a foreign name (DNS rebinding)."""
+
+        def prepare(self) -> None:
+            if self.request.host_name not in HOSTS:
+                raise tornado.web.HTTPError(403)
+
+    class Page(LocalOnly):
+        def get(self) -> None:
+            self.set_header("Cache-Control", "no-store")
+            self.write(hub.page)
+
+    class Tab(LocalOnly, tornado.websocket.WebSocketHandler):
+        """One open page. It acknowledges each message, and gets the next only then."""
+
+        def open(self, *args: str, **kwargs: str) -> None:
+            self.set_nodelay(True)
+            self.queue = Queue()
+            self.queue.waiting = [command.payload for command in hub.store.commands()]
+            self.idle = True
+            hub.tabs.add(self)
+            tell(tabs=len(hub.tabs))
+            self.send_waiting()
+
+        def send_waiting(self) -> None:
+            if self.idle and self.queue.waiting:
+                self.idle = False
+                self.write_message(bundle(self.queue.take()), binary=True)
+
+        def on_message(self, message: str | bytes) -> None:
+            self.idle = True
+            self.send_waiting()
+            hub.settle()
+
+        def on_close(self) -> None:
+            hub.tabs.discard(self)
+            tell(tabs=len(hub.tabs))
+            hub.settle()
+
+    return tornado.web.Application([("/", Page), ("/socket", Tab)])
+
+
+async def serve(parent: int) -> None:
+    """Serve until the input ends or the parent is gone."""
+    import logging
+
+    from tornado.httpserver import HTTPServer
+    from tornado.netutil import bind_sockets
+
+    logging.getLogger("tornado").setLevel(logging.CRITICAL)
+    hub = Hub()
+    for port in [*range(FIRST_PORT, FIRST_PORT + PORTS), 0]:
+        try:
+            sockets = bind_sockets(port, "127.0.0.1")
+            break
+        except OSError:
+            if port == 0:
+                raise
+    server = HTTPServer(make_application(hub))
+    server.add_sockets(sockets)
+    tell(url=f"http://127.0.0.1:{sockets[0].getsockname()[1]}/")
+
+    reader = asyncio.StreamReader(limit=2**20)
+    await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin.buffer)
+    listening = asyncio.ensure_future(hub.listen(reader))
+    while not listening.done() and os.getppid() == parent:
+        await asyncio.wait([listening], timeout=PARENT_POLL)
+
+
+if __name__ == "__main__":
+    try:
+        asyncio.run(serve(int(sys.argv[1])))
+    except (KeyboardInterrupt, BrokenPipeError):
+        pass
+    os._exit(0)
