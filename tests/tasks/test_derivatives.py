@@ -10,7 +10,9 @@ import pinocchio as pin
 import pytest
 
 from wholebody import tasks
+from wholebody.figures import load
 from wholebody.figures.state import State, Wrench
+from wholebody.scene import Scene
 
 STEP = 1e-6
 TERMS = {
@@ -100,6 +102,43 @@ def test_derivative_equals_central_differences(name: str, scene: Any, random_pos
         exact = derivative_of(term, state.update(q))
         expected = differences(term, state, q)
         assert exact.shape == expected.shape
+        np.testing.assert_allclose(exact, expected, atol=2e-7 * max(1.0, np.abs(expected).max()))
+
+
+HUMAN_TERMS = {
+    "point": tasks.Point("right_index_tip", (0.55, -0.25, 0.95), offset=(0.0, 0.0, 0.02)),
+    "frame": tasks.Frame("left_palm", (0.4, 0.2, 1.0, 0.5, 0.5, -0.5, 0.5)),
+    "gaze": tasks.Axis("gaze", (1.0, 0.0, 0.0), toward=(1.0, 0.3, 0.8)),
+    "center_of_mass": tasks.CenterOfMass((0.0, 0.0, 1.0)),
+    "hold_relative": tasks.Hold("left_palm", relative_to="right_palm"),
+    "plane": tasks.Plane("left_elbow", (1.0, 1.0, 0.0)),
+    "balance": tasks.Balance(),
+    "reach_cones": tasks.ReachCones(),
+    "posture": tasks.Posture("sitting"),
+    "effort": tasks.Effort(),
+    "displacement": tasks.Displacement(),
+    "discomfort": tasks.Discomfort(),
+    "potential_energy": tasks.PotentialEnergy(0.01),
+}
+
+
+@pytest.fixture(scope="module")
+def human() -> Any:
+    return Scene(load("human"))
+
+
+@pytest.mark.parametrize("name", HUMAN_TERMS)
+def test_derivative_equals_central_differences_on_the_human(name: str, human: Any) -> None:
+    state = State(human.model)
+    start = human.figure.posture("standing")
+    low, high = human.figure.tangent_bounds(start)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        reach = rng.uniform(np.maximum(low, -1.5), np.minimum(high, 1.5))
+        q = pin.integrate(human.model, start, reach)
+        term = HUMAN_TERMS[name].resolve(human, start)
+        exact = derivative_of(term, state.update(q))
+        expected = differences(term, state, q)
         np.testing.assert_allclose(exact, expected, atol=2e-7 * max(1.0, np.abs(expected).max()))
 
 

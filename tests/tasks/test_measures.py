@@ -48,7 +48,7 @@ def test_displacement_is_zero_only_in_the_neutral_posture(humanoid: Any) -> None
 def penalty(humanoid: Any, ratio: float) -> float:
     """Discomfort of one joint at a ratio of its range from the upper limit, without the term of neutral."""
     figure = humanoid.figure
-    figure.neutral_weights[:] = 0.0
+    figure.effort_weights[:] = 0.0
     term = tasks.Discomfort().resolve(humanoid, figure.neutral)
     q = figure.neutral.copy()
     q[12] = figure.limits.upper[5] - ratio * (figure.limits.upper[5] - figure.limits.lower[5])
@@ -78,8 +78,8 @@ def test_discomfort_is_bounded_and_quiet_beyond_limits(humanoid: Any) -> None:
 def test_discomfort_counts_the_stiffest_joint_over_its_range_as_one(humanoid: Any) -> None:
     figure = humanoid.figure
     figure.limits.lower[:], figure.limits.upper[:] = -1.0, 1.0
-    figure.neutral_weights[6:] = 2.0
-    figure.neutral_weights[6 + 4] = 50.0
+    figure.effort_weights[6:] = 2.0
+    figure.effort_weights[6 + 4] = 50.0
     term = tasks.Discomfort().resolve(humanoid, figure.neutral)
     state = State(humanoid.model)
     rest = term.value(state.update(figure.neutral))
@@ -89,6 +89,19 @@ def test_discomfort_counts_the_stiffest_joint_over_its_range_as_one(humanoid: An
     q = figure.neutral.copy()
     q[7 + 5] = 0.5
     np.testing.assert_allclose(term.value(state.update(q)) - rest, 0.25**2 * 2.0 / 50.0, atol=1e-12)
+
+
+def test_discomfort_leaves_out_joints_without_a_range(humanoid: Any) -> None:
+    figure = humanoid.figure
+    figure.limits.upper[3] = np.inf
+    figure.limits.lower[4] = figure.limits.upper[4] = 0.0
+    term = tasks.Discomfort().resolve(humanoid, figure.neutral)
+    state = State(humanoid.model)
+    rest = term.value(state.update(figure.neutral))
+    q = figure.neutral.copy()
+    q[7 + 3], q[7 + 4] = 2.0, 2.0
+    assert term.value(state.update(q)) == rest
+    np.testing.assert_array_equal(term.gradient(state)[[6 + 3, 6 + 4]], 0.0)
 
 
 def test_raising_the_whole_body_costs_the_weight_of_each_segment_times_the_height(humanoid: Any) -> None:

@@ -12,12 +12,15 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.figures.state import State, Wrench
+
+if TYPE_CHECKING:
+    from wholebody.figures.figure import Figure
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,8 +32,8 @@ class Surroundings(Protocol):
     """What a term needs to know of a scene."""
 
     @property
-    def figure(self) -> Any:
-        """The `Figure` that moves."""
+    def figure(self) -> Figure:
+        """What moves."""
 
     @property
     def model(self) -> Any:

@@ -21,7 +21,7 @@ POWER = 200
 
 
 class _Joints(NamedTuple):
-    """The joints that have limits, each array (n,)."""
+    """The joints that have two limits, each array (n,)."""
 
     idx_q: NDArray[np.intp]
     idx_v: NDArray[np.intp]
@@ -34,15 +34,16 @@ class _Joints(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Discomfort(Measure):
-    """Discomfort of the joints that have limits; about 1 for a joint at its limit [no unit].
+    """Discomfort of the joints that have two limits; about 1 for a joint at its limit [no unit].
 
     ``sum_i [g_i ((q_i - n_i) / (u_i - l_i))^2 + P((u_i - q_i) / (u_i - l_i)) + P((q_i - l_i) / (u_i - l_i))]`` with n
     the neutral posture, l and u the limits and
     ``P(r) = [(sin(5 r + pi/2) + 1) / 2]^100 = cos(2.5 r)^200``: Abdel-Malek and Arora 2013, "Human Motion Simulation:
     Predictive Dynamics", eqs. 3.13 to 3.16, with two changes. The factor 1/2 applies to the whole bracket: as printed,
-    ``(sin(5 r + 1.571) / 2 + 1)^100`` is 4e17 at a limit, whereas the text says it goes from 0 to 1. And g are the
-    figure's `neutral_weights` over the greatest of them, in place of weights of 1 to 1e8 over 1e6, so that the stiffest
-    joint over its whole range weighs as much as a joint at its limit. Beyond a limit P stays 1, with no slope.
+    ``(sin(5 r + 1.571) / 2 + 1)^100`` is 4e17 at a limit, whereas the text says it goes from 0 to 1. And g
+    are the figure's `effort_weights`, which rank the joints as table 3.3 does, over the greatest of them, in place of
+    weights of 1 to 1e8 over 1e6: the stiffest joint over its whole range weighs as much as a joint at its limit. Beyond
+    a limit P stays 1, with no slope.
 
     Attributes:
         weight: factor on the measure.
@@ -59,10 +60,10 @@ class Discomfort(Measure):
         """Take the limits, the neutral posture and the weights of the figure."""
         figure = scene.figure
         limits = figure.limits
-        moves = limits.upper > limits.lower
+        moves = (limits.upper > limits.lower) & np.isfinite(limits.upper - limits.lower)
         idx_q, idx_v = limits.idx_q[moves], limits.idx_v[moves]
         lower, upper = limits.lower[moves], limits.upper[moves]
-        weights = figure.neutral_weights[idx_v]
+        weights = figure.effort_weights[idx_v]
         greatest = float(weights.max(initial=0.0))
         weights = weights / greatest if greatest > 0.0 else np.zeros_like(weights)
         joints = _Joints(idx_q, idx_v, lower, upper, figure.neutral[idx_q], upper - lower, weights)

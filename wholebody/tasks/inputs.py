@@ -40,16 +40,16 @@ def find_place(scene: Surroundings, name: str, where: str) -> Place:
         where: the term that asks, for the message.
 
     Raises:
-        UnknownNameError: the figure has neither.
+        UnknownNameError: the figure has none of that name.
+        InputError: the name is not a string.
     """
-    model = scene.model
+    if not isinstance(name, str):
+        raise InputError(f"{where} takes the name of a frame, not {name!r}")
     try:
         frame = int(scene.figure.frame_id(name))
     except UnknownNameError as error:
-        if not (isinstance(name, str) and model.existJointName(name)):
-            raise UnknownNameError(error.kind, error.name, error.known, where) from None
-        frame = int(model.getFrameId(name))
-    return Place(frame, int(model.frames[frame].parentJoint))
+        raise UnknownNameError(error.kind, error.name, error.known, where) from None
+    return Place(frame, int(scene.model.frames[frame].parentJoint))
 
 
 def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> Place:

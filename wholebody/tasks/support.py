@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,9 @@ from wholebody.tasks.base import Array, Surroundings
 
 STANDING_HEIGHT = 0.01
 """Height [m] above a foot's lowest point up to which its corners stand on the ground: soles are rounded by as much."""
+
+FLATTEST = 1e-6
+"""Height [m] of a corner over the line through its neighbours below which it makes no corner of its own."""
 
 THINNEST = 1e-4
 """Width [m] below which a polygon is a line that nobody stands on."""
@@ -112,7 +116,7 @@ def _half_hull(ordered: list[tuple[float, float]]) -> list[tuple[float, float]]:
     for x, y in ordered:
         while len(hull) > 1:
             (ax, ay), (bx, by) = hull[-2:]
-            if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+            if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > FLATTEST * hypot(x - ax, y - ay):
                 break
             hull.pop()
         hull.append((x, y))
