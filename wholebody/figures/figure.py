@@ -79,6 +79,7 @@ class Description(NamedTuple):
         collision_groups: segment to the group whose parts are never tested against each other; may be empty.
         effort: joint to weight of its effort; joints that are not named have 1.
         excluded: pairs of pieces that are not tested, with the reason.
+        notes: sentences on what had to be changed about the geometry of a file.
     """
 
     groups: Mapping[str, tuple[str, ...]]
@@ -90,6 +91,7 @@ class Description(NamedTuple):
     collision_groups: Mapping[str, str] = MappingProxyType({})
     effort: Mapping[str, float] = MappingProxyType({})
     excluded: tuple[ExcludedPair, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 class Figure:
@@ -109,6 +111,7 @@ class Figure:
         cones: reach cones of shoulders and hips.
         collision_groups: segment to collision group ("torso_head", "left_arm", ...).
         excluded_pairs: pairs of pieces that are never tested, with the reason.
+        notes: sentences on what had to be changed about the geometry of a file.
         limits: joint limits as arrays.
         effort_weights: (nv,) weight of each degree of freedom in the effort; 0 for the root.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
@@ -131,7 +134,7 @@ class Figure:
         self.frames, self.segments = description.frames, description.segments
         self.cones = MappingProxyType(dict(description.cones))
         self.collision_groups = MappingProxyType(dict(description.collision_groups))
-        self.excluded_pairs = description.excluded
+        self.excluded_pairs, self.notes = description.excluded, description.notes
         self._description = description
         self._made: dict[str, Array] = {}
         first = model.joints[1] if model.njoints > 1 else None

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
-import coal
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-RINGS = 6
+RINGS = 5
 AROUND = 10
-"""Rings of vertices between the poles, and vertices on each: 62 vertices, 2 * 6 * 10 = 120 triangles."""
+"""Rings of vertices between the poles, and vertices on each: 52 vertices, 2 * 5 * 10 = 100 triangles."""
 
 
+@lru_cache(maxsize=8)
 def unit_sphere(rings: int = RINGS, around: int = AROUND) -> tuple[Array, NDArray[np.intp]]:
     """Return vertices (n, 3) on the unit sphere, mirror-symmetric in y, and triangles (m, 3) seen from outside.
 
@@ -31,52 +33,38 @@ def unit_sphere(rings: int = RINGS, around: int = AROUND) -> tuple[Array, NDArra
     return vertices, _outward_triangles(vertices)
 
 
-def convex(points: Array) -> Any:
-    """Return coal's Convex of the hull of solid points (n, 3).
+def convex(points: Array, what: str) -> tuple[Any, pin.SE3]:
+    """Return coal's Convex of the hull of points (n, 3), about the centre of its bounding sphere, and that centre's place."""
+    # Figures stand below geometry; only building needs this one function of it, and one safe hull is enough.
+    from wholebody.geometry.convex import hull_piece
 
-    The triangles come from scipy: coal's own hull ends the process on points in one plane.
-
-    Raises:
-        scipy.spatial.QhullError: the points lie in one plane.
-    """
-    triangles = _outward_triangles(points)
-    used, renumbered = np.unique(triangles, return_inverse=True)
-    vertices, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    vertices.extend(list(points[used]))
-    faces.extend([coal.Triangle(*map(int, face)) for face in renumbered.reshape(-1, 3)])
-    return coal.Convex(vertices, faces)
+    piece = hull_piece(points, what)
+    return piece.geometry, piece.placement
 
 
-def ellipsoid(radii: tuple[float, float, float]) -> Any:
-    """Convex polyhedron with its vertices on an ellipsoid, axes along x, y, z."""
-    return convex(unit_sphere()[0] * np.array(radii))
+def ellipsoid(radii: tuple[float, float, float], what: str) -> tuple[Any, pin.SE3]:
+    """Convex polyhedron with its vertices on an ellipsoid, axes along x, y, z, centre at the origin."""
+    return convex(unit_sphere()[0] * np.array(radii), what)
 
 
-def tapered(radius_start: float, radius_end: float, length: float) -> tuple[Any, float]:
-    """Convex polyhedron of a tapered capsule along -z: a ball at the origin and one at -length, vertices on the balls.
-
-    Returns:
-        The polyhedron about the centre of its box, and the z of that centre.
-    """
+def tapered(radius_start: float, radius_end: float, length: float, what: str) -> tuple[Any, pin.SE3]:
+    """Convex polyhedron of a tapered capsule along -z: vertices on a ball at the origin and on one at -length."""
     ball = unit_sphere()[0]
-    points = np.vstack([ball * radius_start, ball * radius_end - [0.0, 0.0, length]])
-    middle = 0.5 * float(points[:, 2].max() + points[:, 2].min())
-    return convex(points - [0.0, 0.0, middle]), middle
+    return convex(np.vstack([ball * radius_start, ball * radius_end - [0.0, 0.0, length]]), what)
 
 
-def box(size: tuple[float, float, float]) -> Any:
-    """Convex polyhedron of a box: eight vertices, twelve triangles."""
+def box(size: tuple[float, float, float], what: str) -> tuple[Any, pin.SE3]:
+    """Convex polyhedron of a box about the origin: eight vertices, twelve triangles."""
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    return convex(corners * np.array(size))
+    return convex(corners * np.array(size), what)
 
 
 def _outward_triangles(points: Array) -> NDArray[np.intp]:
-    """Triangles (m, 3) of the hull of points, counter-clockwise seen from outside."""
+    """Triangles (m, 3) of the hull of points around the origin, counter-clockwise seen from outside."""
     from scipy.spatial import ConvexHull
 
-    hull = ConvexHull(points)
-    triangles = np.array(hull.simplices, dtype=np.intp)
+    triangles = np.array(ConvexHull(points).simplices, dtype=np.intp)
     a, b, c = (points[triangles[:, k]] for k in range(3))
-    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0.0
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0.0
     triangles[inward] = triangles[inward][:, [0, 2, 1]]
     return triangles

@@ -14,6 +14,7 @@ from wholebody.figures.figure import Chain, Description, ExcludedPair, Figure, J
 from wholebody.figures.human import blueprint
 from wholebody.figures.human_pairs import body_pairs, collision_group, sphere_pairs
 from wholebody.figures.reach_cones import ReachCone
+from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.figures.tables import table
 
 
@@ -40,6 +41,7 @@ def figure_of(plan: Blueprint, detail: str) -> Figure:
     model = model_of(plan)
     tested, excluded = (sphere_pairs if detail == "spheres" else body_pairs)(plan.solids)
     geometry = geometry_of(model, plan.solids, tested)
+    rigid = drop_rigid_pairs(geometry)
     joints = {joint.name for joint in plan.joints if joint.axis is not None}
     segments = tuple(link.name for link in plan.links if link.mass)
     description = Description(
@@ -51,7 +53,7 @@ def figure_of(plan: Blueprint, detail: str) -> Figure:
         cones=human_cones(),
         collision_groups={segment: collision_group(segment) for segment in segments},
         effort={row["name"]: float(row["effort_weight"]) for row in table("joints")},
-        excluded=tuple(ExcludedPair(*entry) for entry in excluded),
+        excluded=(*(ExcludedPair(*entry) for entry in excluded), *rigid),
     )
     return Figure(plan.name, model, geometry, detail, description)
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from os import PathLike, fspath
+from pathlib import Path
 from typing import Any
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.errors import FileFormatError, UnknownNameError
 from wholebody.figures.figure import Figure
 
 
@@ -23,13 +26,26 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
         InputError: a value that no body has.
         FileFormatError: a URDF that cannot be read.
     """
+    from wholebody.figures.avatar import avatar_figure
+    from wholebody.figures.hand import hand_figure
     from wholebody.figures.human_figure import human_figure
+    from wholebody.figures.urdf_figure import urdf_figure
 
-    text = fspath(spec)
-    builders = {"human": human_figure}
-    if text in builders:
-        try:
-            return builders[text](**options)
-        except TypeError as error:
-            raise InputError(str(error)) from None
-    raise UnknownNameError("figure", text, builders)
+    builders: dict[str, Callable[..., Figure]] = {"human": human_figure, "avatar": avatar_figure, "hand": hand_figure}
+    name = fspath(spec)
+    if name in builders:
+        _check_options(builders[name], options, f"load({name!r})")
+        return builders[name](**options)
+    if Path(name).suffix == "" and not Path(name).exists():
+        raise UnknownNameError("figure", name, builders, "load")
+    if Path(name).suffix and Path(name).suffix.lower() not in (".urdf", ".xml", ".xacro"):
+        raise FileFormatError(f"{name}: a figure is a URDF file, or 'human', 'avatar', 'hand'; convert it to URDF")
+    _check_options(urdf_figure, options, f"load({name!r})")
+    return urdf_figure(name, **options)
+
+
+def _check_options(builder: Callable[..., Figure], options: dict[str, Any], where: str) -> None:
+    known = [name for name in inspect.signature(builder).parameters if name != "path"]
+    for option in options:
+        if option not in known:
+            raise UnknownNameError("option", option, known, where)

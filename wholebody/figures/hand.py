@@ -1,0 +1,224 @@
+"""The hand: fifteen ellipsoids, each a polyhedron of a hundred triangles, on a free root at the wrist (Schmidl & Lin).
+
+The hand's frame is that of the person's hand: fingers along -z, thumb towards +x, palm towards -y on the left and +y on
+the right. The root of the thumb is fixed at its resting place, so that the thumb has two parts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from itertools import combinations
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.errors import InputError
+from wholebody.figures import hulls
+from wholebody.figures.anthropometry import Body, body
+from wholebody.figures.assembly import geometry_of, model_of
+from wholebody.figures.blueprint import Array, Blueprint, Joint, Landmark, Link, Solid, place
+from wholebody.figures.figure import Chain, Description, ExcludedPair, Figure
+from wholebody.figures.measures import FINGER_BASES, Measures, keyed_hand
+from wholebody.figures.tables import keyed
+
+MESH = "meshes/ellipsoid.stl"
+"""The unit polyhedron that the URDF scales to each part."""
+
+FINGERS = {"thumb": ("pp", "dp"), **{name: ("pp", "mp", "dp") for name in ("index", "middle", "ring", "little")}}
+_PART = {"pp": "proximal", "mp": "middle", "dp": "distal"}
+_JOINT = {"mcp_flex": "mcp_flexion", "mcp_abd": "mcp_abduction", "pip_flex": "pip_flexion", "dip_flex": "dip_flexion"}
+_JOINT["ip_flex"] = "ip_flexion"
+
+_THUMB_RADIAL = math.radians(40.0)
+_THUMB_PALMAR = math.radians(30.0)
+"""Resting direction of the thumb's metacarpal: from the fingers towards the thumb's side, and out of the palm (CMC abduction
+of the table); the first is an estimate."""
+
+# Degrees by kind of joint; "relaxed" is the neutral column of the table.
+POSTURES: dict[str, dict[str, float]] = {
+    "relaxed": {},
+    "open": {"mcp_flexion": 0.0, "pip_flexion": 0.0, "dip_flexion": 0.0, "ip_flexion": 0.0},
+    "pointing": {
+        "mcp_flexion": 60.0,
+        "pip_flexion": 60.0,
+        "dip_flexion": 30.0,
+        "index_mcp_flexion": 0.0,
+        "index_pip_flexion": 0.0,
+        "index_dip_flexion": 0.0,
+        "thumb_mcp_flexion": 0.0,
+        "thumb_ip_flexion": 0.0,
+    },
+    "grip": {"mcp_flexion": 45.0, "pip_flexion": 50.0, "dip_flexion": 25.0, "thumb_mcp_flexion": 10.0},
+}
+
+
+def hand_blueprint(side: str = "right", person: Body | None = None) -> Blueprint:
+    """Return the blueprint of a hand.
+
+    Args:
+        side: "left" or "right".
+        person: whose hand; the median man's if left out.
+
+    Raises:
+        InputError: another side.
+    """
+    if side not in ("left", "right"):
+        raise InputError(f"side is {side!r}; give 'left' or 'right'")
+    person = person or body()
+    size = Measures(person)
+    palm = Solid(f"{side}_hand", f"{side}_hand", *_polyhedron(size, "palm"), (MESH, _radii(size, "palm")))
+    solids, joints, virtual = [palm], [], []
+    marks = [_palm_mark(size, side)]
+    for finger, parts in FINGERS.items():
+        parent, origin = f"{side}_hand", _base(size, side, finger)
+        for part in parts:
+            key, segment = f"{finger}_{part}", f"{side}_{finger}_{_PART[part]}"
+            for joint in _joints(side, finger, key, parent, segment, origin):
+                joints.append(joint)
+                virtual += [Link(joint.child)] if joint.child != segment else []
+            solids.append(Solid(segment, segment, *_polyhedron(size, key), (MESH, _radii(size, key))))
+            parent, origin = segment, place(z=-keyed_hand(key, "length") * size.hand_length)
+        marks.append(Landmark(f"{side}_{finger}_tip", parent, origin * pin.SE3(_palm_axes(side), np.zeros(3))))
+    return Blueprint(
+        name=f"{side}_hand",
+        title=f"{side} hand of a {person.sex}, stature {person.stature:g} m, mass {person.mass:g} kg; written by wholebody",
+        links=(*_links(size, solids), *virtual),
+        joints=tuple(joints),
+        landmarks=tuple(marks),
+        solids=tuple(solids),
+    )
+
+
+def hand_figure(
+    side: str = "right", sex: str = "male", stature: float | None = None, mass: float | None = None
+) -> Figure:
+    """Return a hand with a free root at the wrist; arguments as for `hand_blueprint` and the person."""
+    plan = hand_blueprint(side, body(sex, stature, mass))
+    model = model_of(plan)
+    tested, excluded = _pairs(plan.solids)
+    names = tuple(joint.name for joint in plan.joints)
+    groups = {
+        finger: tuple(name for name in names if name.startswith(f"{side}_{finger}_")) for finger in FINGERS
+    }
+    description = Description(
+        groups={**groups, "fingers": names},
+        chains={finger: Chain(groups[finger], f"{side}_{finger}_tip") for finger in FINGERS},
+        frames=tuple(mark.name for mark in plan.landmarks),
+        segments=tuple(solid.segment for solid in plan.solids),
+        postures={name: partial(_posture, side=side, degrees=degrees) for name, degrees in POSTURES.items()},
+        excluded=excluded,
+    )
+    return Figure(plan.name, model, geometry_of(model, plan.solids, tested), "hulls", description)
+
+
+def _palm_axes(side: str) -> Array:
+    sign = 1.0 if side == "left" else -1.0
+    return np.column_stack([[0.0, 0.0, -1.0], [sign, 0.0, 0.0], [0.0, -sign, 0.0]])
+
+
+def _palm_mark(size: Measures, side: str) -> Landmark:
+    out = size.palm_half_thickness if side == "right" else -size.palm_half_thickness
+    half = 0.5 * keyed_hand("palm", "length") * size.hand_length
+    return Landmark(f"{side}_palm", f"{side}_hand", place(0.0, out, -half, _palm_axes(side)))
+
+
+def _radii(size: Measures, part: str) -> tuple[float, float, float]:
+    return (
+        keyed_hand(part, "width") * size.hand_breadth,
+        keyed_hand(part, "depth") * size.hand_breadth,
+        0.5 * keyed_hand(part, "length") * size.hand_length,
+    )
+
+
+def _polyhedron(size: Measures, part: str) -> tuple[object, pin.SE3]:
+    radii = _radii(size, part)
+    shape, center = hulls.ellipsoid(radii, part)
+    return shape, place(z=-radii[2]) * center
+
+
+def _base(size: Measures, side: str, finger: str) -> pin.SE3:
+    """Place of a finger's first joint in the hand: its knuckle, or the thumb's one beyond the fixed metacarpal."""
+    lateral, distal = FINGER_BASES[finger]
+    knuckle = np.array([lateral * size.hand_breadth, 0.0, -distal * size.hand_length])
+    if finger != "thumb":
+        return pin.SE3(np.eye(3), knuckle)
+    sign = 1.0 if side == "left" else -1.0
+    radial, palmar = _THUMB_RADIAL, _THUMB_PALMAR
+    along = np.array([math.sin(radial), -sign * math.sin(palmar), -math.cos(radial)])
+    along /= np.linalg.norm(along)
+    # The thumb bends across the palm, towards the little finger.
+    bend = np.array([-0.8, -sign * 0.6, 0.0])
+    bend -= along * (along @ bend)
+    y = -sign * bend / np.linalg.norm(bend)
+    rotation = np.column_stack([np.cross(y, -along), y, -along])
+    return pin.SE3(rotation, knuckle + keyed_hand("thumb_mc", "length") * size.hand_length * along)
+
+
+def _joints(side: str, finger: str, key: str, parent: str, segment: str, origin: pin.SE3) -> Iterator[Joint]:
+    sign = 1.0 if side == "left" else -1.0
+    row = keyed("hand", "name")[key]
+    kinds = [kind.strip() for kind in row["joints"].split(",")]
+    ranges = [limits.strip().split("..") for limits in row["limits_deg"].split(";")]
+    for kind, (low, high) in zip(kinds, ranges, strict=True):
+        # Flexion bends towards the palm; abduction leads away from the middle finger, that finger's own to the thumb.
+        away = 1.0 if finger in ("ring", "little") else -1.0
+        axis = (-sign, 0.0, 0.0) if kind.endswith("flex") else (0.0, away, 0.0)
+        child = segment if kind == kinds[-1] else f"{segment}_v1"
+        limits = math.radians(float(low)), math.radians(float(high))
+        yield Joint(f"{side}_{finger}_{_JOINT[kind]}", parent, child, origin, axis, *limits)
+        parent, origin = child, pin.SE3.Identity()
+
+
+def _links(size: Measures, solids: list[Solid]) -> Iterator[Link]:
+    """Links whose mass follows their volume; solid ellipsoids."""
+    volumes = [float(np.prod(solid.mesh[1])) for solid in solids if solid.mesh is not None]
+    total = size.body.segment_mass("left_hand")
+    for solid, volume in zip(solids, volumes, strict=True):
+        assert solid.mesh is not None
+        a, b, c = solid.mesh[1]
+        mass = total * volume / sum(volumes)
+        inertia = (mass * (b * b + c * c) / 5.0, mass * (a * a + c * c) / 5.0, mass * (a * a + b * b) / 5.0)
+        yield Link(solid.segment, mass, (0.0, 0.0, -c), inertia)
+
+
+def _pairs(solids: tuple[Solid, ...]) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:
+    order = list(FINGERS)
+    tested, excluded = [], []
+    for a, b in combinations([solid.name for solid in solids], 2):
+        first, second = a.split("_")[1:], b.split("_")[1:]
+        if first == ["hand"]:
+            reason = "neighbours that overlap at their joint" if second[1] == "proximal" else ""
+        elif first[0] == second[0]:
+            reason = "neighbours that overlap at their joint"
+        else:
+            beside = abs(order.index(first[0]) - order.index(second[0])) == 1 and "thumb" not in (first[0], second[0])
+            reason = "fingers rest side by side" if beside else ""
+        if reason:
+            excluded.append(ExcludedPair(a, b, reason))
+        else:
+            tested.append((a, b))
+    return tuple(tested), tuple(excluded)
+
+
+def _posture(figure: Figure, side: str, degrees: dict[str, float]) -> Array:
+    """Wrist above the origin, palm down, fingers forward, lowest part on z = 0."""
+    from wholebody.figures.postures import lowest
+
+    values = {}
+    for finger, parts in FINGERS.items():
+        for part in parts:
+            row = keyed("hand", "name")[f"{finger}_{part}"]
+            for kind, neutral in zip(row["joints"].split(","), row["neutral_deg"].split(";"), strict=True):
+                joint = _JOINT[kind.strip()]
+                angle = degrees.get(f"{finger}_{joint}", degrees.get(joint, float(neutral)))
+                name = f"{side}_{finger}_{joint}"
+                if name in figure.joints:
+                    values[name] = math.radians(angle)
+    q = figure.with_joints(pin.neutral(figure.model), values)
+    if figure.root == "free":
+        down = np.column_stack([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
+        q[3:7] = pin.Quaternion(down @ _palm_axes(side).T).coeffs()
+        q[2] = -lowest(figure, q)
+    return q

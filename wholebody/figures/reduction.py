@@ -1,0 +1,82 @@
+"""A smaller figure: only some joints move, the others are locked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.errors import InputError
+from wholebody.figures.figure import ROOT_JOINT, Array, Chain, Description, ExcludedPair, Figure
+
+_LOCKED = "locked together"
+
+
+def reduce_figure(figure: Figure, keep: tuple[str, ...], q: Array) -> Figure:
+    """Return a figure of which only the joints in `keep` move; see `Figure.reduced`.
+
+    Raises:
+        InputError: `keep` is empty.
+    """
+    if not keep:
+        raise InputError("a reduced figure needs at least one joint; name joints, groups or 'root'")
+    model = figure.model
+    kept = {figure.joint_id(name) for name in keep}
+    locked = [joint for joint in range(1, model.njoints) if joint not in kept]
+    small, geometries = pin.buildReducedModel(model, [figure.geometry, figure.visual], locked, q)
+    geometry = geometries[0]
+    visual = geometry if figure.visual is figure.geometry else geometries[1]
+    fixed = drop_rigid_pairs(geometry)
+    names = {name for name in small.names if name != ROOT_JOINT}
+    old = figure.describe()
+    frames = {frame.name: frame for frame in small.frames}
+    description = Description(
+        groups=_filtered(old.groups, names),
+        chains={
+            name: Chain(tuple(joint for joint in chain.joints if joint in names), chain.tip)
+            for name, chain in old.chains.items()
+            if any(joint in names for joint in chain.joints)
+        },
+        frames=old.frames,
+        segments=old.segments,
+        postures={name: partial(_restricted, figure, name) for name in old.postures},
+        cones={
+            name: cone
+            for name, cone in old.cones.items()
+            if frames[cone.reference].parentJoint != frames[cone.limb].parentJoint
+        },
+        collision_groups=old.collision_groups,
+        effort=old.effort,
+        excluded=(*old.excluded, *fixed),
+        notes=old.notes,
+    )
+    return Figure(figure.name, small, geometry, figure.detail, description, visual)
+
+
+def drop_rigid_pairs(geometry: pin.GeometryModel) -> list[ExcludedPair]:
+    """Remove pairs of pieces on one joint from the geometry, since they never move against each other; return them."""
+    pieces = geometry.geometryObjects
+    dropped = []
+    for pair in list(geometry.collisionPairs):
+        a, b = pieces[pair.first], pieces[pair.second]
+        if a.parentJoint == b.parentJoint:
+            geometry.removeCollisionPair(pair)
+            dropped.append(ExcludedPair(a.name, b.name, _LOCKED))
+    return dropped
+
+
+def _filtered(groups: Mapping[str, tuple[str, ...]], names: set[str]) -> dict[str, tuple[str, ...]]:
+    kept = {name: tuple(joint for joint in members if joint in names) for name, members in groups.items()}
+    return {name: members for name, members in kept.items() if members}
+
+
+def _restricted(whole: Figure, name: str, part: Figure) -> Array:
+    """Posture of the reduced figure: the whole one's values of the joints that are left."""
+    q, values = whole.posture(name), pin.neutral(part.model)
+    for joint in range(1, part.model.njoints):
+        source = whole.model.joints[whole.model.getJointId(part.model.names[joint])]
+        target = part.model.joints[joint]
+        values[target.idx_q : target.idx_q + target.nq] = q[source.idx_q : source.idx_q + source.nq]
+    return np.asarray(values)
