@@ -1,0 +1,175 @@
+"""The one thing a method asks of a problem at a posture: everything that counts, to first order.
+
+One pass of Pinocchio, one cull, coal for the pairs that survive, and one matrix product for every row that is a wrench
+(goals, holds and contacts alike).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.figures.state import State, Wrench
+from wholebody.geometry.proximity import Contacts
+from wholebody.scene import Scene
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """A problem at one posture, to first order in the tangent displacement dq of shape (nv,).
+
+    Attributes:
+        q: (nq,) the posture.
+        goal_error: (g,) errors of the goals, metres and radians; ``goal_error + goal_jacobian @ dq`` should vanish.
+        goal_jacobian: (g, nv).
+        value: (c,) values of the constraints, to stay between the problem's lower and upper.
+        value_jacobian: (c, nv).
+        contacts: the pairs near enough to count.
+        gap: (r,) gaps of the contact rows, metres; the first k are the distances of the k contacts.
+        gap_jacobian: (r, nv); ``gap + gap_jacobian @ dq`` is to be at least `clearance`.
+        gap_contact: (r,) the contact a row belongs to.
+        clearance: (r,) least gap asked of each row.
+        measure: weighted sum of the measures.
+        gradient: (nv,) its derivative.
+        curvature: (nv,) its positive diagonal.
+        lower, upper: (nv,) bounds on dq.
+    """
+
+    q: Array
+    goal_error: Array
+    goal_jacobian: Array
+    value: Array
+    value_jacobian: Array
+    contacts: Contacts
+    gap: Array
+    gap_jacobian: Array
+    gap_contact: Indices
+    clearance: Array
+    measure: float
+    gradient: Array
+    curvature: Array
+    lower: Array
+    upper: Array
+
+
+class Lineariser:
+    """Linearises one problem at many postures, re-using its state and buffers."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        goals: Sequence[Goal],
+        constraints: Sequence[Constraint],
+        bounds: Sequence[Bound],
+        measures: Sequence[Measure],
+        clearances: Array,
+        dt: float | None = None,
+    ) -> None:
+        """Take the resolved terms of a problem.
+
+        Args:
+            scene: figure and things.
+            goals: resolved goals.
+            constraints: resolved constraints.
+            bounds: resolved bounds on the displacement.
+            measures: resolved measures.
+            clearances: (pairs,) least distance asked of every collision pair, metres.
+            dt: step in seconds for bounds that need one.
+        """
+        self.scene, self.goals, self.constraints = scene, goals, constraints
+        self.bounds, self.measures, self.clearances, self.dt = bounds, measures, clearances, dt
+        self.state = State(scene.model)
+        self._terms: list[Any] = [*goals, *constraints]
+
+    def at(self, q: Array, within: float) -> Linearisation:
+        """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres beyond their clearance."""
+        state, scene = self.state, self.scene
+        state.update(q)
+        reach = within + (float(self.clearances.max()) if len(self.clearances) else 0.0)
+        contacts = scene.proximity.near(state.data, reach)
+        rows = scene.row_builder.rows(contacts)
+
+        errors = [np.atleast_1d(goal.error(state)) for goal in self.goals]
+        values = [np.atleast_1d(constraint.value(state)) for constraint in self.constraints]
+        jacobian = self._jacobians(state, rows.wrench, rows.second, rows.first)
+        goal_rows = sum(len(error) for error in errors)
+        value_rows = sum(len(value) for value in values)
+        lower, upper = self._box(state)
+        measure, gradient, curvature = self._measure(state)
+        return Linearisation(
+            q=np.array(q, dtype=float),
+            goal_error=_joined(errors),
+            goal_jacobian=jacobian[:goal_rows],
+            value=_joined(values),
+            value_jacobian=jacobian[goal_rows : goal_rows + value_rows],
+            contacts=contacts,
+            gap=rows.gap,
+            gap_jacobian=jacobian[goal_rows + value_rows :],
+            gap_contact=rows.contact,
+            clearance=self.clearances[contacts.index][rows.contact],
+            measure=measure,
+            gradient=gradient,
+            curvature=curvature,
+            lower=lower,
+            upper=upper,
+        )
+
+    def _jacobians(self, state: State, gap_wrench: Array, second: Indices, first: Indices) -> Array:
+        """Rows of all goals, constraints and contacts, in this order; the wrenches among them in one product."""
+        wrenches: list[Array] = []
+        joint: list[int] = []
+        against: list[int] = []
+        dense: list[tuple[int, Array]] = []
+        row = 0
+        for term in self._terms:
+            part = term.jacobian(state)
+            if isinstance(part, Wrench):
+                size = len(part.rows)
+                wrenches.append(part.rows)
+                joint += [part.joint] * size
+                against += [part.against] * size
+            else:
+                size = len(part)
+                dense.append((row, part))
+                wrenches.append(np.zeros((size, 6)))
+                joint += [0] * size
+                against += [0] * size
+            row += size
+        stacked = np.vstack([*wrenches, gap_wrench])
+        result = state.rows(
+            stacked,
+            np.concatenate([np.array(joint, dtype=np.intp), second]),
+            np.concatenate([np.array(against, dtype=np.intp), first]),
+        )
+        for start, part in dense:
+            result[start : start + len(part)] = part
+        return result
+
+    def _box(self, state: State) -> tuple[Array, Array]:
+        lower, upper = self.scene.figure.tangent_bounds(state.q)
+        for bound in self.bounds:
+            low, high = bound.bounds(state, self.dt)
+            lower, upper = np.maximum(lower, low), np.minimum(upper, high)
+        return lower, upper
+
+    def _measure(self, state: State) -> tuple[float, Array, Array]:
+        value = 0.0
+        gradient = np.zeros(state.model.nv)
+        curvature = np.zeros(state.model.nv)
+        for term in self.measures:
+            value += term.weight * term.value(state)
+            gradient += term.weight * term.gradient(state)
+            curvature += term.weight * term.curvature(state)
+        return value, gradient, curvature
+
+
+def _joined(parts: list[Array]) -> Array:
+    return np.concatenate(parts) if parts else np.zeros(0)

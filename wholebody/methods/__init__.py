@@ -1,0 +1,1 @@
+"""How a posture is found: one module or folder a method."""

@@ -1,0 +1,100 @@
+"""From a guess of the active set to the exact answer of a quadratic program.
+
+With the active set fixed the program is a linear system. Eliminating x leaves one symmetric positive definite system in
+the multipliers y of the soft and active elastic rows A (Schur complement of the diagonal),
+
+    (A_F D_F^-1 A_F' + W^-1) y = A x_fixed-part - A_F D_F^-1 g_F - b,        x_F = -D_F^-1 (g_F + A_F' y),
+
+of a few dozen unknowns: about 30 us. Weights enter as their inverse, so very large ones cost no accuracy, and rows that
+repeat each other do no harm. The set is then corrected where signs are wrong (the primal-dual active set method,
+Hintermueller, Ito and Kunisch 2002), which ends after a few corrections when the guess was near. First-order solvers
+such as OSQP thereby end in answers exact to rounding.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg.lapack import dposv
+
+from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution, QuadraticProgram
+
+BOUND_TOLERANCE = 1e-11  # rad, m: an x this far outside its box counts as inside
+ROW_TOLERANCE = 1e-11  # m: likewise for elastic rows
+
+
+def guess_active_set(program: QuadraticProgram, x: Array, tolerance: float) -> ActiveSet:
+    """Active set read off an approximate minimiser x, shape (n,): what is within `tolerance` of its bound."""
+    gradient = program.gradient(x)
+    lower = (x <= program.lower + tolerance) & (gradient >= 0.0)
+    upper = (x >= program.upper - tolerance) & (gradient <= 0.0) & ~lower
+    return ActiveSet(lower, upper, program.elastic @ x <= program.least + tolerance)
+
+
+def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int = 12) -> QPSolution | None:
+    """Exact answer by correcting a guess of the active set.
+
+    Args:
+        program: what to solve.
+        guess: where to begin.
+        corrections: how many sets to try at the most.
+
+    Returns:
+        The answer, or None when the sets did not settle.
+    """
+    active = guess
+    for _ in range(corrections):
+        point = minimise_on_face(program, active)
+        if point is None:
+            return None
+        following = _corrected(program, active, point)
+        if following.same(active):
+            return QPSolution(np.clip(point.x, program.lower, program.upper), active, True, 0)
+        active = following
+    return None
+
+
+class FacePoint(NamedTuple):
+    """Stationary point for one active set: x, derivative of the Lagrangian in x, push of every active elastic row."""
+
+    x: Array
+    gradient: Array
+    push: Array
+
+
+def minimise_on_face(program: QuadraticProgram, active: ActiveSet) -> FacePoint | None:
+    """Minimiser with the bounds of the set held and the elastic rows of the set pushing; None if it is not finite.
+
+    Signs are read off the multipliers: weight times residual would drown them in rounding where weights are large.
+    """
+    rows = np.vstack([program.rows, program.elastic[active.elastic]])
+    target = np.concatenate([program.target, program.least[active.elastic]])
+    compliance = 1.0 / np.concatenate([program.weight, program.elastic_weight[active.elastic]])
+    x = np.where(active.lower, program.lower, np.where(active.upper, program.upper, 0.0))
+    inverse = np.where(active.lower | active.upper, 0.0, 1.0 / program.diagonal)
+    if len(rows):
+        scaled = rows * inverse
+        system = scaled @ rows.T
+        system.flat[:: len(rows) + 1] += compliance
+        _, multiplier, info = dposv(system, rows @ x - scaled @ program.linear - target)
+        if info != 0:
+            return None
+        pull = program.linear + multiplier @ rows
+    else:
+        multiplier = target
+        pull = program.linear
+    x = x - inverse * pull
+    if not np.isfinite(x).all():
+        return None
+    return FacePoint(x, program.diagonal * x + pull, -multiplier[len(program.target) :])
+
+
+def _corrected(program: QuadraticProgram, active: ActiveSet, point: FacePoint) -> ActiveSet:
+    """The set with wrong signs put right."""
+    x, gradient = point.x, point.gradient
+    elastic = program.elastic @ x < program.least - ROW_TOLERANCE
+    elastic[active.elastic] = point.push >= 0.0
+    lower = np.where(active.lower, gradient >= 0.0, x < program.lower - BOUND_TOLERANCE)
+    upper = np.where(active.upper, gradient <= 0.0, x > program.upper + BOUND_TOLERANCE)
+    return ActiveSet(lower, upper, elastic)

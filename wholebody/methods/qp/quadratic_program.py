@@ -1,0 +1,118 @@
+"""The quadratic program of one step, in a form that always has exactly one answer.
+
+    minimise    1/2 x' D x + g' x  +  1/2 sum_i w_i (t_i x - e_i)^2  +  1/2 sum_j v_j max(0, l_j - c_j x)^2
+    subject to  lower <= x <= upper
+
+D is diagonal and positive. The soft rows t carry goals and equalities, the elastic rows c what must stay apart or within
+bounds. Only the box is hard, so a start in penetration, a goal out of reach or constraints that contradict each other
+are ordinary programs and none is infeasible. Large weights order the rows: what has the larger weight gives way last.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class QuadraticProgram:
+    """Data of one program in n variables.
+
+    Attributes:
+        diagonal: (n,) D, positive.
+        linear: (n,) g.
+        rows: (m, n) soft rows t.
+        target: (m,) their targets e.
+        weight: (m,) their weights w, positive.
+        elastic: (k, n) elastic rows c.
+        least: (k,) their least values l.
+        elastic_weight: (k,) their weights v, positive.
+        lower, upper: (n,) the box, finite, lower <= upper.
+    """
+
+    diagonal: Array
+    linear: Array
+    rows: Array
+    target: Array
+    weight: Array
+    elastic: Array
+    least: Array
+    elastic_weight: Array
+    lower: Array
+    upper: Array
+
+    @property
+    def size(self) -> int:
+        """Number of variables n."""
+        return len(self.diagonal)
+
+    def value(self, x: Array) -> float:
+        """Objective at x, shape (n,)."""
+        residual = self.rows @ x - self.target
+        lack = np.maximum(self.least - self.elastic @ x, 0.0)
+        return float(
+            0.5 * (self.diagonal * x) @ x
+            + self.linear @ x
+            + 0.5 * (self.weight * residual) @ residual
+            + 0.5 * (self.elastic_weight * lack) @ lack
+        )
+
+    def gradient(self, x: Array) -> Array:
+        """Derivative of the objective at x, shape (n,); it is continuous."""
+        residual = self.rows @ x - self.target
+        lack = np.maximum(self.least - self.elastic @ x, 0.0)
+        result: Array = (
+            self.diagonal * x
+            + self.linear
+            + (self.weight * residual) @ self.rows
+            - (self.elastic_weight * lack) @ self.elastic
+        )
+        return result
+
+    def optimality(self, x: Array) -> float:
+        """How far x is from the answer: largest entry of x - clip(x - gradient / scale), in units of x.
+
+        The scale of an entry is the curvature there, so the figure reads as the Newton step that is still to be made.
+        """
+        lack = self.least - self.elastic @ x > 0.0
+        scale = self.diagonal + self.weight @ self.rows**2 + (self.elastic_weight * lack) @ self.elastic**2
+        moved = np.clip(x - self.gradient(x) / scale, self.lower, self.upper)
+        return float(np.abs(moved - x).max(initial=0.0))
+
+
+class ActiveSet(NamedTuple):
+    """Which bounds hold x and which elastic rows push."""
+
+    lower: Mask
+    upper: Mask
+    elastic: Mask
+
+    def same(self, other: ActiveSet) -> bool:
+        """Whether both are the same set."""
+        return (
+            np.array_equal(self.elastic, other.elastic)
+            and np.array_equal(self.lower, other.lower)
+            and np.array_equal(self.upper, other.upper)
+        )
+
+
+class QPSolution(NamedTuple):
+    """Answer to a program.
+
+    Attributes:
+        x: (n,) the minimiser.
+        active: the active set it was found with.
+        exact: whether the optimality conditions hold to rounding; otherwise x is the best found.
+        iterations: iterations of the solver that was used; 0 where the last active set was right at once.
+    """
+
+    x: Array
+    active: ActiveSet
+    exact: bool
+    iterations: int

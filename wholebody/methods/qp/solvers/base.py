@@ -1,0 +1,82 @@
+"""What a QP solver has to do, and the list of those there are."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from importlib.util import find_spec
+
+from wholebody.errors import MissingPackageError, UnknownNameError
+from wholebody.methods.qp.active_set import guess_active_set, solve_from
+from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution, QuadraticProgram
+
+GUESS_TOLERANCE = 1e-4
+"""How near to its bound an approximate answer counts as on it [rad, m]."""
+
+CORRECTIONS = 12
+"""Corrections of a guessed active set before the solver is asked for a better answer."""
+
+
+class QPSolver(ABC):
+    """Solves programs one after the other; keeps what helps the next one."""
+
+    name: str
+
+    @abstractmethod
+    def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
+        """Minimise.
+
+        Args:
+            program: what to solve.
+            guess: active set of a program like this one, or None.
+
+        Returns:
+            The answer; `exact` is False where only an approximation was found. Never NaN, always inside the box.
+        """
+
+
+def finish(program: QuadraticProgram, x: Array, iterations: int) -> QPSolution | None:
+    """Exact answer from an approximate one, or None when no active set near it settles."""
+    solution = solve_from(program, guess_active_set(program, x, GUESS_TOLERANCE), CORRECTIONS)
+    return None if solution is None else solution._replace(iterations=iterations)
+
+
+def approximate(program: QuadraticProgram, x: Array, iterations: int) -> QPSolution:
+    """The best that can be said of an x for which `finish` failed."""
+    x = x.clip(program.lower, program.upper)
+    return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, iterations)
+
+
+def solver_names() -> tuple[str, ...]:
+    """Names that `make_solver` takes on this machine: "osqp", "daqp" and what qpsolvers finds installed."""
+    names = ["osqp"]
+    if find_spec("daqp") is not None:
+        names.append("daqp")
+    if find_spec("qpsolvers") is not None:
+        from qpsolvers import available_solvers
+
+        names += sorted(set(available_solvers) - set(names))
+    return tuple(names)
+
+
+def make_solver(name: str) -> QPSolver:
+    """A QP solver by name.
+
+    Raises:
+        UnknownNameError: no installed solver has this name.
+        MissingPackageError: it exists but its package is not installed.
+    """
+    if name == "osqp":
+        from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
+
+        return OSQPSolver()
+    if name == "daqp":
+        if find_spec("daqp") is None:
+            raise MissingPackageError("the QP solver daqp is not installed; install it with: pip install daqp")
+        from wholebody.methods.qp.solvers.daqp_solver import DAQPSolver
+
+        return DAQPSolver()
+    if name not in solver_names():
+        raise UnknownNameError("QP solver", name, solver_names())
+    from wholebody.methods.qp.solvers.qpsolvers_solver import QpsolversSolver
+
+    return QpsolversSolver(name)

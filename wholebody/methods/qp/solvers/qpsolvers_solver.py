@@ -1,0 +1,47 @@
+"""Whatever solver qpsolvers offers, by its name."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.solvers.base import QPSolver, approximate, finish
+from wholebody.methods.qp.solvers.split_form import split
+
+
+HEAVIEST = 1e5  # weights are cut to this: solvers find the active set of a milder program more reliably
+
+
+class QpsolversSolver(QPSolver):
+    """A solver of qpsolvers on the split form; rebuilt at every call, since qpsolvers keeps no workspace."""
+
+    def __init__(self, name: str) -> None:
+        """Take a name that `qpsolvers.available_solvers` lists."""
+        from qpsolvers import sparse_solvers
+
+        self.name = name
+        self._sparse = name in sparse_solvers
+
+    def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
+        """Minimise; see `QPSolver.solve`. The guess is not used."""
+        from qpsolvers import Problem, solve_problem
+        from scipy import sparse
+
+        n, m = program.size, len(program.target)
+        form = split(program, HEAVIEST)
+        hessian, matrix = np.diag(form.diagonal), form.matrix
+        if self._sparse:
+            hessian, matrix = sparse.csc_matrix(hessian), sparse.csc_matrix(matrix)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            answer = solve_problem(
+                Problem(
+                    hessian, form.linear, -matrix[m:], -form.lower[m:], matrix[:m], form.lower[:m],
+                    form.box_lower, form.box_upper,
+                ),
+                solver=self.name,
+            )  # fmt: skip
+        x = np.zeros(n) if answer.x is None else np.where(np.isfinite(answer.x[:n]), answer.x[:n], 0.0)
+        return finish(program, x, 1) or approximate(program, x, 1)

@@ -1,0 +1,144 @@
+"""From a linearisation to the quadratic program of one step, and the two figures a step is judged by.
+
+The rows are ordered by their weights: contacts and inequalities give way last, then holds, then goals, then measures.
+Because the programs are solved exactly, the order is kept to rounding whatever the factor between the weights.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.linearisation import Linearisation
+from wholebody.methods.qp.quadratic_program import Array, QuadraticProgram
+from wholebody.problem import Problem
+
+GOAL_FORCE = 1e4  # 1/m: what a goal pulls with, however far it is; far above what measures pull with
+GOAL_WEIGHTS = (1e4, 1e8)  # 1/m^2, 1/rad^2: least and greatest weight of a goal row
+HOLD_WEIGHT = 1e10  # equalities give way by 1e-6 m to the pull of a goal out of reach
+ELASTIC_WEIGHT = 1e10  # and so do contacts
+PULL = 0.7  # m per rad of radius: of a goal farther away, or a deeper overlap, one step asks for this much
+BOX = 3.0  # radii: the box around a step, which seldom holds it; asking for little at a time keeps programs easy instead
+HOLD_SHARE = 10.0  # what a metre of hold counts against a metre of goal when a step is judged
+ELASTIC_SHARE = 50.0  # and a metre of overlap; above any ratio at which overlap could buy goal
+LEAST_CURVATURE = 1e-2  # 1/rad^2: of a degree of freedom that no measure speaks for
+
+
+class Violation(NamedTuple):
+    """How far a posture is from what is asked: metres and radians.
+
+    Attributes:
+        goal: norm of the goal errors.
+        hold: norm of the equality constraints' errors.
+        elastic: sum of what pairs lack in distance and inequalities in value.
+    """
+
+    goal: float
+    hold: float
+    elastic: float
+
+    @property
+    def total(self) -> float:
+        """One figure, in which overlap counts most."""
+        return self.goal + HOLD_SHARE * self.hold + ELASTIC_SHARE * self.elastic
+
+
+class Rows(NamedTuple):
+    """A linearisation sorted into soft rows (goals, then equalities) and elastic ones (inequalities, then gaps)."""
+
+    soft: Array
+    soft_error: Array
+    soft_weight: Array
+    goals: int
+    elastic: Array
+    lack: Array
+    group: NDArray[np.intp]
+    groups: int
+
+
+class Subproblem:
+    """Builds programs for one problem."""
+
+    def __init__(self, problem: Problem) -> None:
+        """Read off which constraint rows are equalities."""
+        lower, upper, weight = [], [], []
+        state = problem.scene.state(problem.start)
+        for constraint in problem.constraints:
+            size = np.atleast_1d(constraint.value(state)).shape
+            lower.append(np.broadcast_to(constraint.lower, size))
+            upper.append(np.broadcast_to(constraint.upper, size))
+        for goal in problem.goals:
+            weight.append(np.full(np.atleast_1d(goal.error(state)).shape, goal.weight))
+        self._lower = np.concatenate(lower) if lower else np.zeros(0)
+        self._upper = np.concatenate(upper) if upper else np.zeros(0)
+        self._goal_weight = np.concatenate(weight) if weight else np.zeros(0)
+        self._equal = np.flatnonzero(self._lower == self._upper)
+        self._low = np.flatnonzero((self._lower != self._upper) & np.isfinite(self._lower))
+        self._high = np.flatnonzero((self._lower != self._upper) & np.isfinite(self._upper))
+
+    def rows(self, at: Linearisation) -> Rows:
+        """Sort the rows of a linearisation."""
+        goals = len(at.goal_error)
+        soft = np.vstack([at.goal_jacobian, at.value_jacobian[self._equal]])
+        error = np.concatenate([at.goal_error, at.value[self._equal] - self._lower[self._equal]])
+        distance = float(np.linalg.norm(at.goal_error))
+        pull = min(max(GOAL_FORCE / max(distance, 1e-12), GOAL_WEIGHTS[0]), GOAL_WEIGHTS[1])
+        weight = np.concatenate([pull * self._goal_weight, np.full(len(self._equal), HOLD_WEIGHT)])
+        low, high = self._low, self._high
+        elastic = np.vstack([at.value_jacobian[low], -at.value_jacobian[high], at.gap_jacobian])
+        lack = np.concatenate(
+            [self._lower[low] - at.value[low], at.value[high] - self._upper[high], at.clearance - at.gap]
+        )
+        one_sided = len(low) + len(high)
+        group = np.concatenate([np.arange(one_sided), one_sided + at.gap_contact])
+        return Rows(soft, error, weight, goals, elastic, lack, group, one_sided + len(at.contacts.distance))
+
+    def violation(self, rows: Rows, displacement: Array | None = None) -> Violation:
+        """Violation at the linearised posture, or what the linearisation predicts after a displacement (nv,)."""
+        error, lack = rows.soft_error, rows.lack
+        if displacement is not None:
+            error = error + rows.soft @ displacement
+            lack = lack - rows.elastic @ displacement
+        worst = np.zeros(rows.groups)
+        np.maximum.at(worst, rows.group, lack)
+        goal = error[: rows.goals]
+        return Violation(float(np.sqrt(goal @ goal)), float(np.linalg.norm(error[rows.goals :])), float(worst.sum()))
+
+    def program(
+        self, at: Linearisation, rows: Rows, radius: float, damping: float, shift: Array | None = None
+    ) -> QuadraticProgram:
+        """The program of one step.
+
+        Args:
+            at: where.
+            rows: its rows.
+            radius: largest entry of the displacement, radians and metres.
+            damping: how much of the goals' neglected second derivative to add, bounded by |error| times lever.
+            shift: (soft rows,) what to add to the errors so that weights need not be infinite (method of multipliers).
+        """
+        diagonal = np.maximum(at.curvature, LEAST_CURVATURE)
+        diagonal = np.maximum(diagonal, np.abs(at.gradient) / radius)
+        error = rows.soft_error.copy()
+        distance = float(np.linalg.norm(error[: rows.goals]))
+        if distance > PULL * radius:
+            error[: rows.goals] *= PULL * radius / distance
+        if damping > 0.0 and rows.goals:
+            pull = rows.soft_weight[: rows.goals] * np.abs(error[: rows.goals])
+            diagonal = diagonal + damping * (pull @ np.abs(rows.soft[: rows.goals]))
+        box = BOX * radius
+        lower = np.minimum(np.maximum(at.lower, -box), box)
+        upper = np.maximum(np.minimum(at.upper, box), -box)
+        return QuadraticProgram(
+            diagonal=diagonal,
+            linear=at.gradient,
+            rows=rows.soft,
+            target=-error if shift is None else -(error + shift),
+            weight=rows.soft_weight,
+            elastic=rows.elastic,
+            least=np.minimum(rows.lack, PULL * radius),
+            elastic_weight=np.full(len(rows.lack), ELASTIC_WEIGHT),
+            lower=np.minimum(lower, upper),
+            upper=np.maximum(lower, upper),
+        )

@@ -1,0 +1,55 @@
+"""Solve a problem by a method's name or by a configured method."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.problem import Problem, Solution
+
+METHODS = ("qp",)
+
+
+class Method(Protocol):
+    """A way to solve a problem."""
+
+    @property
+    def name(self) -> str:
+        """Name for tables."""
+
+    def solve(self, problem: Problem) -> Solution:
+        """Find a posture."""
+
+
+def method_named(name: str) -> Method:
+    """A method with its default settings.
+
+    Raises:
+        UnknownNameError: there is none of this name.
+    """
+    if name == "qp":
+        from wholebody.methods.qp.method import QP
+
+        return QP()
+    raise UnknownNameError("method", name, METHODS)
+
+
+def solve(problem: Problem, method: str | Method = "qp") -> Solution:
+    """Find a posture that fits a problem.
+
+    Args:
+        problem: what is asked.
+        method: "qp", or a configured method such as `QP(solver="daqp", tolerance=1e-8)`.
+
+    Returns:
+        The posture with its status and the independent assessment. Goals out of reach and starts in penetration are
+        answers, not errors.
+
+    Raises:
+        UnknownNameError: there is no such method.
+        InputError: the scene changed after the problem was stated.
+    """
+    if not isinstance(problem, Problem):
+        raise InputError(f"solve takes a Problem, not a {type(problem).__name__}")
+    chosen = method_named(method) if isinstance(method, str) else method
+    return chosen.solve(problem)

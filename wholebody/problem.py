@@ -1,0 +1,215 @@
+"""A problem (what is asked), its solution (what a method answers) and how a posture is told apart from a good one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.linearisation import Lineariser
+from wholebody.scene import Scene
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+
+if TYPE_CHECKING:
+    from wholebody.assessment import Assessment
+
+Array = NDArray[np.float64]
+Status = Literal["solved", "unreachable", "infeasible", "stalled"]
+
+UNIT_TOLERANCE = 1e-3  # how far a start's quaternion may be from unit length before it is taken for a mistake
+LARGEST_CLEARANCE = 0.5  # m: more is taken for a slip of units
+
+
+class Problem:
+    """Scene, start, goals, constraints and measures: stated once, for every method.
+
+    Joint limits and non-penetration are always part of it. A pair that begins nearer than the clearance but not inside
+    (soles on a floor, a hand on a table) is asked to keep what it has; a pair that begins inside is asked for all of it.
+
+    Attributes:
+        scene: figure and things.
+        start: (nq,) the posture it begins from.
+        goals, constraints, bounds, measures: the terms, resolved on this scene and start.
+        clearance: distance asked of every pair, metres.
+        clearances: (pairs,) distance asked of each collision pair of the scene.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        start: Array | str | None = None,
+        *,
+        goals: Iterable[Goal] = (),
+        constraints: Iterable[Constraint | Bound] = (),
+        measures: Iterable[Measure] | None = None,
+        clearance: float = 0.0,
+        touching: Iterable[tuple[str, str]] = (),
+    ) -> None:
+        """State a problem.
+
+        Args:
+            scene: figure and things.
+            start: (nq,) posture, or the name of one of the figure's; its first posture where None.
+            goals: what to reach.
+            constraints: what must hold; bounds on the displacement are given here too.
+            measures: what to minimise; `Effort()` where None.
+            clearance: least distance between pieces, metres.
+            touching: pairs of segment or object names that may touch (clearance zero) although the others may not.
+
+        Raises:
+            InputError: a value of the wrong kind, shape or range.
+            UnknownNameError: a name that the figure or scene does not have.
+        """
+        from wholebody.tasks import Effort
+
+        self.scene = scene
+        self.start = _start(scene, start)
+        self.clearance = _clearance(clearance)
+        terms = [*_checked(goals, (Goal,), "goals")]
+        given = [*_checked(constraints, (Constraint, Bound), "constraints")]
+        measured = [Effort()] if measures is None else [*_checked(measures, (Measure,), "measures")]
+        self.goals: tuple[Goal, ...] = tuple(goal.resolve(scene, self.start) for goal in terms)
+        self.constraints: tuple[Constraint, ...] = tuple(
+            term.resolve(scene, self.start) for term in given if isinstance(term, Constraint)
+        )
+        self.bounds: tuple[Bound, ...] = tuple(
+            term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
+        )
+        self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
+        self.touching = tuple(_owner_pair(scene, pair) for pair in touching)
+        self.clearances = self._clearances()
+        self._revision = scene.revision
+
+    def lineariser(self, dt: float | None = None) -> Lineariser:
+        """What linearises this problem at postures; each method makes its own.
+
+        Raises:
+            InputError: objects came to or left the scene after the problem was stated.
+        """
+        self.check_fresh()
+        return Lineariser(
+            self.scene, self.goals, self.constraints, self.bounds, self.measures, self.clearances, dt
+        )
+
+    def check_fresh(self) -> None:
+        """Raise InputError if objects came to or left the scene after the problem was stated (moving them is fine)."""
+        if self.scene.revision != self._revision:
+            raise InputError("objects came to or left the scene after the problem was stated; state the problem anew")
+
+    def _clearances(self) -> Array:
+        scene = self.scene
+        asked = np.full(len(scene.proximity.pairs), self.clearance)
+        owners = scene.piece_owner
+        allowed = set(self.touching) | {(b, a) for a, b in self.touching}
+        if allowed:
+            named = [(owners[a], owners[b]) in allowed for a, b in scene.proximity.pairs]
+            asked[np.array(named, dtype=bool)] = 0.0
+        state = scene.state(self.start)
+        near = scene.proximity.near(state.data, self.clearance + 1e-9)
+        kept = np.maximum(near.distance, 0.0)
+        resting = near.distance >= -1e-6
+        asked[near.index[resting]] = np.minimum(asked[near.index[resting]], kept[resting])
+        return asked
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """One line of a solution's trace.
+
+    Attributes:
+        goal_error: largest goal error left, metres or radians.
+        violation: largest violation of anything that must hold, metres or radians.
+        measure: weighted sum of the measures.
+        step: largest entry of the displacement that led here, radians or metres.
+        note: what happened: "", "restart", "continuation", ...
+    """
+
+    goal_error: float
+    violation: float
+    measure: float
+    step: float
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a method answers.
+
+    Attributes:
+        q: (nq,) the posture, within limits, never NaN.
+        status: "solved", "unreachable", "infeasible" or "stalled"; see the guide.
+        seconds: wall time of the call.
+        iterations: iterations of the method.
+        assessment: the independent judgement of q.
+        trace: one entry an iteration.
+        method: name of the method and of what it used.
+        message: one sentence for a reader.
+    """
+
+    q: Array
+    status: Status
+    seconds: float
+    iterations: int
+    assessment: Assessment
+    trace: tuple[Iterate, ...] = field(repr=False)
+    method: str
+    message: str
+
+    @property
+    def solved(self) -> bool:
+        """Whether the status is "solved"."""
+        return self.status == "solved"
+
+
+def _start(scene: Scene, start: Array | str | None) -> Array:
+    figure = scene.figure
+    if start is None:
+        return np.array(figure.posture(figure.postures[0]), dtype=float)
+    if isinstance(start, str):
+        return np.array(figure.posture(start), dtype=float)
+    q = np.array(start, dtype=float)
+    if q.shape != (scene.model.nq,):
+        raise InputError(f"start has shape ({scene.model.nq},), not {q.shape}; begin from figure.posture('standing')")
+    if not np.isfinite(q).all():
+        raise InputError(f"start entry {int(np.flatnonzero(~np.isfinite(q))[0])} is not finite; give finite numbers")
+    normal = pin.normalize(scene.model, q)
+    if np.abs(normal - q).max() > UNIT_TOLERANCE:
+        raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
+    return np.array(normal)
+
+
+def _clearance(value: float) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"clearance is a distance in metres, not {value!r}") from None
+    if not 0.0 <= number <= LARGEST_CLEARANCE:
+        raise InputError(f"clearance is {number} m; give metres from 0 to {LARGEST_CLEARANCE}")
+    return number
+
+
+def _checked(terms: Any, kinds: tuple[type, ...], what: str) -> Sequence[Any]:
+    try:
+        listed = list(terms)
+    except TypeError:
+        raise InputError(f"{what} is a list of terms, not {type(terms).__name__}; write {what}=[...]") from None
+    for number, term in enumerate(listed):
+        if not isinstance(term, kinds):
+            wanted = " or ".join(kind.__name__ for kind in kinds)
+            raise InputError(f"{what}[{number}] is a {type(term).__name__}, not a {wanted}; see wholebody.tasks")
+    return listed
+
+
+def _owner_pair(scene: Scene, pair: Any) -> tuple[str, str]:
+    known = {*scene.figure.segments, *scene.objects}
+    if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+        raise InputError(f"touching takes pairs of names such as ('right_hand', 'table'), not {pair!r}")
+    for name in pair:
+        if name not in known:
+            raise UnknownNameError("segment or object", str(name), known, "touching")
+    return str(pair[0]), str(pair[1])

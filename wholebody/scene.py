@@ -1,0 +1,340 @@
+"""A scene: one figure, what it carries, what stands around it, and which pairs can touch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures.state import State
+from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.geometry.placement import placement as to_placement
+from wholebody.geometry.proximity import Contacts, Proximity
+
+if TYPE_CHECKING:
+    from wholebody.figures.figure import Figure
+    from wholebody.geometry.penetration import ObjectPenetration
+    from wholebody.geometry.shapes import Shape
+    from wholebody.geometry.sweep import FirstContact
+
+Array = NDArray[np.float64]
+RESTING = 1e-3  # m: equipment nearer than this to a segment at rest is taken to lean on it
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """One thing in a scene.
+
+    Attributes:
+        name: its name, unique among the objects and segments of the scene.
+        shape: what it is.
+        placement: in the world, or in the segment's frame where it is carried.
+        segment: the segment that carries it; None for a thing that stands around.
+        color: red, green, blue, alpha from 0 to 1, or None for the viewer's choice.
+    """
+
+    name: str
+    shape: Shape
+    placement: pin.SE3
+    segment: str | None = None
+    color: tuple[float, float, float, float] | None = None
+
+
+class Scene:
+    """A figure among things.
+
+    The geometry model is built when it is first needed and again after objects come or go. Moving an object keeps it.
+    """
+
+    def __init__(self, figure: Figure) -> None:
+        """Begin with the figure alone."""
+        self.figure = figure
+        self._objects: dict[str, SceneObject] = {}
+        self._excluded: dict[tuple[str, str], str] = {}
+        self._built: _Built | None = None
+        self._state: State | None = None
+        self.revision = 0
+
+    # ---- what is there
+
+    @property
+    def model(self) -> pin.Model:
+        """Pinocchio's model of the figure."""
+        return self.figure.model
+
+    @property
+    def geometry(self) -> pin.GeometryModel:
+        """Pinocchio's geometry model: the pieces of the figure, of what it carries, of what stands around; all pairs."""
+        return self._build().geometry
+
+    @property
+    def objects(self) -> Mapping[str, SceneObject]:
+        """Things by name, carried ones included."""
+        return MappingProxyType(self._objects)
+
+    @property
+    def piece_names(self) -> tuple[str, ...]:
+        """Name of every piece, in the order of the geometry model."""
+        return tuple(piece.name for piece in self.geometry.geometryObjects)
+
+    @property
+    def piece_owner(self) -> tuple[str, ...]:
+        """The segment or object that every piece is part of, in the order of the geometry model."""
+        return self._build().owners
+
+    @property
+    def excluded_pairs(self) -> Mapping[tuple[str, str], str]:
+        """Pairs of owners that are not tested against each other because of the scene, with the reason."""
+        self._build()
+        return MappingProxyType(self._excluded)
+
+    @property
+    def proximity(self) -> Proximity:
+        """The distances of this scene's pairs, re-used from posture to posture."""
+        return self._build().proximity
+
+    @property
+    def row_builder(self) -> ContactRowBuilder:
+        """The contact rows of this scene's pairs."""
+        return self._build().rows
+
+    def frame_id(self, name: str) -> int:
+        """Index of a frame of the figure.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+        """
+        return int(self.figure.frame_id(name))
+
+    # ---- changing it
+
+    def add(
+        self,
+        shape: Shape,
+        *,
+        name: str,
+        at: Any = (0.0, 0.0, 0.0),
+        color: tuple[float, float, float, float] | None = None,
+    ) -> Scene:
+        """Put a thing into the world.
+
+        Args:
+            shape: a `wholebody.geometry.shapes.Shape`.
+            name: a name that nothing else in the scene has.
+            at: (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3.
+            color: red, green, blue, alpha.
+
+        Returns:
+            The scene, so that calls can be chained.
+
+        Raises:
+            InputError: the name is taken, or the placement cannot be read.
+        """
+        return self._put(SceneObject(self._new_name(name), shape, to_placement(at), None, color))
+
+    def attach(
+        self,
+        shape: Shape,
+        *,
+        to: str,
+        name: str,
+        at: Any = (0.0, 0.0, 0.0),
+        color: tuple[float, float, float, float] | None = None,
+    ) -> Scene:
+        """Give the figure a thing to carry: it moves with a segment, at `at` in the segment's frame.
+
+        It is not tested against its own segment, nor against segments it leans on in the posture the figure rests in.
+
+        Raises:
+            InputError: the name is taken, or the placement cannot be read.
+            UnknownNameError: there is no such frame.
+        """
+        self.frame_id(to)
+        return self._put(SceneObject(self._new_name(name), shape, to_placement(at), to, color))
+
+    def move(self, name: str, *, at: Any) -> Scene:
+        """Place a thing anew: in the world, or in its segment's frame.
+
+        Raises:
+            UnknownNameError: there is no such object.
+            InputError: the placement cannot be read.
+        """
+        old = self._object(name)
+        moved = SceneObject(name, old.shape, to_placement(at), old.segment, old.color)
+        self._objects[name] = moved
+        if self._built is not None:
+            base = moved.placement
+            if moved.segment is not None:
+                base = self.model.frames[self.frame_id(moved.segment)].placement * base
+            for index, local in self._built.pieces_of[name]:
+                self._built.geometry.geometryObjects[index].placement = base * local
+        return self
+
+    def remove(self, name: str) -> Scene:
+        """Take a thing out.
+
+        Raises:
+            UnknownNameError: there is no such object.
+        """
+        self._object(name)
+        del self._objects[name]
+        self._changed()
+        return self
+
+    def _put(self, thing: SceneObject) -> Scene:
+        self._objects[thing.name] = thing
+        self._changed()
+        return self
+
+    def _changed(self) -> None:
+        self._built = None
+        self.revision += 1
+
+    def _object(self, name: str) -> SceneObject:
+        if name not in self._objects:
+            raise UnknownNameError("object", name, self._objects)
+        return self._objects[name]
+
+    def _new_name(self, name: str) -> str:
+        if not isinstance(name, str) or not name:
+            raise InputError("an object needs a name; give name='table'")
+        if name in self._objects or name in self.figure.segments:
+            raise InputError(f"the scene already has a {name!r}; give the new object another name, or move() the old one")
+        return name
+
+    # ---- asking it
+
+    def state(self, q: Array) -> State:
+        """One kinematic pass at q, shape (nq,); the pieces are moved there too. Re-used by the next call."""
+        if self._state is None:
+            self._state = State(self.model)
+        self._state.update(q)
+        self.proximity.place(self._state.data)
+        return self._state
+
+    def contacts(self, q: Array, within: float = 0.05) -> Contacts:
+        """Every pair nearer than `within` metres at the posture q, shape (nq,), nearest first.
+
+        Raises:
+            InputError: q has the wrong shape or is not finite, or `within` is not a finite number.
+        """
+        if not np.isfinite(within):
+            raise InputError(f"within is a finite distance in metres, not {within}")
+        near = self.proximity.near(self.state(q).data, float(within))
+        order = np.argsort(near.distance, kind="stable")
+        return Contacts(*(np.array(field[order]) for field in near))
+
+    def penetration(self, q: Array) -> list[ObjectPenetration]:
+        """How deep owners (segments, objects) are in each other at q: PD_g and the least separating translation.
+
+        The deepest first; empty where nothing overlaps. See `wholebody.geometry.penetration`.
+        """
+        from wholebody.geometry.penetration import object_penetrations
+
+        contacts = self.contacts(q, within=0.0)
+        built = self._build()
+        return object_penetrations(self.geometry, built.proximity.results, built.owners, contacts.pair)
+
+    def sweep(self, q0: Array, q1: Array) -> FirstContact | None:
+        """First contact on the way from q0 to q1, both (nq,), along pin.interpolate; None where there is none.
+
+        Continuous: no object is too thin to be seen. See `wholebody.geometry.sweep`.
+        """
+        from wholebody.geometry.sweep import first_contact
+
+        return first_contact(self.model, self.geometry, self.proximity.pairs, q0, q1)
+
+    # ---- building
+
+    def _build(self) -> _Built:
+        if self._built is None:
+            self._excluded.clear()
+            self._built = _assemble(self.figure, self._objects.values(), self._excluded)
+        return self._built
+
+
+class _Built:
+    """What is made from the list of objects: the geometry model and the indices into it."""
+
+    def __init__(
+        self,
+        model: pin.Model,
+        geometry: pin.GeometryModel,
+        owners: tuple[str, ...],
+        pieces_of: dict[str, list[tuple[int, pin.SE3]]],
+    ) -> None:
+        self.geometry, self.owners, self.pieces_of = geometry, owners, pieces_of
+        self.proximity = Proximity(model, geometry)
+        self.rows = ContactRowBuilder(self.proximity)
+
+
+def _assemble(
+    figure: Figure, objects: Iterable[SceneObject], excluded: dict[tuple[str, str], str]
+) -> _Built:
+    """Geometry model of a figure with things: the figure's pieces first, then carried ones, then the world's."""
+    model = figure.model
+    geometry = pin.GeometryModel()
+    owners: list[str] = []
+    pieces_of: dict[str, list[tuple[int, pin.SE3]]] = {}
+    for piece in figure.geometry.geometryObjects:
+        geometry.addGeometryObject(pin.GeometryObject(piece))
+        owners.append(model.frames[piece.parentFrame].name)
+    body = geometry.ngeoms
+    for pair in figure.geometry.collisionPairs:
+        geometry.addCollisionPair(pin.CollisionPair(pair.first, pair.second))
+
+    for thing in sorted(objects, key=lambda item: item.segment is None):
+        frame = model.frames[figure.frame_id(thing.segment)] if thing.segment is not None else None
+        base = frame.placement * thing.placement if frame is not None else thing.placement
+        joint = frame.parentJoint if frame is not None else 0
+        parent = figure.frame_id(thing.segment) if thing.segment is not None else 0
+        pieces_of[thing.name] = []
+        for number, part in enumerate(thing.shape.pieces()):
+            name = f"{thing.name}:{number}"
+            made = pin.GeometryObject(name, joint, parent, base * part.placement, part.geometry)
+            index = geometry.addGeometryObject(made)
+            owners.append(thing.name)
+            pieces_of[thing.name].append((index, part.placement))
+
+    joints = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=int)
+    resting = _resting(figure, geometry, body, joints, owners, excluded)
+    for second in range(body, geometry.ngeoms):
+        for first in range(second):
+            if joints[first] != joints[second] and (owners[first], owners[second]) not in resting:
+                geometry.addCollisionPair(pin.CollisionPair(first, second))
+    return _Built(model, geometry, tuple(owners), pieces_of)
+
+
+def _resting(
+    figure: Figure,
+    geometry: pin.GeometryModel,
+    body: int,
+    joints: NDArray[np.int_],
+    owners: list[str],
+    excluded: dict[tuple[str, str], str],
+) -> set[tuple[str, str]]:
+    """Pairs of owners, a carried thing being one, that touch in the posture the figure rests in."""
+    carried = [i for i in range(body, geometry.ngeoms) if joints[i] != 0]
+    if not carried:
+        return set()
+    probe = geometry.copy()
+    probe.removeAllCollisionPairs()
+    for second in carried:
+        for first in range(second):
+            if joints[first] not in (0, joints[second]):
+                probe.addCollisionPair(pin.CollisionPair(first, second))
+    rest = figure.posture(figure.postures[0])
+    data = figure.model.createData()
+    pin.forwardKinematics(figure.model, data, rest)
+    proximity = Proximity(figure.model, probe)
+    found = proximity.near(data, RESTING)
+    pairs = {(owners[a], owners[b]) for a, b in found.pair}
+    for pair in pairs:
+        excluded[pair] = f"they touch in the posture {figure.postures[0]!r}"
+    return pairs
