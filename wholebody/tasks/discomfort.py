@@ -21,15 +21,23 @@ POWER = 200
 
 
 class _Joints(NamedTuple):
-    """The joints that have two limits, each array (n,)."""
+    """The n joints that have two limits.
+
+    Attributes:
+        idx_q: (n,) places in the posture.
+        idx_v: (n,) places in the tangent.
+        neutral: (n,) values in the neutral posture.
+        weights: (n,) g over the squared range.
+        limits: (2, n) upper, then lower limits.
+        phase: (2, n) derivative of the phase 2.5 r by the joint's value: r falls towards the upper limit.
+    """
 
     idx_q: NDArray[np.intp]
     idx_v: NDArray[np.intp]
-    lower: Array
-    upper: Array
     neutral: Array
-    span: Array
     weights: Array
+    limits: Array
+    phase: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,55 +70,41 @@ class Discomfort(Measure):
         limits = figure.limits
         moves = (limits.upper > limits.lower) & np.isfinite(limits.upper - limits.lower)
         idx_q, idx_v = limits.idx_q[moves], limits.idx_v[moves]
-        lower, upper = limits.lower[moves], limits.upper[moves]
+        ends = np.array([limits.upper[moves], limits.lower[moves]])
+        span = ends[0] - ends[1]
         weights = figure.effort_weights[idx_v]
-        greatest = float(weights.max(initial=0.0))
-        weights = weights / greatest if greatest > 0.0 else np.zeros_like(weights)
-        joints = _Joints(idx_q, idx_v, lower, upper, figure.neutral[idx_q], upper - lower, weights)
-        return filled(self, _joints=joints)
+        weights = weights / (max(float(weights.max(initial=0.0)), LEAST_CURVATURE) * span * span)
+        phase = STEEPNESS * np.array([-1.0 / span, 1.0 / span])
+        return filled(self, _joints=_Joints(idx_q, idx_v, figure.neutral[idx_q], weights, ends, phase))
 
     def value(self, state: State) -> float:
         """The discomfort."""
         joints = self._joints
-        away = (state.q[joints.idx_q] - joints.neutral) / joints.span
-        above, below = self._phases(state)
-        return float(joints.weights @ (away * away) + (np.cos(above) ** POWER).sum() + (np.cos(below) ** POWER).sum())
+        q = state.q[joints.idx_q]
+        away = q - joints.neutral
+        return float(joints.weights @ (away * away) + (np.cos(self._phase(q)) ** POWER).sum())
 
     def gradient(self, state: State) -> Array:
         """(nv,) derivative [1/rad]."""
         joints = self._joints
-        away = (state.q[joints.idx_q] - joints.neutral) / joints.span
-        above, below = self._phases(state)
-        slope = STEEPNESS * POWER * (_slope(above) - _slope(below))
+        q = state.q[joints.idx_q]
+        phase = self._phase(q)
+        slope = (-POWER * np.cos(phase) ** (POWER - 1) * np.sin(phase) * joints.phase).sum(axis=0)
         result = np.zeros(state.model.nv)
-        result[joints.idx_v] = (2.0 * joints.weights * away + slope) / joints.span
+        result[joints.idx_v] = 2.0 * joints.weights * (q - joints.neutral) + slope
         return result
 
     def curvature(self, state: State) -> Array:
         """(nv,) second derivative, which is diagonal; its negative part near the limits is left out [1/rad^2]."""
         joints = self._joints
-        above, below = self._phases(state)
-        bend = STEEPNESS**2 * POWER * (_bend(above) + _bend(below))
+        phase = self._phase(state.q[joints.idx_q])
+        cosine, sine = np.cos(phase), np.sin(phase)
+        bend = POWER * cosine ** (POWER - 2) * ((POWER - 1) * sine * sine - cosine * cosine) * joints.phase**2
         result = np.full(state.model.nv, LEAST_CURVATURE)
-        result[joints.idx_v] += (2.0 * joints.weights + bend) / (joints.span * joints.span)
+        result[joints.idx_v] += 2.0 * joints.weights + np.maximum(bend, 0.0).sum(axis=0)
         return result
 
-    def _phases(self, state: State) -> tuple[Array, Array]:
-        """2.5 r to the upper and lower limits; zero beyond them."""
+    def _phase(self, q: Array) -> Array:
+        """(2, n) 2.5 r to the upper and lower limits, kept between zero at one limit and 2.5 at the other."""
         joints = self._joints
-        q = state.q[joints.idx_q]
-        scale = STEEPNESS / joints.span
-        above = np.clip((joints.upper - q) * scale, 0.0, STEEPNESS)
-        below = np.clip((q - joints.lower) * scale, 0.0, STEEPNESS)
-        return above, below
-
-
-def _slope(phase: Array) -> Array:
-    """-1/POWER times the derivative of cos(phase)^POWER."""
-    return np.asarray(np.cos(phase) ** (POWER - 1) * np.sin(phase))
-
-
-def _bend(phase: Array) -> Array:
-    """1/POWER times the second derivative of cos(phase)^POWER, where that is positive."""
-    cosine, sine = np.cos(phase), np.sin(phase)
-    return np.asarray(np.maximum(cosine ** (POWER - 2) * ((POWER - 1) * sine * sine - cosine * cosine), 0.0))
+        return np.asarray(np.minimum(np.maximum((q - joints.limits) * joints.phase, 0.0), STEEPNESS))
