@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.state import State
+from wholebody.geometry.placement import ROUNDING
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Array, Goal, Mask, Surroundings, filled
 
@@ -77,6 +78,7 @@ class Posture(Goal):
             except UnknownNameError as error:
                 raise UnknownNameError(error.kind, error.name, error.known, "Posture") from None
         q = inputs.numbers(self.target, (scene.model.nq,), "Posture: target")
-        if not pin.isNormalized(scene.model, q, 1e-6):
+        normal = np.asarray(pin.normalize(scene.model, q))
+        if np.abs(normal - q).max() > ROUNDING:
             raise InputError("Posture: target holds a quaternion that is not of unit length; use pin.normalize")
-        return q
+        return normal
