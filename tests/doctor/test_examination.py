@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from wholebody.doctor import examination, packages, trials
+from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
+from wholebody.doctor.trials import Outcome
+
+Fake = Callable[..., None]
+
+
+@pytest.fixture
+def fake(monkeypatch: pytest.MonkeyPatch) -> Fake:
+    """An installation in which everything works, but for what the test says."""
+
+    def arrange(
+        have: dict[str, Distribution] | None = None, fails: dict[str, str] | None = None, absent: Sequence[str] = ()
+    ) -> None:
+        everything = {packages.normal(name): Distribution("1.0") for name in (*MODULES, *EXTRAS)} | (have or {})
+        for name in absent:
+            del everything[name]
+        failing = {MODULES.get(name, name): "ModuleNotFoundError: absent" for name in absent} | (fails or {})
+
+        def run(kind: str, names: Sequence[str]) -> dict[str, Outcome]:
+            answer = {"methods": "qp"}.get(kind, "fine")
+            return {name: Outcome(name not in failing, failing.get(name, answer)) for name in names}
+
+        monkeypatch.setattr(packages, "installed", lambda names: everything)
+        monkeypatch.setattr(trials, "run", run)
+
+    return arrange
+
+
+def test_a_sound_installation_has_no_faults(fake: Fake) -> None:
+    fake()
+    report = examination.examine({})
+    assert report.healthy
+    assert {entry.kind for entry in report.entries} == {"package", "QP solver", "method", "tool"}
+    assert all(entry.state == "works" for entry in report.entries)
+
+
+def test_what_is_absent_but_not_needed_is_no_fault_and_says_how_it_is_had(fake: Fake) -> None:
+    fake(absent=["mujoco", "piqp"], fails={"chromium": "FileNotFoundError: not found"})
+    report = examination.examine({})
+    assert report.healthy
+    mends = {
+        entry.name: entry.mend for entry in report.entries if entry.state == "absent" and entry.kind != "QP solver"
+    }
+    assert mends == {
+        "mujoco": "pip install 'wholebody[compare]'",
+        "piqp": "pip install 'wholebody[solvers]'",
+        "chromium": "apt-get install chromium",
+    }
+
+
+@pytest.mark.parametrize(
+    ("arranged", "environ", "sentence", "mend"),
+    [
+        (
+            {"have": {"placo": Distribution("0.10.2", ("pin==3.8.0",)), "pin": Distribution("4.1.0")}},
+            {},
+            "placo needs pin==3.8.0, and 4.1.0 is installed",
+            "pip install 'placo' 'pin==3.8.0'",
+        ),
+        ({"fails": {"placo": "ImportError: undefined symbol"}}, {}, "undefined symbol", examination.AGAIN),
+        ({"absent": ["coal"]}, {}, "the package coal is absent", examination.AGAIN),
+        ({"fails": {"osqp": "ended the process (code -11)"}}, {}, "code -11", examination.AGAIN),
+        ({"fails": {"qp": "ArithmeticError: a reach of 5 cm ended stalled"}}, {}, "stalled", examination.AGAIN),
+        ({"fails": {"": "ImportError: no pinocchio"}}, {}, "no pinocchio", examination.AGAIN),
+        (
+            {"have": {"numpy": Distribution("2.0", files=frozenset({"/right/numpy/__init__.py"}))}},
+            {},
+            "2.0 is installed, but",
+            "unset PYTHONPATH",
+        ),
+    ],
+)
+def test_faults_come_with_their_mend(
+    fake: Fake, arranged: dict[str, object], environ: dict[str, str], sentence: str, mend: str
+) -> None:
+    fake(**arranged)
+    report = examination.examine(environ)
+    assert not report.healthy
+    assert any(sentence in said and mend == told for said, told in report.faults), report.faults
+
+
+def test_a_ros_workspace_on_the_paths_is_a_fault(fake: Fake, tmp_path: Path) -> None:
+    (tmp_path / "pinocchio").mkdir()
+    (tmp_path / "libboost_python311.so").touch()
+    fake()
+    report = examination.examine({"PYTHONPATH": str(tmp_path), "LD_LIBRARY_PATH": str(tmp_path)})
+    assert [mend for _, mend in report.faults] == ["unset PYTHONPATH", "unset LD_LIBRARY_PATH"]

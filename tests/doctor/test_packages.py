@@ -1,0 +1,48 @@
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from wholebody.doctor.packages import MODULES, Conflict, Distribution, conflicts, installed, shadow
+
+PLACO = Distribution("0.10.2", ("cmeel", "pin==3.8.0", "cmeel-urdfdom==4.0.1", "meshcat", "extra-one==1; extra == 'x'"))
+URDFDOM = Distribution("4.0.1")
+
+
+def test_versions_that_fit_are_no_conflict() -> None:
+    assert conflicts({"placo": PLACO, "pin": Distribution("3.8.0"), "cmeel-urdfdom": URDFDOM}) == []
+
+
+def test_placo_beside_another_pin_is_named_with_its_mend() -> None:
+    (found,) = conflicts({"placo": PLACO, "pin": Distribution("4.1.0"), "cmeel-urdfdom": URDFDOM})
+    assert found == Conflict("placo", "pin==3.8.0", "4.1.0")
+    assert str(found) == "placo needs pin==3.8.0, and 4.1.0 is installed"
+    assert found.mend == "pip install 'placo' 'pin==3.8.0'"
+
+
+def test_an_old_placo_contradicts_wholebody_itself() -> None:
+    (found,) = conflicts({"wholebody": Distribution("1", ("placo==0.10.2",)), "placo": Distribution("0.6.2")})
+    assert (found.who, found.found, found.mend) == ("wholebody", "0.6.2", "pip install 'placo==0.10.2'")
+
+
+def test_what_is_missing_is_said_to_be_missing() -> None:
+    (found,) = conflicts({"pin": Distribution("3.8.0", ("libpinocchio == 3.8.0", "coal >= 3.0.2, < 4"))})
+    assert str(found) == "pin needs libpinocchio==3.8.0, and it is not installed"
+
+
+def test_a_module_from_elsewhere_is_noticed(tmp_path: Path) -> None:
+    right, wrong = tmp_path / "site" / "pinocchio" / "__init__.py", tmp_path / "ros" / "pinocchio" / "__init__.py"
+    package = Distribution("3.8.0", files=frozenset({os.path.realpath(right)}))
+    assert shadow(package, str(right)) is None
+    assert shadow(package, str(wrong)) == str(tmp_path / "ros")
+    assert shadow(Distribution("3.8.0"), str(wrong)) is None, "metadata that lists no files proves nothing"
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_what_is_needed_is_installed_here(name: str) -> None:
+    found = installed([name, "no-such-distribution"])
+    assert list(found) == [name]
+    assert found[name].version[0].isdigit()
+    assert any(os.path.isfile(file) for file in found[name].files)

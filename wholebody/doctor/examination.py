@@ -1,0 +1,164 @@
+"""The whole examination: what is there, what works, and every fault with its mend."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from wholebody.doctor import packages, surroundings, trials
+from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
+
+State = Literal["works", "absent", "broken"]
+
+SOLVERS = {"osqp": "osqp", "daqp": "daqp", "quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
+"""QP solvers: name -> the distribution that brings it."""
+
+TOOLS = {
+    "chromium": ("draws pictures and movies; scenes as HTML need none", "apt-get install chromium"),
+    "ffmpeg": ("writes MP4; GIF needs none", "apt-get install ffmpeg"),
+}
+"""Programs beside Python: name -> what it is for, and how it is had on Debian and Ubuntu."""
+
+AGAIN = "pip install --force-reinstall wholebody"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One thing that was looked at.
+
+    Attributes:
+        kind: "package", "QP solver", "method" or "tool".
+        name: its name.
+        state: "works", "absent" or "broken".
+        detail: version, time, place or reason.
+        needed: whether wholebody cannot do without it.
+        mend: the command or the deed that repairs it; empty where nothing is to be done.
+    """
+
+    kind: str
+    name: str
+    state: State
+    detail: str
+    needed: bool = True
+    mend: str = ""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What the examination found.
+
+    Attributes:
+        python: version and place of the interpreter.
+        entries: everything that was looked at.
+        faults: what is wrong, with its mend: (sentence, mend).
+    """
+
+    python: str
+    entries: tuple[Entry, ...]
+    faults: tuple[tuple[str, str], ...] = field(default=())
+
+    @property
+    def healthy(self) -> bool:
+        """Whether nothing is wrong: what is absent but not needed does not count."""
+        return not self.faults
+
+
+def examine(environ: Mapping[str, str] = os.environ) -> Report:
+    """Look at everything; takes about ten seconds, because methods and solvers are really used.
+
+    Args:
+        environ: the environment variables to judge.
+    """
+    have = packages.installed(["wholebody", *MODULES, *EXTRAS, "libpinocchio", "libcoal", *_REQUIRED])
+    entries = [*_packages(have), *_solvers(have), *_methods(), *_tools()]
+    faults = [*_python(), *_conflicts(have), *_paths(environ)]
+    faults += [
+        (f"the {entry.kind} {entry.name} is {entry.state}: {entry.detail}", entry.mend)
+        for entry in entries
+        if entry.state == "broken" or (entry.needed and entry.state == "absent")
+    ]
+    return Report(f"Python {sys.version.split()[0]}, {sys.executable}", tuple(entries), tuple(faults))
+
+
+_REQUIRED = ("cmeel-urdfdom", "cmeel-tinyxml2")
+"""What placo asks for by exact version, beside pin."""
+
+
+def _packages(have: Mapping[str, Distribution]) -> Iterator[Entry]:
+    outcomes = trials.run("import", list(MODULES.values()))
+    for name, module in MODULES.items():
+        found, outcome = have.get(packages.normal(name)), outcomes[module]
+        if found is None and not outcome.works:
+            yield Entry("package", name, "absent", "not installed", mend=AGAIN)
+        elif not outcome.works:
+            version = found.version if found else ""
+            yield Entry("package", name, "broken", f"{version}: import fails, {outcome.detail}", mend=AGAIN)
+        elif found is None:
+            yield Entry("package", name, "works", f"not from a package, {outcome.detail}")
+        elif (folder := packages.shadow(found, outcome.detail)) is not None:
+            detail = f"{found.version} is installed, but {folder} hides it"
+            yield Entry("package", name, "broken", detail, mend="unset PYTHONPATH")
+        else:
+            yield Entry("package", name, "works", found.version)
+    for name, extra in EXTRAS.items():
+        if name in have:
+            yield Entry("package", name, "works", have[name].version, False)
+        else:
+            yield Entry("package", name, "absent", "not installed", False, f"pip install 'wholebody[{extra}]'")
+
+
+def _solvers(have: Mapping[str, Distribution]) -> Iterator[Entry]:
+    present = [name for name, package in SOLVERS.items() if package in have]
+    outcomes = trials.run("program", present)
+    for name, package in SOLVERS.items():
+        if name in outcomes:
+            mend = "" if outcomes[name].works else f"pip install --force-reinstall {package}"
+            state: State = "works" if outcomes[name].works else "broken"
+            yield Entry("QP solver", name, state, outcomes[name].detail, name == "osqp", mend)
+        else:
+            yield Entry("QP solver", name, "absent", "not installed", name == "osqp", f"pip install {package}")
+
+
+def _methods() -> Iterator[Entry]:
+    listed = trials.run("methods", [""])[""]
+    if not listed.works:
+        yield Entry("method", "all", "broken", listed.detail, mend=AGAIN)
+        return
+    for name, outcome in trials.run("pose", listed.detail.split()).items():
+        if outcome.works:
+            yield Entry("method", name, "works", outcome.detail)
+        else:
+            yield Entry("method", name, "broken", outcome.detail, mend=AGAIN)
+
+
+def _tools() -> Iterator[Entry]:
+    for name, outcome in trials.run("tool", list(TOOLS)).items():
+        use, mend = TOOLS[name]
+        if outcome.works:
+            yield Entry("tool", name, "works", f"{outcome.detail}, {use}", False)
+        elif outcome.detail.endswith("not found"):
+            yield Entry("tool", name, "absent", use, False, mend)
+        else:
+            yield Entry("tool", name, "broken", outcome.detail, False, mend)
+
+
+def _python() -> Iterator[tuple[str, str]]:
+    fault = surroundings.python_fault()
+    if fault:
+        yield fault, "make an environment with one of them: python3.12 -m venv .venv"
+
+
+def _conflicts(have: Mapping[str, Distribution]) -> Iterator[tuple[str, str]]:
+    for conflict in packages.conflicts(have):
+        yield str(conflict), conflict.mend
+
+
+def _paths(environ: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    for folder, hidden in surroundings.shadowing_folders(environ, MODULES.values()).items():
+        yield f"PYTHONPATH names {folder}, whose {', '.join(hidden)} hide the installed ones", "unset PYTHONPATH"
+    for folder, hidden in surroundings.library_folders(environ).items():
+        sentence = f"LD_LIBRARY_PATH names {folder}, whose {', '.join(hidden)} replace the installed ones"
+        yield sentence, "unset LD_LIBRARY_PATH"

@@ -1,0 +1,126 @@
+"""Which packages are installed, which contradict each other, and which are hidden by others of the same name."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping
+from importlib import metadata
+from typing import NamedTuple
+
+MODULES = {
+    "pin": "pinocchio",
+    "coal": "coal",
+    "placo": "placo",
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "qpsolvers": "qpsolvers",
+    "osqp": "osqp",
+    "daqp": "daqp",
+    "meshcat": "meshcat",
+    "pillow": "PIL",
+    "trimesh": "trimesh",
+    "coacd": "coacd",
+    "rich": "rich",
+}
+"""What wholebody needs: distribution -> the module it brings."""
+
+EXTRAS = {
+    "matplotlib": "charts",
+    "quadprog": "solvers",
+    "proxsuite": "solvers",
+    "piqp": "solvers",
+    "pin-pink": "compare",
+    "mink": "compare",
+    "mujoco": "compare",
+}
+"""What wholebody can use: distribution -> the extra that installs it."""
+
+_EXACT = re.compile(r"^\s*(?P<name>[\w.-]+)\s*==\s*(?P<version>[\w.+!-]+)\s*$")
+
+
+class Distribution(NamedTuple):
+    """What is installed under one name.
+
+    Attributes:
+        version: its version.
+        requires: its requirements, as its metadata states them.
+        files: absolute paths of what it installed; empty where its metadata does not say.
+    """
+
+    version: str
+    requires: tuple[str, ...] = ()
+    files: frozenset[str] = frozenset()
+
+
+class Conflict(NamedTuple):
+    """Two packages that cannot work together.
+
+    Attributes:
+        who: the one with the requirement.
+        needs: what it needs, such as ``pin==3.8.0``.
+        found: the version that is installed instead; None where there is none.
+    """
+
+    who: str
+    needs: str
+    found: str | None
+
+    @property
+    def mend(self) -> str:
+        """The command that repairs it."""
+        return f"pip install '{self.needs}'" if self.who == "wholebody" else f"pip install '{self.who}' '{self.needs}'"
+
+    def __str__(self) -> str:
+        """Return one sentence."""
+        found = f"{self.found} is installed" if self.found else "it is not installed"
+        return f"{self.who} needs {self.needs}, and {found}"
+
+
+def normal(name: str) -> str:
+    """Spell a distribution's name as indexes do (PEP 503)."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def installed(names: Iterable[str]) -> dict[str, Distribution]:
+    """Those of the named distributions that this Python has."""
+    found = {}
+    for name in names:
+        try:
+            distribution = metadata.distribution(name)
+        except metadata.PackageNotFoundError:
+            continue
+        files = frozenset(os.path.realpath(str(file.locate())) for file in distribution.files or ())
+        found[normal(name)] = Distribution(distribution.version, tuple(distribution.requires or ()), files)
+    return found
+
+
+def conflicts(have: Mapping[str, Distribution]) -> list[Conflict]:
+    """Exact versions that an installed package asks for and does not get.
+
+    Only ``name==version`` without a condition is looked at: those are the binary interfaces of Pinocchio, coal and
+    placo, which are built against each other. What is not among `have` at all is not judged here.
+    """
+    found = []
+    for who, distribution in sorted(have.items()):
+        for requirement in distribution.requires:
+            match = _EXACT.match(requirement)
+            if match is None:
+                continue
+            other = have.get(normal(match["name"]))
+            if other is None or other.version != match["version"]:
+                needs = f"{match['name']}=={match['version']}"
+                found.append(Conflict(who, needs, other.version if other else None))
+    return found
+
+
+def shadow(distribution: Distribution, file: str) -> str | None:
+    """Folder from which another package of the same name was imported, or None where the right one was.
+
+    Args:
+        distribution: what is installed.
+        file: where the imported module says it lies.
+    """
+    if not distribution.files or os.path.realpath(file) in distribution.files:
+        return None
+    return os.path.dirname(os.path.dirname(file))
