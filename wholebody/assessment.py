@@ -193,7 +193,7 @@ def _dense(part: Wrench | Array, state: State) -> Array:
 
 def _optimality(problem: Problem, state: State, pairs: _Pairs) -> float:
     """Share of the objective's gradient left after the best nonnegative combination of all active gradients."""
-    from scipy.optimize import lsq_linear
+    from scipy.optimize import nnls
 
     nv = state.model.nv
     goals = [(np.atleast_1d(goal.error(state)), _dense(goal.jacobian(state), state), goal) for goal in problem.goals]
@@ -222,9 +222,8 @@ def _optimality(problem: Problem, state: State, pairs: _Pairs) -> float:
     scale = float(np.linalg.norm(objective))
     if scale < 1e-12:
         return 0.0
-    rows = np.vstack([signed, one_sided])
+    rows = np.vstack([signed, -signed, one_sided])
     if not len(rows):
         return 1.0
-    least = np.concatenate([np.full(len(signed), -np.inf), np.zeros(len(one_sided))])
-    answer = lsq_linear(rows.T, objective, bounds=(least, np.full(len(rows), np.inf)))
-    return float(np.linalg.norm(rows.T @ answer.x - objective) / scale)
+    _, left = nnls(rows.T, objective, maxiter=20 * (len(rows) + nv))
+    return float(left / scale)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.geometry.penetration import ObjectPenetration
     from wholebody.geometry.shapes import Shape
-    from wholebody.geometry.sweep import FirstContact
+    from wholebody.geometry.sweep import FirstContact, Sweep
 
 Array = NDArray[np.float64]
 RESTING = 1e-3  # m: equipment nearer than this to a segment at rest is taken to lean on it
@@ -103,6 +103,16 @@ class Scene:
     def row_builder(self) -> ContactRowBuilder:
         """The contact rows of this scene's pairs."""
         return self._build().rows
+
+    @property
+    def sweeper(self) -> Sweep:
+        """The continuous collision detection of this scene, re-used from motion to motion."""
+        built = self._build()
+        if built.sweep is None:
+            from wholebody.geometry.sweep import Sweep
+
+            built.sweep = Sweep(self.model, built.geometry)
+        return built.sweep
 
     def frame_id(self, name: str) -> int:
         """Index of a frame of the figure.
@@ -246,9 +256,7 @@ class Scene:
 
         Continuous: no object is too thin to be seen. See `wholebody.geometry.sweep`.
         """
-        from wholebody.geometry.sweep import first_contact
-
-        return first_contact(self.model, self.geometry, self.proximity.pairs, q0, q1)
+        return self.sweeper.first_contact(q0, q1)
 
     # ---- building
 
@@ -272,6 +280,7 @@ class _Built:
         self.geometry, self.owners, self.pieces_of = geometry, owners, pieces_of
         self.proximity = Proximity(model, geometry)
         self.rows = ContactRowBuilder(self.proximity)
+        self.sweep: Sweep | None = None
 
 
 def _assemble(

@@ -27,6 +27,7 @@ class Core(NamedTuple):
         faces: (f, 4) rows [n, b] with n . x <= b inside; for a capsule only the two caps' planes.
         reach: radius about the piece's origin that contains the piece; inf for a half-space.
         axis: unit direction of a capsule, zero for everything else.
+        width: least distance between two parallel planes that hold the piece; inf for a half-space.
     """
 
     points: Array
@@ -34,6 +35,7 @@ class Core(NamedTuple):
     faces: Array
     reach: float
     axis: Array
+    width: float
 
 
 _NONE = np.zeros((0, 3))
@@ -49,23 +51,27 @@ def core_of(geometry: Any) -> Core:
         InputError: another kind of geometry, which has no exact distance here.
     """
     if isinstance(geometry, coal.Sphere):
-        return Core(np.zeros((1, 3)), geometry.radius, _NO_FACES, geometry.radius, _NO_AXIS)
+        return Core(np.zeros((1, 3)), geometry.radius, _NO_FACES, geometry.radius, _NO_AXIS, 2.0 * geometry.radius)
     if isinstance(geometry, coal.Capsule):
         half = geometry.halfLength
         points = np.array([[0.0, 0.0, -half], [0.0, 0.0, half]])
         caps = np.array([[0.0, 0.0, 1.0, half], [0.0, 0.0, -1.0, half]])
-        return Core(points, geometry.radius, caps, half + geometry.radius, np.array([0.0, 0.0, 1.0]))
+        along = np.array([0.0, 0.0, 1.0])
+        return Core(points, geometry.radius, caps, half + geometry.radius, along, 2.0 * geometry.radius)
     if isinstance(geometry, coal.Box):
         half = np.array(geometry.halfSide)
         faces = np.vstack([np.column_stack([np.eye(3), half]), np.column_stack([-np.eye(3), half])])
-        return Core(_CORNERS * half, 0.0, faces, float(np.linalg.norm(half)), _NO_AXIS)
+        return Core(_CORNERS * half, 0.0, faces, float(np.linalg.norm(half)), _NO_AXIS, 2.0 * float(half.min()))
     if isinstance(geometry, coal.Ellipsoid):
-        return Core(_NONE, 0.0, _NO_FACES, float(np.max(geometry.radii)), _NO_AXIS)
+        radii = geometry.radii
+        return Core(_NONE, 0.0, _NO_FACES, float(np.max(radii)), _NO_AXIS, 2.0 * float(np.min(radii)))
     if isinstance(geometry, coal.Halfspace):
-        return Core(_NONE, 0.0, np.array([[*geometry.n, geometry.d]]), np.inf, _NO_AXIS)
+        return Core(_NONE, 0.0, np.array([[*geometry.n, geometry.d]]), np.inf, _NO_AXIS, np.inf)
     if isinstance(geometry, coal.Convex):
         points = np.array(geometry.points())
-        return Core(points, 0.0, _convex_faces(geometry, points), float(np.linalg.norm(points, axis=1).max()), _NO_AXIS)
+        faces = _convex_faces(geometry, points)
+        width = float((faces[:, 3] - (points @ faces[:, :3].T).min(axis=0)).min())
+        return Core(points, 0.0, faces, float(np.linalg.norm(points, axis=1).max()), _NO_AXIS, width)
     raise InputError(
         f"{type(geometry).__name__} is not a convex piece; use Box, Sphere, Capsule, Ellipsoid, HalfSpace, Hull or Mesh"
     )

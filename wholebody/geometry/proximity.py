@@ -59,6 +59,8 @@ class Proximity:
         ).reshape(-1, 2)
         self.joint: Indices = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
         self.reach = np.array([core.reach for core in self.cores]).reshape(-1)
+        width = np.array([core.width for core in self.cores]).reshape(-1)
+        self.widths: Array = width[self.pairs].sum(axis=1)
         self._pair_of = np.full((count, count), -1, dtype=np.intp)
         self._pair_of[self.pairs[:, 0], self.pairs[:, 1]] = np.arange(len(self.pairs))
         rows = self.pairs[:, 0]

@@ -1,15 +1,15 @@
 """Sequential quadratic programming from one start to the nearest posture that fits.
 
-Each iteration linearises, solves one quadratic program within a box trust region and judges the posture it leads to by
-two figures, the violation and the measures, with a funnel (Gould and Toint 2010): while what is asked is far, a step
-must lessen the violation; near, it must lessen the measures and stay inside a funnel of violation that narrows. No
-penalty weight has to be guessed, and measures may improve along curved constraints in long steps.
+Each iteration linearises, solves one quadratic program that asks for a piece of the way, and judges the posture it leads
+to by two figures, the violation and the measures, with a funnel (Gould and Toint 2010): while what is asked is far, a
+step must lessen the violation; near, it must lessen the measures and stay inside a funnel of violation that narrows. No
+penalty weight has to be guessed, and measures may improve along curved constraints in long steps. Steps that could have
+jumped over something are swept.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -17,19 +17,23 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.linearisation import Linearisation, Lineariser
-from wholebody.methods.qp.quadratic_program import ActiveSet, Array
+from wholebody.methods.qp.acceleration import Anderson
+from wholebody.methods.qp.passage import Placed, doubtful_pairs, snapshot
+from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import Rows, Subproblem, Violation
+from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem, Violation
 from wholebody.methods.qp.working_set import solve_by_rows
 from wholebody.problem import Iterate
 
-FIRST_RADIUS = 0.3  # rad, m: first trust region; larger = fewer iterations in the open, more rejected ones in clutter
-LARGEST_RADIUS = 0.6
+FIRST_RADIUS = 0.3  # rad, m: of the trust region; larger = fewer iterations in the open, more rejected ones in clutter
+LARGEST_RADIUS = 0.8
 LEAST_RADIUS = 1e-7
 FUNNEL = 0.02  # violation that is allowed while the measures improve, at first
 SWITCH = 10.0  # the measures lead once they gain more than this times the squared violation
-PAIRS_WITHIN = 2.0  # pairs within this many radii of the trust region get a row: limbs reach farther than one joint turns
-LEAST_WITHIN = 0.05  # m
+LEAST_WITHIN = 0.05  # m: pairs nearer than this, or than a step is long, get rows
+SLOW = 0.1  # share of the violation that must go in PATIENCE iterations, else only the nearest posture is sought
+PATIENCE = 6
+NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
 
 
 class Local(NamedTuple):
@@ -50,9 +54,27 @@ class Local(NamedTuple):
     iterations: int
 
 
+class _Visit(NamedTuple):
+    """A posture that was looked at."""
+
+    at: Linearisation
+    rows: Rows
+    violation: Violation
+    placed: Placed
+
+
+class _Verdict(NamedTuple):
+    """How a step did: whether it is taken, how well it was foreseen, and by which figure."""
+
+    accepted: bool
+    good: bool
+    poor: bool
+    by: str
+
+
 @dataclass
 class Descent:
-    """One descent; call `run`.
+    """One descent; call `run` once.
 
     Attributes:
         subproblem: builds the programs.
@@ -63,6 +85,7 @@ class Descent:
         deadline: `time.perf_counter()` at which to stop.
         offset: (goal rows,) subtracted from the goal errors: a nearer goal on the way to the true one.
         trace: grows by one entry an iteration.
+        note: what to call the iterations in the trace.
     """
 
     subproblem: Subproblem
@@ -73,95 +96,149 @@ class Descent:
     deadline: float
     offset: Array | None = None
     trace: list[Iterate] = field(default_factory=list)
-    watch: Callable[[Array], None] | None = None
+    note: str = ""
 
-    def run(self, start: Array, note: str = "") -> Local:
+    def run(self, start: Array) -> Local:
         """Descend from a posture within limits, shape (nq,)."""
-        model = self.lineariser.state.model
-        here = self._visit(start, FIRST_RADIUS)
-        funnel = max(FUNNEL, here.violation.total)
-        radius, damping = FIRST_RADIUS, 0.0
+        self._radius, self._damping, self._measures = FIRST_RADIUS, 0.0, True
+        here = self._visit(start)
+        self._funnel = max(FUNNEL, here.violation.total)
+        self._shift = np.zeros(len(here.rows.soft_error))
+        self._memory = Anderson()
         guess: ActiveSet | None = None
-        shift = np.zeros(len(here.rows.soft_error))
-        count, still = 0, 0
-        converged = False
+        history: list[float] = []
+        count, converged = 0, False
         while count < self.iterations and time.perf_counter() < self.deadline:
             count += 1
-            program = self.subproblem.program(here.at, here.rows, radius, damping, shift)
-            answer = solve_by_rows(self.solver, program, guess)
-            guess, dq = answer.active, answer.x
-            step = float(np.abs(dq).max(initial=0.0))
-            foreseen = self.subproblem.violation(here.rows, dq)
-            gain = here.violation.total - foreseen.total
-            saving = -float(here.at.gradient @ dq + 0.5 * (program.diagonal * dq) @ dq)
-            settled = gain <= 0.5 * self.tolerance or gain <= 1e-4 * here.violation.total
-            if settled and (step <= 10.0 * self.tolerance or saving <= 1e-7 * (1.0 + abs(here.at.measure))):
-                converged = True
-                if here.violation.total <= self.tolerance or gain <= 0.0:
-                    break
-                still += 1
-                if still > 3:
-                    break
-            there = self._visit(pin.integrate(model, here.at.q, dq), radius)
-            verdict = _judge(here, there, gain, saving, funnel)
-            self.trace.append(
-                Iterate(there.violation.goal, there.violation.total, there.at.measure, step, note or verdict.name)
+            program = self.subproblem.program(
+                here.at, here.rows, self._radius, self._damping, self._shift, self._measures
             )
-            if verdict.accepted:
-                if verdict.narrows:
-                    funnel = max(0.9 * funnel, there.violation.total + 0.5 * (here.violation.total - there.violation.total))
-                    funnel = max(min(funnel, FUNNEL), there.violation.total)
-                residual = program.rows @ dq - program.target
-                shift = residual if np.abs(residual).max(initial=0.0) < 1e-4 else np.zeros_like(shift)
-                if verdict.good:
-                    damping *= 0.3
-                    if step > 0.8 * radius:
-                        radius = min(2.0 * radius, LARGEST_RADIUS)
-                elif verdict.poor:
-                    radius = max(0.5 * step, LEAST_RADIUS)
+            answer = solve_by_rows(self.solver, program, guess)
+            guess = answer.active
+            gain = here.violation.total - self.subproblem.violation(here.rows, answer.x).total
+            saving = -float(program.linear @ answer.x + 0.5 * (program.diagonal * answer.x) @ answer.x)
+            if self._settled(here, answer, gain, saving):
+                converged = True
+                break
+            there = self._advance(here, program, answer, gain, saving)
+            if there is not None:
                 here = there
-            else:
-                radius = 0.35 * min(step, radius)
-                damping = max(0.5, 2.0 * damping) if not verdict.measures_led else damping
-                shift = np.zeros_like(shift)
-                if radius < LEAST_RADIUS:
-                    converged = True
-                    break
+                history.append(here.violation.total)
+                if self._stagnates(history):
+                    self._measures = False
+                    self._memory.forget()
+            elif self._radius < LEAST_RADIUS:
+                converged = True
+                break
         return Local(here.at.q, here.violation, here.at.measure, converged, count)
 
-    def _visit(self, q: Array, radius: float) -> _Visit:
-        if self.watch is not None:
-            self.watch(q)
-        at = self.lineariser.at(q, max(LEAST_WITHIN, PAIRS_WITHIN * radius))
+    def _settled(self, here: _Visit, answer: QPSolution, gain: float, saving: float) -> bool:
+        """Whether nothing worth having is foreseen."""
+        left = here.violation.total
+        if left > self.tolerance and gain > max(0.5 * self.tolerance, 1e-3 * left):
+            return False
+        if not self._measures:
+            return True
+        still = float(np.abs(answer.x).max(initial=0.0)) <= 10.0 * self.tolerance
+        return still or saving <= 1e-2 * self.tolerance * (1.0 + abs(here.at.measure))
+
+    def _stagnates(self, history: list[float]) -> bool:
+        """Whether the violation has hardly lessened for a while, so that the measures should not hold it up."""
+        if not self._measures or len(history) <= PATIENCE or history[-1] <= 10.0 * self.tolerance:
+            return False
+        return min(history[-PATIENCE:]) > (1.0 - SLOW) * min(history[:-PATIENCE])
+
+    def _advance(
+        self, here: _Visit, program: QuadraticProgram, answer: QPSolution, gain: float, saving: float
+    ) -> _Visit | None:
+        """Go where the program says, or a little farther along what the last steps foretell; None if neither is good."""
+        dq = answer.x
+        fast = self._memory.propose(dq) if self._measures and gain <= FUNNEL * 0.1 else None
+        if fast is not None:
+            there = self._try(here, np.clip(fast, program.lower, program.upper))
+            if there is not None and self._judge(here, there, gain, saving).by == "measure":
+                self._memory.went(there[1])
+                self._record(there[0], there[1], "accelerated")
+                self._shift = self._multipliers(program, dq)
+                return there[0]
+        tried = self._try(here, dq)
+        verdict = _Verdict(False, False, False, "blocked") if tried is None else self._judge(here, tried, gain, saving)
+        if tried is not None:
+            self._record(tried[0], dq, verdict.by)
+        step = float(np.abs(dq).max(initial=0.0))
+        if tried is None or not verdict.accepted:
+            self._radius = 0.3 * min(step, self._radius)
+            self._damping = max(0.3, 2.0 * self._damping) if verdict.by != "rejected measure" else self._damping
+            self._shift = np.zeros_like(self._shift)
+            self._memory.forget()
+            return None
+        there = tried[0]
+        if verdict.by == "measure":
+            self._memory.went(dq)
+        else:
+            self._memory.forget()
+            before, after = here.violation.total, there.violation.total
+            narrower = max(0.9 * self._funnel, after + 0.5 * (before - after))
+            self._funnel = max(min(narrower, FUNNEL), after)
+        if verdict.good:
+            self._damping *= 0.3
+            if step > 0.5 * self._radius or here.violation.goal > PULL * self._radius:
+                self._radius = min(2.0 * self._radius, LARGEST_RADIUS)
+        elif verdict.poor:
+            self._radius = 0.5 * self._radius
+        self._shift = self._multipliers(program, dq)
+        return there
+
+    def _multipliers(self, program: QuadraticProgram, dq: Array) -> Array:
+        """What the rows would still lack after the step because the measures pull: to be asked for in the next one."""
+        residual = program.rows @ dq - program.target
+        return residual if np.abs(residual).max(initial=0.0) < NEAR_MET else np.zeros_like(residual)
+
+    def _try(self, here: _Visit, dq: Array) -> tuple[_Visit, Array] | None:
+        """Visit the posture a displacement leads to; None where something would be jumped over on the way."""
+        q = pin.integrate(self.lineariser.state.model, here.at.q, dq)
+        there = self._visit(q)
+        proximity = self.lineariser.scene.proximity
+        doubtful = doubtful_pairs(proximity, here.placed, there.placed)
+        if len(doubtful):
+            sweep = self.lineariser.scene.sweeper
+            hit = sweep.first_contact(here.at.q, q, proximity.pairs[doubtful], JUMP_TOLERANCE)
+            if hit is not None and self._passed(here, there, hit.index):
+                return None
+        return there, dq
+
+    def _passed(self, here: _Visit, there: _Visit, pair: int) -> bool:
+        """Whether a pair that touches on the way is apart again after it: jumped over, not bumped into."""
+        near = np.flatnonzero(there.at.contacts.index == pair)
+        return not len(near) or bool(there.at.contacts.distance[near[0]] > -JUMP_TOLERANCE)
+
+    def _visit(self, q: Array) -> _Visit:
+        within = max(LEAST_WITHIN, PULL * self._radius)
+        at = self.lineariser.at(q, within)
         rows = self.subproblem.rows(at)
         if self.offset is not None:
             rows.soft_error[: rows.goals] -= self.offset
-        return _Visit(at, rows, self.subproblem.violation(rows))
+        proximity = self.lineariser.scene.proximity
+        return _Visit(at, rows, self.subproblem.violation(rows), snapshot(proximity, at.contacts, within))
+
+    def _judge(self, here: _Visit, tried: tuple[_Visit, Array], gain: float, saving: float) -> _Verdict:
+        """Whether to go there, given what was foreseen: `gain` of violation and `saving` of the measures."""
+        there = tried[0]
+        before, after = here.violation.total, there.violation.total
+        measures_lead = self._measures and saving > SWITCH * before**2 and before <= self._funnel
+        if measures_lead and after <= self._funnel:
+            saved = here.at.measure - there.at.measure
+            if saved >= 0.05 * saving:
+                return _Verdict(True, saved >= 0.5 * saving, saved < 0.25 * saving, "measure")
+        gained = before - after
+        if gain > 0.0 and gained >= 0.05 * gain:
+            return _Verdict(True, gained >= 0.5 * gain, gained < 0.25 * gain, "goal")
+        return _Verdict(False, False, False, "rejected measure" if measures_lead else "rejected")
+
+    def _record(self, there: _Visit, dq: Array, what: str) -> None:
+        step = float(np.abs(dq).max(initial=0.0))
+        note = f"{self.note}: {what}" if self.note else what
+        self.trace.append(Iterate(there.violation.goal, there.violation.total, there.at.measure, step, note))
 
 
-class _Visit(NamedTuple):
-    at: Linearisation
-    rows: Rows
-    violation: Violation
-
-
-class _Verdict(NamedTuple):
-    accepted: bool
-    good: bool
-    poor: bool
-    narrows: bool
-    measures_led: bool
-    name: str
-
-
-def _judge(here: _Visit, there: _Visit, gain: float, saving: float, funnel: float) -> _Verdict:
-    """Whether to go there, given what was foreseen: `gain` of violation and `saving` of the measures."""
-    before, after = here.violation.total, there.violation.total
-    saved = here.at.measure - there.at.measure
-    measures_lead = saving > SWITCH * before**2 and before <= funnel
-    if measures_lead and after <= funnel and saved >= 0.05 * saving:
-        return _Verdict(True, saved >= 0.5 * saving, saved < 0.25 * saving, False, True, "measure")
-    gained = before - after
-    if gain > 0.0 and gained >= 0.05 * gain:
-        return _Verdict(True, gained >= 0.5 * gain, gained < 0.25 * gain, True, False, "goal")
-    return _Verdict(False, False, False, False, measures_lead, "rejected")
+JUMP_TOLERANCE = 2e-4  # m: overlap on the way that does not count; finer than any piece is thick

@@ -132,9 +132,9 @@ class _Search:
     def _descend(self, start: Array, deadline: float, offset: Array | None, note: str) -> Local:
         descent = Descent(
             self.subproblem, self.lineariser, self.method._solver, self.method.tolerance,
-            self.method.iterations, deadline, offset, self.trace,
+            self.method.iterations, deadline, offset, self.trace, note,
         )  # fmt: skip
-        local = descent.run(start, note)
+        local = descent.run(start)
         self.spent += local.iterations
         return local
 

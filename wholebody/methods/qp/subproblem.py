@@ -21,8 +21,8 @@ HOLD_WEIGHT = 1e10  # equalities give way by 1e-6 m to the pull of a goal out of
 ELASTIC_WEIGHT = 1e10  # and so do contacts
 PULL = 0.7  # m per rad of radius: of a goal farther away, or a deeper overlap, one step asks for this much
 BOX = 3.0  # radii: the box around a step, which seldom holds it; asking for little at a time keeps programs easy instead
-HOLD_SHARE = 10.0  # what a metre of hold counts against a metre of goal when a step is judged
-ELASTIC_SHARE = 50.0  # and a metre of overlap; above any ratio at which overlap could buy goal
+HOLD_SHARE = 3.0  # what a metre of hold counts against a metre of goal when a step is judged
+ELASTIC_SHARE = 10.0  # and a metre of overlap; above any ratio at which overlap could buy goal
 LEAST_CURVATURE = 1e-2  # 1/rad^2: of a degree of freedom that no measure speaks for
 
 
@@ -107,19 +107,21 @@ class Subproblem:
         return Violation(float(np.sqrt(goal @ goal)), float(np.linalg.norm(error[rows.goals :])), float(worst.sum()))
 
     def program(
-        self, at: Linearisation, rows: Rows, radius: float, damping: float, shift: Array | None = None
+        self, at: Linearisation, rows: Rows, radius: float, damping: float, shift: Array, measures: bool
     ) -> QuadraticProgram:
         """The program of one step.
 
         Args:
             at: where.
             rows: its rows.
-            radius: largest entry of the displacement, radians and metres.
+            radius: about the largest entry that the displacement should have, radians and metres.
             damping: how much of the goals' neglected second derivative to add, bounded by |error| times lever.
-            shift: (soft rows,) what to add to the errors so that weights need not be infinite (method of multipliers).
+            shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
+            measures: whether the measures count; without them the nearest posture to the goals is sought.
         """
         diagonal = np.maximum(at.curvature, LEAST_CURVATURE)
-        diagonal = np.maximum(diagonal, np.abs(at.gradient) / radius)
+        linear = at.gradient if measures else np.zeros_like(at.gradient)
+        diagonal = np.maximum(diagonal if measures else np.minimum(diagonal, 1.0), np.abs(linear) / radius)
         error = rows.soft_error.copy()
         distance = float(np.linalg.norm(error[: rows.goals]))
         if distance > PULL * radius:
@@ -132,9 +134,9 @@ class Subproblem:
         upper = np.maximum(np.minimum(at.upper, box), -box)
         return QuadraticProgram(
             diagonal=diagonal,
-            linear=at.gradient,
+            linear=linear,
             rows=rows.soft,
-            target=-error if shift is None else -(error + shift),
+            target=-(error + shift),
             weight=rows.soft_weight,
             elastic=rows.elastic,
             least=np.minimum(rows.lack, PULL * radius),

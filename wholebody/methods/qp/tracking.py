@@ -62,7 +62,7 @@ class Tracker:
         model = self.problem.scene.model
         at = self._lineariser.at(q, WITHIN)
         rows = self._subproblem.rows(at)
-        program = self._subproblem.program(at, rows, LARGEST_STEP, 0.0)
+        program = self._subproblem.program(at, rows, LARGEST_STEP, 0.0, np.zeros(len(rows.soft_error)), True)
         answer = solve_by_rows(self._solver, program, self._guess)
         self._guess = answer.active
         following = pin.integrate(model, at.q, answer.x)
