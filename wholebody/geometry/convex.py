@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wholebody.errors import InputError, MissingPackageError
 from wholebody.geometry.components import Component, split_components
+from wholebody.geometry.outer_hull import outer_hull
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Array, Piece
 
 CONVEX_VOLUME = 1e-4
@@ -30,8 +31,8 @@ class ConvexPieces(NamedTuple):
 
     Attributes:
         pieces: at least one.
-        added_volume: volume of all pieces over the volume of the mesh, minus one; parts that are not closed do not count,
-            since they have no volume of their own.
+        added_volume: volume of all pieces over the volume of the mesh, minus one; parts that are not closed do not
+            count, since they have no volume of their own.
         notes: one sentence for each part that could not be kept as it is.
     """
 
@@ -167,13 +168,14 @@ def convex_pieces(
 
     Parts that hang together are found first. A convex part is kept as it is, with all its vertices; another closed part
     is decomposed by CoACD (Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware
-    concavity and tree search"); a part with holes in its surface has no inside, so its hull is taken, and a flat part is
-    thickened to twice `SMALLEST`; `notes` says so.
+    concavity and tree search"), and its pieces are simplified outwards, so that none of the surface is left uncovered; a
+    part with holes in its surface has no inside, so its hull is taken; and a flat part is thickened to twice `SMALLEST`.
+    `notes` says which.
 
     Args:
         vertices: (n, 3), metres.
         faces: (m, 3) vertex indices.
-        max_vertices: most vertices of a piece that comes out of a decomposition, 4 to 256.
+        max_vertices: most vertices of a piece that comes out of a decomposition, 8 to 256.
         threshold: concavity left in the pieces, as a share of the part's size, 0.01 to 1: CoACD's own measure.
         what: what the mesh is, for the error's sentence.
 
@@ -182,8 +184,8 @@ def convex_pieces(
         MissingPackageError: a part needs decomposing and coacd is not installed.
     """
     cloud, triangles = check_mesh(vertices, faces, what)
-    if not isinstance(max_vertices, (int, np.integer)) or not 4 <= max_vertices <= 256:
-        raise InputError(f"{what}: max_vertices is {max_vertices!r}; give a whole number between 4 and 256")
+    if not isinstance(max_vertices, (int, np.integer)) or not 8 <= max_vertices <= 256:
+        raise InputError(f"{what}: max_vertices is {max_vertices!r}; give a whole number between 8 and 256")
     if not isinstance(threshold, (int, float, np.floating)) or not 0.01 <= threshold <= 1.0:
         raise InputError(f"{what}: threshold is {threshold!r}; give a number between 0.01 and 1")
     kept = _decomposed(cloud.tobytes(), triangles.tobytes(), int(max_vertices), float(threshold), what)
@@ -274,13 +276,11 @@ def _coacd(part: Component, max_vertices: int, threshold: float) -> list[Array]:
     except ImportError:
         raise MissingPackageError("a mesh that is not convex needs coacd: pip install coacd") from None
     coacd.set_log_level("error")
-    # Re-meshing (preprocess) inflates thin parts by half, and a closed manifold does not need it.
+    # CoACD's own cap on vertices (decimate) leaves parts of the surface outside. Re-meshing (preprocess) inflates thin parts by half, and a closed manifold does not need it.
     parts = coacd.run_coacd(
         coacd.Mesh(part.vertices, part.faces.astype(np.int32)),
         threshold=threshold,
         preprocess_mode="off",
-        decimate=True,
-        max_ch_vertex=max_vertices,
         seed=0,
     )
-    return [np.asarray(corners, dtype=float) for corners, _ in parts]
+    return [outer_hull(np.asarray(corners, dtype=float), max_vertices) for corners, _ in parts]

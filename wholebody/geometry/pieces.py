@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,24 +62,3 @@ def check_vector(value: object, what: str) -> tuple[float, float, float]:
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise InputError(f"{what} is {value!r}; give three finite numbers")
     return float(vector[0]), float(vector[1]), float(vector[2])
-
-
-def bounding_radius(geometry: Any) -> float:
-    """Radius about the geometry's own origin of the sphere that holds all of it, metres; infinite for a half-space.
-
-    coal's own ``aabb_radius`` is that of a box around the piece and up to a third larger.
-    """
-    kind = type(geometry).__name__
-    if kind == "Sphere":
-        return float(geometry.radius)
-    if kind == "Capsule":
-        return float(geometry.halfLength + geometry.radius)
-    if kind == "Box":
-        return float(np.linalg.norm(geometry.halfSide))
-    if kind == "Ellipsoid":
-        return float(np.max(geometry.radii))
-    if kind == "Convex":
-        return math.sqrt(float((np.asarray(geometry.points()) ** 2).sum(axis=1).max()))
-    if kind == "Halfspace":
-        return math.inf
-    raise InputError(f"a piece is Box, Sphere, Capsule, Ellipsoid, Convex or Halfspace, not coal's {kind}")

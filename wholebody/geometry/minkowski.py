@@ -1,0 +1,189 @@
+"""Where one union of convex pieces overlaps another, as a function of a translation of the first.
+
+Piece i of A, moved by t, overlaps piece j of B while t lies inside O_ij = B_j - A_i (Minkowski difference), a convex
+set. A side of it is a unit normal n out of O_ij with the offset h(n) = max over O_ij of n . x: every t with n . t >=
+h(n) takes the pair apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.geometry.cores import Core, core_of
+from wholebody.geometry.pieces import Array
+
+Placed: TypeAlias = tuple[Any, pin.SE3]
+"""A coal geometry and where it is in the world."""
+
+MOST_POINTS = 20_000
+"""Vertices of a Minkowski difference above which its sides are sampled and no longer enumerated."""
+
+
+OVERLAP = 2e-6
+"""Depth up to which a pair counts as touching, metres: twice coal's own tolerance."""
+
+
+class _Body:
+    """One piece: its core in the world, and its support function."""
+
+    def __init__(self, placed: Placed) -> None:
+        self.geometry, self.placement = placed
+        self.core: Core = core_of(self.geometry)
+        rotation, self.center = np.asarray(self.placement.rotation), np.asarray(self.placement.translation)
+        self.points: Array = self.core.points @ rotation.T + self.center
+        self.axis: Array = rotation @ self.core.axis
+        self.plane: Array | None = None
+        self.round = self.core.radius > 0.0
+        self.radii: Array | None = None
+        if not len(self.points):
+            if np.isinf(self.core.reach):
+                self.plane = rotation @ self.core.faces[0, :3]
+                self.offset = float(self.core.faces[0, 3] + self.plane @ self.center)
+            else:
+                self.round = True
+                self.radii = rotation * np.asarray(self.geometry.radii)
+
+    def support(self, normals: Array) -> Array:
+        """The greatest n . x over the piece for each row n: (k,)."""
+        if self.plane is not None:
+            return np.where(np.abs(normals - self.plane).max(axis=1) < 1e-12, self.offset, np.inf)
+        if self.radii is not None:
+            return np.asarray(normals @ self.center + np.linalg.norm(normals @ self.radii, axis=1))
+        return np.asarray((normals @ self.points.T).max(axis=1) + self.core.radius)
+
+
+class Sides(NamedTuple):
+    """Sides of O: normals (k, 3) out of it, and offsets (k,): n . t >= offset separates the pair."""
+
+    normals: Array
+    offsets: Array
+
+
+class ObjectPair:
+    """All pairs of pieces of two objects, with A moved by a translation."""
+
+    def __init__(
+        self, pieces_a: Sequence[Placed], pieces_b: Sequence[Placed], allowed: NDArray[np.bool_] | None = None
+    ) -> None:
+        """Read the pieces once; `allowed` (n, m) says which pairs count."""
+        import coal
+
+        self.a, self.b = [_Body(p) for p in pieces_a], [_Body(p) for p in pieces_b]
+        self._centers = np.array([x.center for x in self.a])[:, None] - np.array([x.center for x in self.b])
+        self._reach = np.array([x.core.reach for x in self.a])[:, None] + np.array([x.core.reach for x in self.b])
+        if allowed is not None:
+            self._reach = np.where(allowed, self._reach, -np.inf)
+        self._sides: dict[tuple[int, int], Sides] = {}
+        self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
+        self._at_a = [_transform(x.placement) for x in self.a]
+        self._at_b = [_transform(x.placement) for x in self.b]
+        most = max(len(x.points) for x in self.a) * max(len(x.points) for x in self.b)
+        self.sampled = most > MOST_POINTS or any(x.round for x in (*self.a, *self.b))
+
+    def overlapping(self, translation: Array, tolerance: float) -> tuple[list[tuple[int, int]], Array, Array]:
+        """Pairs deeper than `tolerance`: (i, j), depths (k,), and normals (k, 3) out of B into A."""
+        near = np.argwhere(np.linalg.norm(self._centers + translation, axis=2) < self._reach)
+        pairs: list[tuple[int, int]] = []
+        depths, normals = [], []
+        for i, j in near:
+            depth, normal = self.measure(int(i), int(j), translation)
+            if depth > tolerance:
+                pairs.append((int(i), int(j)))
+                depths.append(depth)
+                normals.append(normal)
+        return pairs, np.array(depths), np.array(normals).reshape(-1, 3)
+
+    def measure(self, i: int, j: int, translation: Array) -> tuple[float, Array]:
+        """Depth (negative: gap) of piece i of A, moved, in piece j of B, and the unit normal out of B into A."""
+        import coal
+
+        a, b = self.a[i], self.b[j]
+        self._at_a[i].setTranslation(a.center + translation)
+        self._result.clear()
+        distance = coal.distance(a.geometry, self._at_a[i], b.geometry, self._at_b[j], self._request, self._result)
+        normal = -np.array(self._result.normal)
+        if (
+            not normal @ normal > 0.25
+        ):  # cores that cross exactly (capsule axes, concentric spheres): coal has no normal
+            normal = np.cross(a.axis, b.axis)
+            if np.linalg.norm(normal) < 1e-9:
+                along = a.axis if a.axis.any() else b.axis if b.axis.any() else np.array([1.0, 0.0, 0.0])
+                normal = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+            normal /= np.linalg.norm(normal)
+        return -float(distance), normal
+
+    def between(self, translation: Array) -> Sides | None:
+        """A plane between each pair that a shorter translation can bring to overlap; None if one overlaps."""
+        reach = float(np.linalg.norm(translation))
+        normals, offsets = [], []
+        for i, j in np.argwhere(np.linalg.norm(self._centers, axis=2) - reach < self._reach):
+            depth, normal = self.measure(int(i), int(j), translation)
+            side = self.rows(int(i), int(j), normal[None])
+            if not len(side.offsets):  # a half-space has one side, and coal's normal is off it by rounding
+                side = self.sides(int(i), int(j))
+            slack = side.normals @ translation - side.offsets
+            best = int(np.argmax(slack))
+            if depth > OVERLAP or slack[best] < -OVERLAP:
+                return None
+            normals.append(side.normals[best])
+            offsets.append(min(side.offsets[best], float(side.normals[best] @ translation)))
+        return Sides(np.array(normals), np.array(offsets)) if normals else None
+
+    def sides(self, i: int, j: int) -> Sides:
+        """Every side of O_ij where it is a polytope, a net of sides where it is round."""
+        if (i, j) not in self._sides:
+            self._sides[i, j] = self.rows(i, j, self._normals(self.a[i], self.b[j]))
+        return self._sides[i, j]
+
+    def rows(self, i: int, j: int, normals: Array) -> Sides:
+        """Sides of O_ij with these normals (k, 3); those where it has no end are left out."""
+        offsets = self.b[j].support(normals) + self.a[i].support(-normals)
+        finite = np.isfinite(offsets)
+        return Sides(normals[finite], offsets[finite])
+
+    def _normals(self, a: _Body, b: _Body) -> Array:
+        from scipy.spatial import ConvexHull, QhullError
+
+        if a.plane is not None or b.plane is not None:
+            return np.array([side for side in (b.plane, None if a.plane is None else -a.plane) if side is not None])
+        many = len(a.points) * len(b.points) > MOST_POINTS
+        found = [_net()] if a.round or b.round or many else []
+        if len(a.points) and len(b.points) and not many:
+            corners = (b.points[:, None] - a.points).reshape(-1, 3)
+            try:
+                found.append(ConvexHull(corners - corners.mean(axis=0)).equations[:, :3])
+            except QhullError:  # the cores are points, segments or parallel plates: the rounding decides, see _net
+                crossed = np.cross(a.axis, b.axis)
+                if np.linalg.norm(crossed) > 1e-9:
+                    found.append(np.array([crossed, -crossed]) / np.linalg.norm(crossed))
+        normals = np.vstack(found)
+        return normals[np.unique(np.round(normals, 9), axis=0, return_index=True)[1]]
+
+    def escapes(self) -> Array:
+        """Translations (k, 3) that take the hull of A out of that of B, one for each of many directions."""
+        planes = [x.plane for x in self.b if x.plane is not None] + [-x.plane for x in self.a if x.plane is not None]
+        normals = np.vstack([_net(), *[plane[None] for plane in planes]])
+        ahead = np.max([x.support(normals) for x in self.b], axis=0)
+        length = ahead + np.max([x.support(-normals) for x in self.a], axis=0)
+        finite = np.isfinite(length)
+        return np.asarray(normals[finite] * np.maximum(length[finite], 0.0)[:, None])
+
+
+def _transform(placement: pin.SE3) -> Any:
+    import coal
+
+    return coal.Transform3s(placement.rotation, placement.translation)
+
+
+def _net(count: int = 32) -> Array:
+    """Unit vectors spread over the sphere: a Fibonacci spiral, its opposites and the axes."""
+    k = np.arange(count) + 0.5
+    z, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + np.sqrt(5.0)) * k
+    ring = np.sqrt(1.0 - z * z)
+    spiral = np.column_stack([ring * np.cos(turn), ring * np.sin(turn), z])
+    return np.vstack([spiral, -spiral, np.eye(3), -np.eye(3)])

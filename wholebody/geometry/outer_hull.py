@@ -1,0 +1,57 @@
+"""Fewer vertices for a hull without losing any of it: a simpler hull around it.
+
+Dropping vertices would leave parts of the surface uncovered, and then a posture could be free of contact and still inside.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.geometry.pieces import SMALLEST, Array
+
+
+def outer_hull(points: Array, max_vertices: int) -> Array:
+    """Vertices of a convex polytope that holds points and has few vertices.
+
+    The polytope is cut out by planes of the points' own hull: first a box about their principal axes, then again and
+    again the plane that cuts off most of the vertex that sticks out farthest, as long as the vertices stay few enough.
+
+    Args:
+        points: (n, 3), enclosing a volume.
+        max_vertices: most vertices, at least 8.
+
+    Returns:
+        (k, 3) vertices; those of the points' hull if they are few enough.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    hull = ConvexHull(points)
+    corners = points[hull.vertices]
+    if len(corners) <= max_vertices:
+        return corners
+    inside = corners.mean(axis=0)
+    axes = np.linalg.svd(corners - inside, full_matrices=False)[2]
+    box = np.vstack([axes, -axes])
+    planes = np.column_stack([box, -(corners @ box.T).max(axis=0)])
+    best = _vertices(planes, inside)
+    for _ in range(len(hull.equations)):
+        outside = best @ hull.equations[:, :3].T + hull.equations[:, 3]
+        vertex, plane = np.unravel_index(int(outside.argmax()), outside.shape)
+        if outside[vertex, plane] < SMALLEST:
+            break
+        planes = np.vstack([planes, hull.equations[plane]])
+        try:
+            trial = _vertices(planes, inside)
+        except QhullError:  # planes that all but coincide: what is there already holds the points
+            break
+        if len(trial) > max_vertices:
+            break
+        best = trial
+    return best
+
+
+def _vertices(planes: Array, inside: Array) -> Array:
+    from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+    found = HalfspaceIntersection(planes, inside).intersections
+    return np.asarray(found[ConvexHull(found).vertices])
