@@ -34,16 +34,33 @@ class QPSolver(ABC):
         """
 
 
-def finish(program: QuadraticProgram, x: Array, iterations: int) -> QPSolution | None:
-    """Exact answer from an approximate one, or None when no active set near it settles."""
+def finish(program: QuadraticProgram, x: Array, iterations: int, by: str) -> QPSolution | None:
+    """Exact answer from an approximate one, or None when no active set near it settles.
+
+    Args:
+        program: what is solved.
+        x: (n,) approximate answer.
+        iterations: what it took.
+        by: name of the solver it came from.
+    """
     solution = solve_from(program, guess_active_set(program, x, GUESS_TOLERANCE), CORRECTIONS)
-    return None if solution is None else solution._replace(iterations=iterations)
+    return None if solution is None else solution._replace(iterations=iterations, by=by)
 
 
-def approximate(program: QuadraticProgram, x: Array, iterations: int) -> QPSolution:
+def last_resort(program: QuadraticProgram, x: Array, iterations: int, by: str) -> QPSolution:
+    """Exact answer by DAQP where a solver's own answer x, shape (n,), does not lead to one; else the best known."""
+    from wholebody.methods.qp.solvers.daqp_solver import solve_with_daqp
+
+    solution = solve_with_daqp(program)
+    if solution.exact:
+        return solution._replace(iterations=iterations + solution.iterations)
+    return approximate(program, x, iterations, by)
+
+
+def approximate(program: QuadraticProgram, x: Array, iterations: int, by: str) -> QPSolution:
     """The best that can be said of an x for which `finish` failed."""
     x = x.clip(program.lower, program.upper)
-    return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, iterations)
+    return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, iterations, by)
 
 
 def solver_names() -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from wholebody.methods.qp.solvers.split_form import split
 FAR = 1e30  # DAQP's infinity
 HEAVIEST = (1e5, 1e10)  # weights are cut to this: milder programs are three times faster, and mostly enough for `finish`
 LIMIT = 500  # iterations
+TOLERANCE = 1e-9  # of rows, m
 EQUALITY = 5  # DAQP's mark for a row that is always active
 
 
@@ -23,23 +24,28 @@ class DAQPSolver(QPSolver):
 
     def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
         """Minimise; see `QPSolver.solve`. DAQP starts cold, so the guess is not used."""
-        import daqp
+        return solve_with_daqp(program)
 
-        n, m, k = program.size, len(program.target), len(program.least)
-        iterations = 0
-        x = np.zeros(n)
-        for heaviest in HEAVIEST:
-            form = split(program, heaviest)
-            upper = np.concatenate([program.upper, np.minimum(form.upper, FAR)])
-            lower = np.concatenate([program.lower, form.lower])
-            sense = np.zeros(n + m + k, dtype=c_int)
-            sense[n : n + m] = EQUALITY
-            x, _, _, info = daqp.solve(
-                np.diag(form.diagonal), form.linear, form.matrix, upper, lower, sense, primal_tol=1e-9, iter_limit=LIMIT
-            )
-            x = np.where(np.isfinite(x[:n]), x[:n], 0.0)
-            iterations += int(info["iterations"])
-            solution = finish(program, x, iterations)
-            if solution is not None:
-                return solution
-        return approximate(program, x, iterations)
+
+def solve_with_daqp(program: QuadraticProgram) -> QPSolution:
+    """Minimise with mild weights, and where that does not lead to the exact answer, with the true ones."""
+    import daqp
+
+    n, m, k = program.size, len(program.target), len(program.least)
+    iterations = 0
+    x = np.zeros(n)
+    for heaviest in HEAVIEST:
+        form = split(program, heaviest)
+        upper = np.concatenate([program.upper, np.minimum(form.upper, FAR)])
+        lower = np.concatenate([program.lower, form.lower])
+        sense = np.zeros(n + m + k, dtype=c_int)
+        sense[n : n + m] = EQUALITY
+        x, _, _, info = daqp.solve(
+            np.diag(form.diagonal), form.linear, form.matrix, upper, lower, sense, primal_tol=TOLERANCE, iter_limit=LIMIT
+        )
+        x = np.where(np.isfinite(x[:n]), x[:n], 0.0)
+        iterations += int(info["iterations"])
+        solution = finish(program, x, iterations, "daqp")
+        if solution is not None:
+            return solution
+    return approximate(program, x, iterations, "daqp")

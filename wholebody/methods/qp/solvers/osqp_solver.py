@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from wholebody.methods.qp.active_set import solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import QPSolver, approximate, finish
+from wholebody.methods.qp.solvers.base import QPSolver, finish, last_resort
 
 HEAVIEST = 1e5  # weights are cut to this: OSQP needs many times the iterations for larger ones
 SLOTS = 8  # elastic rows come in multiples of this, so that the sparsity seldom changes; more slots = slower iterations
 SCALE = 100.0  # x is in hundredths of a radian inside OSQP: its absolute tolerance then means 1e-7 rad
 WARM_CORRECTIONS = 3  # tries with the last active set before OSQP is asked
-ROUNDS = ((50, 1e-3), (400, 1e-5), (4000, 1e-7))  # iterations and tolerance, tried until `finish` succeeds
+ROUNDS = ((50, 1e-3), (100, 1e-5))  # iterations and tolerance, tried until `finish` succeeds
 FAR = 1e30  # OSQP's infinity
 
 
@@ -23,7 +23,8 @@ class OSQPSolver(QPSolver):
     """OSQP (Stellato et al. 2020) on the split form.
 
     First the last active set is tried: most steps of a drag do not change it. Else OSQP iterates until an active set
-    read off its answer settles.
+    read off its answer settles. It is a first-order method, and where many bounds and contacts bind at once thousands
+    of its iterations may not tell the set; such programs, a few in a hundred, are given to DAQP.
     """
 
     name = "osqp"
@@ -37,7 +38,7 @@ class OSQPSolver(QPSolver):
         if guess is not None:
             solution = solve_from(program, guess, WARM_CORRECTIONS)
             if solution is not None:
-                return solution
+                return solution._replace(by="last active set")
         if self._workspace is None or not self._workspace.fits(program):
             self._workspace = _Workspace(program, self._workspace)
         self._workspace.load(program)
@@ -45,10 +46,10 @@ class OSQPSolver(QPSolver):
         for limit, tolerance in ROUNDS:
             x, used = self._workspace.run(limit, tolerance)
             iterations += used
-            solution = finish(program, x, iterations)
+            solution = finish(program, x, iterations, self.name)
             if solution is not None:
                 return solution
-        return approximate(program, x, iterations)
+        return last_resort(program, x, iterations, self.name)
 
 
 class _Workspace:

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import QPSolver, approximate, finish
+from wholebody.methods.qp.solvers.base import QPSolver, finish, last_resort
 from wholebody.methods.qp.solvers.split_form import split
 
 
@@ -44,4 +44,4 @@ class QpsolversSolver(QPSolver):
                 solver=self.name,
             )  # fmt: skip
         x = np.zeros(n) if answer.x is None else np.where(np.isfinite(answer.x[:n]), answer.x[:n], 0.0)
-        return finish(program, x, 1) or approximate(program, x, 1)
+        return finish(program, x, 1, self.name) or last_resort(program, x, 1, self.name)
