@@ -1,8 +1,20 @@
 """What a body is: people, avatars, hands and robots as figures."""
 
-from wholebody.figures.figure import Chain, Figure, JointCone, Limits
+from wholebody.figures.denavit_hartenberg import DenavitHartenberg, denavit_hartenberg
+from wholebody.figures.description import Chain, JointCone, Limits
+from wholebody.figures.figure import Figure
 from wholebody.figures.loading import load
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.shipped import urdf_path
 
-__all__ = ["Chain", "Figure", "JointCone", "Limits", "ReachCone", "load", "urdf_path"]
+__all__ = [
+    "Chain",
+    "DenavitHartenberg",
+    "Figure",
+    "JointCone",
+    "Limits",
+    "ReachCone",
+    "denavit_hartenberg",
+    "load",
+    "urdf_path",
+]

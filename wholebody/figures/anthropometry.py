@@ -25,7 +25,7 @@ STATURE_RANGE = (1.3, 2.2)
 MASS_RANGE = (25.0, 250.0)
 """Kilograms."""
 
-BODY_MASS_INDEX_RANGE = (13.0, 60.0)
+BODY_MASS_INDEX_RANGE = (13.0, 50.0)
 """kg / m^2. Outside, stature and mass do not belong to one living person: most likely a wrong unit."""
 
 _SEXES = {"male": "M", "female": "F"}
@@ -110,6 +110,11 @@ def body(sex: str = "male", stature: float | None = None, mass: float | None = N
             f"mass {weight:g} kg does not go with stature {height:g} m; give a mass between {low:.0f} and {high:.0f} kg"
         )
     return Body(sex, height, weight)
+
+
+def describe(person: Body) -> str:
+    """Return one line on a person for the head of a file."""
+    return f"{person.sex}, stature {person.stature:g} m, mass {person.mass:g} kg; written by wholebody from its tables"
 
 
 def design_cases() -> Mapping[str, Body]:

@@ -18,9 +18,7 @@ def model_of(blueprint: Blueprint) -> pin.Model:
     return model
 
 
-def geometry_of(
-    model: pin.Model, solids: tuple[Solid, ...], pairs: tuple[tuple[str, str], ...]
-) -> pin.GeometryModel:
+def geometry_of(model: pin.Model, solids: tuple[Solid, ...], pairs: tuple[tuple[str, str], ...]) -> pin.GeometryModel:
     """Return Pinocchio's geometry: the pieces on their segments, and the pairs that can touch."""
     geometry = pin.GeometryModel()
     index = {}

@@ -99,7 +99,11 @@ def urdf_text(blueprint: Blueprint) -> str:
     URDF has no capsule: a cylinder is written, with Pinocchio's ``collision_checking`` tag that makes it a capsule of
     that length between the centres of its caps.
     """
-    lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<!-- {blueprint.title} -->", f'<robot name="{blueprint.name}">']
+    lines = [
+        '<?xml version="1.0" encoding="utf-8"?>',
+        f"<!-- {blueprint.title} -->",
+        f'<robot name="{blueprint.name}">',
+    ]
     for link in blueprint.links:
         lines += _link(link, [solid for solid in blueprint.solids if solid.segment == link.name])
     for joint in blueprint.joints:
@@ -171,7 +175,9 @@ def _geometry(solid: Solid) -> str:
         return f'<cylinder radius="{_number(shape.radius)}" length="{_number(2.0 * shape.halfLength)}"/>'
     if kind == "Box":
         return f'<box size="{_numbers(2.0 * np.array(shape.halfSide))}"/>'
-    raise InputError(f"piece {solid.name!r} is a {kind} without a mesh file; URDF knows spheres, cylinders, boxes, meshes")
+    raise InputError(
+        f"piece {solid.name!r} is a {kind} without a mesh file; URDF knows spheres, cylinders, boxes, meshes"
+    )
 
 
 def _origin(placement: pin.SE3) -> str:

@@ -52,7 +52,9 @@ class DenavitHartenberg(NamedTuple):
         """Return the placement of the tip in the reference frame at joint values (n,)."""
         values = np.asarray(values, dtype=float)
         if values.shape != self.offset.shape:
-            raise InputError(f"this branch has {len(self.offset)} joints; give that many values, not shape {values.shape}")
+            raise InputError(
+                f"this branch has {len(self.offset)} joints; give that many values, not shape {values.shape}"
+            )
         placement = self.base
         for theta, d, a, alpha in zip(values + self.offset, self.d, self.a, self.alpha, strict=True):
             placement = placement * _link(theta, d, a, alpha)
@@ -95,7 +97,9 @@ def denavit_hartenberg(figure: Figure, branch: str) -> DenavitHartenberg:
     frames = _frames(axes)
     links = [frames[k].inverse() * frames[k + 1] for k in range(len(ids))]
     offset, d, a, alpha = (np.array(column) for column in zip(*(_parameters(link) for link in links), strict=True))
-    return DenavitHartenberg(chain.joints, reference[0], chain.tip, frames[0], offset, d, a, alpha, frames[-1].inverse() * tip)
+    return DenavitHartenberg(
+        chain.joints, reference[0], chain.tip, frames[0], offset, d, a, alpha, frames[-1].inverse() * tip
+    )
 
 
 def _link_frame(figure: Figure, joint: int) -> tuple[str, int]:

@@ -2,96 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from wholebody.errors import InputError, UnknownNameError
-from wholebody.figures.reach_cones import ReachCone
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from wholebody.figures.description import (
+    Array,
+    Description,
+    Indices,
+    limits_of,
+)
 
 ROOT_JOINT = "root_joint"
-
-
-class Chain(NamedTuple):
-    """Joints from the root outwards, and the frame at the end."""
-
-    joints: tuple[str, ...]
-    tip: str
-
-
-class JointCone(NamedTuple):
-    """Reach cone of a limb.
-
-    Attributes:
-        cone: directions that the limb can take.
-        reference: frame in which the cone stands.
-        limb: frame that carries the limb.
-        axis: (3,) unit direction of the limb in its own frame.
-    """
-
-    cone: ReachCone
-    reference: str
-    limb: str
-    axis: Array
-
-
-class ExcludedPair(NamedTuple):
-    """Two pieces that are never tested, and why."""
-
-    a: str
-    b: str
-    reason: str
-
-
-class Limits(NamedTuple):
-    """Limits of the joints with one degree of freedom that have them.
-
-    Attributes:
-        idx_q: (n,) places in the posture.
-        idx_v: (n,) places in the tangent.
-        lower: (n,) radians or metres.
-        upper: (n,)
-    """
-
-    idx_q: Indices
-    idx_v: Indices
-    lower: Array
-    upper: Array
-
-
-class Description(NamedTuple):
-    """What a figure knows beyond its model and geometry; all of it by name.
-
-    Attributes:
-        groups: group to joints, without the root.
-        chains: limbs, from the root outwards.
-        frames: names that people reach with.
-        segments: links with mass or geometry.
-        postures: name to a function that computes the posture of a figure.
-        cones: reach cones of ball joints.
-        collision_groups: segment to the group whose parts are never tested against each other; may be empty.
-        effort: joint to weight of its effort; joints that are not named have 1.
-        excluded: pairs of pieces that are not tested, with the reason.
-        notes: sentences on what had to be changed about the geometry of a file.
-    """
-
-    groups: Mapping[str, tuple[str, ...]]
-    chains: Mapping[str, Chain]
-    frames: tuple[str, ...]
-    segments: tuple[str, ...]
-    postures: Mapping[str, Callable[[Figure], Array]]
-    cones: Mapping[str, JointCone] = MappingProxyType({})
-    collision_groups: Mapping[str, str] = MappingProxyType({})
-    effort: Mapping[str, float] = MappingProxyType({})
-    excluded: tuple[ExcludedPair, ...] = ()
-    notes: tuple[str, ...] = ()
 
 
 class Figure:
@@ -100,7 +26,8 @@ class Figure:
     Attributes:
         name: such as "human".
         model: Pinocchio's model; `model.nq` numbers make a posture, `model.nv` a displacement.
-        geometry: the convex pieces and the pairs of them that can touch. A piece is called "<segment>" or "<segment>:<k>".
+        geometry: the convex pieces and the pairs of them that can touch. A piece is called "<segment>" or
+            "<segment>:<k>".
         visual: what is drawn.
         detail: "spheres", "capsules", "hulls", or "own" for the geometry of a URDF.
         root: "free" (a floating base) or "fixed".
@@ -141,8 +68,8 @@ class Figure:
         self.root = "free" if first is not None and first.nq == 7 else "fixed"
         self._frame_ids = {frame.name: index for index, frame in reversed(list(enumerate(model.frames)))}
         self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
-        self.limits = _limits(model)
-        root = self.dofs(["root"]) if self.root == "free" else []
+        self.limits = limits_of(model)
+        root = slice(0, 6 if self.root == "free" else 0)
         self.effort_weights = np.ones(model.nv)
         for joint, weight in description.effort.items():
             if joint in self._joint_ids:
@@ -152,7 +79,8 @@ class Figure:
 
     def __repr__(self) -> str:
         return (
-            f"Figure({self.name!r}, detail={self.detail!r}, root={self.root!r}, nq={self.model.nq}, nv={self.model.nv}, "
+            f"Figure({self.name!r}, detail={self.detail!r}, root={self.root!r}, "
+            f"nq={self.model.nq}, nv={self.model.nv}, "
             f"pieces={self.geometry.ngeoms}, pairs={len(self.geometry.collisionPairs)})"
         )
 
@@ -176,7 +104,7 @@ class Figure:
             raise UnknownNameError("posture", name, self.postures)
         if name not in self._made:
             self._made[name] = self._description.postures[name](self)
-        return self._made[name].copy()
+        return np.array(self._made[name])
 
     @property
     def neutral(self) -> Array:
@@ -191,7 +119,7 @@ class Figure:
         """
         if name not in self._frame_ids:
             raise UnknownNameError("frame", name, {*self.frames, *self.segments})
-        return self._frame_ids[name]
+        return int(self._frame_ids[name])
 
     def joint_id(self, name: str) -> int:
         """Return the index of a joint in the model; "root" is the free root.
@@ -267,13 +195,15 @@ class Figure:
             elif (joint.nq, joint.nv) == (2, 1):
                 q[joint.idx_q : joint.idx_q + 2] = np.cos(number), np.sin(number)
             else:
-                raise InputError(f"joint {name!r} has {joint.nv} degrees of freedom; set its part of the posture itself")
+                raise InputError(
+                    f"joint {name!r} has {joint.nv} degrees of freedom; set its part of the posture itself"
+                )
         return q
 
     def tangent_bounds(self, q: Array) -> tuple[Array, Array]:
-        """Return lower and upper bound, each (nv,), of the displacement of q within the limits; infinite where unlimited.
+        """Return lower and upper bound, each (nv,), of the displacement of q within the limits.
 
-        Where q is beyond a limit, both bounds have the sign of the way back.
+        Infinite where there is no limit. Where q is beyond a limit, both bounds have the sign of the way back.
         """
         lower, upper = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
         idx_q, idx_v, low, high = self.limits
@@ -314,16 +244,7 @@ class Figure:
     def _checked(self, q: Any) -> Array:
         posture = np.asarray(q, dtype=float)
         if posture.shape != (self.model.nq,):
-            raise InputError(f"a posture has shape ({self.model.nq},), not {posture.shape}; start from figure.posture(...)")
+            raise InputError(
+                f"a posture has shape ({self.model.nq},), not {posture.shape}; start from figure.posture(...)"
+            )
         return posture
-
-
-def _limits(model: pin.Model) -> Limits:
-    rows = []
-    for joint in list(model.joints)[1:]:
-        if joint.nq == joint.nv == 1:
-            low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
-            if np.isfinite(low) or np.isfinite(high):
-                rows.append((joint.idx_q, joint.idx_v, low, high))
-    columns = np.array(rows).reshape(-1, 4).T
-    return Limits(columns[0].astype(np.intp), columns[1].astype(np.intp), columns[2].copy(), columns[3].copy())

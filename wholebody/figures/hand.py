@@ -16,25 +16,26 @@ import pinocchio as pin
 
 from wholebody.errors import InputError
 from wholebody.figures import hulls
-from wholebody.figures.anthropometry import Body, body
+from wholebody.figures.anthropometry import Body, body, describe
 from wholebody.figures.assembly import geometry_of, model_of
 from wholebody.figures.blueprint import Array, Blueprint, Joint, Landmark, Link, Solid, place
-from wholebody.figures.figure import Chain, Description, ExcludedPair, Figure
+from wholebody.figures.description import Chain, Description, ExcludedPair
+from wholebody.figures.figure import Figure
 from wholebody.figures.measures import FINGER_BASES, Measures, keyed_hand
 from wholebody.figures.tables import keyed
 
 MESH = "meshes/ellipsoid.stl"
 """The unit polyhedron that the URDF scales to each part."""
 
-FINGERS = {"thumb": ("pp", "dp"), **{name: ("pp", "mp", "dp") for name in ("index", "middle", "ring", "little")}}
+FINGERS = {"thumb": ("pp", "dp"), **dict.fromkeys(("index", "middle", "ring", "little"), ("pp", "mp", "dp"))}
 _PART = {"pp": "proximal", "mp": "middle", "dp": "distal"}
 _JOINT = {"mcp_flex": "mcp_flexion", "mcp_abd": "mcp_abduction", "pip_flex": "pip_flexion", "dip_flex": "dip_flexion"}
 _JOINT["ip_flex"] = "ip_flexion"
 
 _THUMB_RADIAL = math.radians(40.0)
 _THUMB_PALMAR = math.radians(30.0)
-"""Resting direction of the thumb's metacarpal: from the fingers towards the thumb's side, and out of the palm (CMC abduction
-of the table); the first is an estimate."""
+"""Resting direction of the thumb's metacarpal: from the fingers towards the thumb's side (estimate), and out of the
+palm (CMC abduction of the table)."""
 
 # Degrees by kind of joint; "relaxed" is the neutral column of the table.
 POSTURES: dict[str, dict[str, float]] = {
@@ -83,7 +84,7 @@ def hand_blueprint(side: str = "right", person: Body | None = None) -> Blueprint
         marks.append(Landmark(f"{side}_{finger}_tip", parent, origin * pin.SE3(_palm_axes(side), np.zeros(3))))
     return Blueprint(
         name=f"{side}_hand",
-        title=f"{side} hand of a {person.sex}, stature {person.stature:g} m, mass {person.mass:g} kg; written by wholebody",
+        title=f"{side} hand; {describe(person)}",
         links=(*_links(size, solids), *virtual),
         joints=tuple(joints),
         landmarks=tuple(marks),
@@ -99,9 +100,7 @@ def hand_figure(
     model = model_of(plan)
     tested, excluded = _pairs(plan.solids)
     names = tuple(joint.name for joint in plan.joints)
-    groups = {
-        finger: tuple(name for name in names if name.startswith(f"{side}_{finger}_")) for finger in FINGERS
-    }
+    groups = {finger: tuple(name for name in names if name.startswith(f"{side}_{finger}_")) for finger in FINGERS}
     description = Description(
         groups={**groups, "fingers": names},
         chains={finger: Chain(groups[finger], f"{side}_{finger}_tip") for finger in FINGERS},

@@ -14,7 +14,7 @@ import numpy as np
 
 from wholebody.errors import UnknownNameError
 from wholebody.figures import human_capsules, human_hulls, human_spheres
-from wholebody.figures.anthropometry import Body, body
+from wholebody.figures.anthropometry import Body, body, describe
 from wholebody.figures.blueprint import Blueprint, Joint, Landmark, Link, Solid, place
 from wholebody.figures.measures import Measures
 from wholebody.figures.tables import table
@@ -24,7 +24,6 @@ DETAILS: dict[str, Callable[[Measures], tuple[Solid, ...]]] = {
     "capsules": human_capsules.solids,
     "hulls": human_hulls.solids,
 }
-
 
 
 def blueprint(person: Body | None = None, detail: str = "capsules") -> Blueprint:
@@ -40,7 +39,7 @@ def blueprint(person: Body | None = None, detail: str = "capsules") -> Blueprint
     person = person or body()
     return Blueprint(
         name="human",
-        title=f"{person.sex}, stature {person.stature:g} m, mass {person.mass:g} kg; written by wholebody from its tables",
+        title=describe(person),
         links=_links(person),
         joints=_joints(person),
         landmarks=landmarks(Measures(person)),
@@ -91,7 +90,7 @@ def landmarks(size: Measures) -> tuple[Landmark, ...]:
     - ``<side>_palm``: on the skin in the middle of the palm; x along the fingers, z out of the palm.
     - ``<side>_index_tip``: end of the index finger; axes as the palm.
     - ``<side>_shoulder`` ... ``<side>_ankle``: joint centres, on the segment nearer the root, with its axes.
-    - ``<side>_heel``, ``<side>_ball``, ``<side>_sole``, ``<side>_toe_tip``: on the ground below the foot; x forward, z up.
+    - ``<side>_heel``, ``<side>_ball``, ``<side>_sole``, ``<side>_toe_tip``: below the foot; x forward, z up.
     - ``head_top``: on the vertex; ``gaze``: between the eyes, x in the direction of looking.
     """
     marks = [
@@ -117,10 +116,3 @@ def landmarks(size: Measures) -> tuple[Landmark, ...]:
             Landmark(f"{side}_toe_tip", f"{side}_toes", place(size.toe_length, 0.0, -size.toe_half_height)),
         ]
     return tuple(marks)
-
-
-def reference_posture_names() -> tuple[str, ...]:
-    """Joint names in the order of the tables (spine, right arm, left arm, neck, right leg, left leg)."""
-    return tuple(row["name"] for row in table("joints"))
-
-

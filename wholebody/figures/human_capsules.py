@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import coal
 import numpy as np
+import pinocchio as pin
 
 from wholebody.figures.blueprint import Array, Solid, place
 from wholebody.figures.measures import RELAXED, Measures
@@ -23,13 +24,19 @@ def solids(size: Measures) -> tuple[Solid, ...]:
 def _trunk(size: Measures) -> Iterator[Solid]:
     for part in trunk_parts(size):
         half = max(part.half_breadth - part.half_depth, 1e-3)
-        yield Solid(part.segment, part.segment, coal.Capsule(part.half_depth, 2.0 * half), place(part.x, 0.0, part.z, _ACROSS))
+        yield Solid(
+            part.segment, part.segment, coal.Capsule(part.half_depth, 2.0 * half), place(part.x, 0.0, part.z, _ACROSS)
+        )
     neck = 0.9 * size.body.radius("neck")
     length = size.body.length("neck")
     yield _between("neck", "neck", neck, (0.0, 0.0, 0.1 * length), (0.0, 0.0, 0.9 * length))
     radius = size.head_radius
     yield _between(
-        "head", "head", radius, (size.head_x, 0.0, size.head_bottom + radius), (size.head_x, 0.0, size.head_top - radius)
+        "head",
+        "head",
+        radius,
+        (size.head_x, 0.0, size.head_bottom + radius),
+        (size.head_x, 0.0, size.head_top - radius),
     )
 
 
@@ -61,7 +68,7 @@ def clavicle(size: Measures, side: str) -> Solid:
 
 
 def hand(size: Measures, side: str) -> Iterator[Solid]:
-    """Palm, index finger, and the three other fingers, slightly shortened: at rest they curl, and the index leads a reach."""
+    """Palm, index finger, and the three others slightly shortened: at rest they curl, and the index leads a reach."""
     segment, thick, breadth = f"{side}_hand", size.palm_half_thickness, size.hand_breadth
     palm, index = size.palm_length, size.index
     box = coal.Box(breadth, 2.0 * thick, palm)
@@ -80,7 +87,9 @@ def foot(size: Measures, side: str) -> Iterator[Solid]:
     """Boxes for the foot and the toes, flush on the sole."""
     height, length = -1.0 * size.sole, size.toe_joint_x - size.heel_x
     box = coal.Box(length, 2.0 * size.foot_half_width, height)
-    yield Solid(f"{side}_foot", f"{side}_foot", box, place(0.5 * (size.toe_joint_x + size.heel_x), 0.0, 0.5 * size.sole))
+    yield Solid(
+        f"{side}_foot", f"{side}_foot", box, place(0.5 * (size.toe_joint_x + size.heel_x), 0.0, 0.5 * size.sole)
+    )
     toes = coal.Box(size.toe_length, 2.0 * size.foot_half_width, 2.0 * size.toe_half_height)
     yield Solid(f"{side}_toes", f"{side}_toes", toes, place(0.5 * size.toe_length, 0.0, 0.0))
 
@@ -102,7 +111,9 @@ def trunk_parts(size: Measures) -> tuple[TrunkPart, ...]:
     waist_x, waist_y, chest_x, chest_y = radius("waist_x"), radius("waist_y"), radius("chest_x"), radius("chest_y")
     low, up, ribs, chest = (length(name) for name in ("lower_lumbar", "upper_lumbar", "lower_thorax", "thorax"))
     return (
-        TrunkPart("pelvis", -0.004 * height, 0.004 * height, 0.95 * radius("hip_x"), 0.97 * radius("hip_y"), 0.06 * height),
+        TrunkPart(
+            "pelvis", -0.004 * height, 0.004 * height, 0.95 * radius("hip_x"), 0.97 * radius("hip_y"), 0.06 * height
+        ),
         TrunkPart("lower_lumbar", 0.010 * height, 0.5 * low, 0.95 * waist_x, 0.95 * waist_y, 1.3 * low),
         TrunkPart("upper_lumbar", 0.004 * height, 0.5 * up, 0.95 * waist_x, 0.93 * waist_y, 1.1 * up),
         TrunkPart("lower_thorax", 0.014 * height, 0.5 * ribs, 0.95 * chest_x, 0.95 * chest_y, 1.2 * ribs),
@@ -126,4 +137,4 @@ def _between(
     side /= np.linalg.norm(side)
     rotation = np.column_stack([np.cross(side, z), side, z])
     center = 0.5 * (start + end)
-    return Solid(name, segment, coal.Capsule(radius, length), place(*center, rotation))
+    return Solid(name, segment, coal.Capsule(radius, length), pin.SE3(rotation, center))

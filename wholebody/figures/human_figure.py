@@ -10,7 +10,8 @@ from wholebody.figures import postures
 from wholebody.figures.anthropometry import body
 from wholebody.figures.assembly import geometry_of, model_of
 from wholebody.figures.blueprint import Blueprint
-from wholebody.figures.figure import Chain, Description, ExcludedPair, Figure, JointCone
+from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone
+from wholebody.figures.figure import Figure
 from wholebody.figures.human import blueprint
 from wholebody.figures.human_pairs import body_pairs, collision_group, sphere_pairs
 from wholebody.figures.reach_cones import ReachCone
@@ -27,7 +28,7 @@ def human_figure(
         sex: "male" or "female".
         stature: metres; the median of the sex if left out.
         mass: kilograms; the median, or what is expected at the stature that was given.
-        detail: "spheres" (39, for whole motions), "capsules" (with boxes for hands and feet), "hulls" (convex polyhedra).
+        detail: "spheres" (39, for whole motions), "capsules" (and boxes), "hulls" (convex polyhedra).
 
     Raises:
         InputError: an impossible body.

@@ -7,7 +7,7 @@ from typing import Any
 
 import pinocchio as pin
 
-from wholebody.figures import human_capsules, hulls
+from wholebody.figures import hulls, human_capsules
 from wholebody.figures.blueprint import Solid, place
 from wholebody.figures.measures import RELAXED, Measures
 

@@ -1,4 +1,4 @@
-"""Which pieces of the person can touch: everything across the body, but not neighbours, which overlap where flesh meets."""
+"""Which pieces of the person can touch: all across the body, but not neighbours, which overlap where flesh meets."""
 
 from __future__ import annotations
 
@@ -74,11 +74,11 @@ def _reason(a: Solid, b: Solid) -> str | None:
         return _NEIGHBOURS
     if part_b == "clavicle" and (part_a == "clavicle" or (a.segment in TRUNK and a.segment != "head")):
         return _SHOULDER
-    if b.name.endswith("_upper_arm:0") and a.segment in ("thorax", "lower_thorax", "neck"):
+    if b.name.endswith("_upper_arm:0") and a.segment in TRUNK and a.segment != "head":
         return _SHOULDER
     if part_b == "thigh" and a.segment == "pelvis":
         return _HIP
-    if b.name.endswith("_thigh:0") and a.segment in ("lower_lumbar", "upper_lumbar"):
+    if b.name.endswith("_thigh:0") and a.segment in ("lower_lumbar", "upper_lumbar", "lower_thorax"):
         return _HIP
     if a.name.endswith("_thigh:0") and b.name.endswith("_thigh:0"):
         return _THIGHS

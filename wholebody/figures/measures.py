@@ -99,7 +99,7 @@ FINGER_BASES = {
     "ring": (-0.158, 0.440),
     "little": (-0.267, 0.396),
 }
-"""Knuckle of each finger (of the thumb: its root joint): towards the thumb in hand breadths, from the wrist in hand lengths."""
+"""Knuckles, and the root of the thumb: in hand breadths to the thumb's side, in hand lengths from the wrist."""
 
 _HAND_COLUMNS = {
     "length": "length_frac_of_hand_length",

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 GAP = 0.004
-"""Metres that a named posture leaves between any two pieces; elbows and legs are moved outwards where a build needs it."""
+"""Metres that a named posture leaves between any two pieces; arms and legs move outwards where a build needs it."""
 
 _SPREAD_STEP = math.radians(1.0)
 _SPREAD_STEPS = 45
@@ -41,12 +41,17 @@ HUMAN: dict[str, Attitude] = {
     "arms_forward": Attitude({"shoulder_flexion": 90.0}),
     "hands_up": Attitude({"shoulder_flexion": 165.0, "elbow_flexion": 10.0}),
     "sitting": Attitude(
-        {"hip_flexion": 90.0, "knee_flexion": 90.0, "hip_abduction": 6.0, "shoulder_abduction": 16.0, "elbow_flexion": 20.0}
+        {
+            "hip_flexion": 90.0,
+            "knee_flexion": 90.0,
+            "hip_abduction": 6.0,
+            "shoulder_abduction": 16.0,
+            "elbow_flexion": 20.0,
+        }
     ),
     "squatting": Attitude(
         {
             "hip_flexion": 105.0,
-            "hip_abduction": 15.0,
             "knee_flexion": 110.0,
             "ankle_dorsiflexion": 30.0,
             "spine1_flexion": 10.0,
@@ -57,34 +62,27 @@ HUMAN: dict[str, Attitude] = {
         pitch=25.0,
     ),
     "kneeling": Attitude({"knee_flexion": 90.0, "ankle_dorsiflexion": -50.0, **_ARMS}),
-    "lunge": Attitude(
-        {
-            "left_hip_flexion": 70.0,
-            "left_knee_flexion": 70.0,
-            "right_hip_flexion": -15.0,
-            "right_knee_flexion": 45.0,
-            "right_ankle_dorsiflexion": 20.0,
-            "right_toe_extension": 40.0,
-            **_ARMS,
-        }
-    ),
     "prone": Attitude({"shoulder_abduction": 25.0, "elbow_flexion": 0.0, "ankle_dorsiflexion": -50.0}, pitch=90.0),
     "supine": Attitude({"shoulder_abduction": 25.0, "elbow_flexion": 0.0, "ankle_dorsiflexion": -20.0}, pitch=-90.0),
 }
 
 
 def stand(figure: Figure, attitude: Attitude) -> Array:
-    """Return the posture (nq,) of an attitude: pelvis above the origin, lowest piece on z = 0, no piece in another."""
+    """Return the posture (nq,) of an attitude: pelvis above the origin, lowest piece on z = 0, no piece in another.
+
+    Very stout builds (body mass index above about 45) cannot squat: there the thighs, spread to their limit,
+    press on the belly.
+    """
     q = pin.neutral(figure.model)
     values: dict[str, float] = {}
     for name, degrees in attitude.degrees.items():
         for joint in (name, f"left_{name}", f"right_{name}"):
             if joint in figure.joints:
                 values[joint] = math.radians(degrees)
-    q = figure.with_joints(q, values)
+    q = figure.clamp(figure.with_joints(q, values))
     spread = [name for name in figure.joints if name.endswith("_abduction") and not name.startswith("neck")]
     free = q
-    for step in range(_SPREAD_STEPS):
+    for _ in range(_SPREAD_STEPS):
         close = _close_segments(figure, free)
         if not close:
             break
@@ -93,8 +91,7 @@ def stand(figure: Figure, attitude: Attitude) -> Array:
             for name in spread
             if any(_moves(name, segment) for segment in close)
         }
-        free = figure.with_joints(free, moved)
-        del step
+        free = figure.clamp(figure.with_joints(free, moved))
     if figure.root == "free":
         half = math.radians(attitude.pitch) / 2.0
         free[3:7] = 0.0, math.sin(half), 0.0, math.cos(half)

@@ -1,8 +1,8 @@
 """Reach cones: which directions a limb can take, as a polygon on the sphere.
 
 Wilhelms & Van Gelder, Fast and Easy Reach-Cone Joint Limits, Journal of Graphics Tools 6(2), 2001. The polygon is
-star-shaped about a visible point V: the planes through V and each vertex P_i cut the sphere into wedges, and exactly one
-wedge holds a direction L: ``S_i . L >= 0 > S_{i+1} . L`` with ``S_i = V x P_i``. L is inside iff ``B_i . L >= 0``
+star-shaped about a visible point V: the planes through V and each vertex P_i cut the sphere into wedges, and exactly
+one wedge holds a direction L: ``S_i . L >= 0 > S_{i+1} . L`` with ``S_i = V x P_i``. L is inside iff ``B_i . L >= 0``
 with the boundary normal ``B_i = P_i x P_{i+1}``. The polygon may be concave and larger than a hemisphere.
 """
 
@@ -32,11 +32,13 @@ class ReachCone:
         """Check the polygon and precompute its planes.
 
         Raises:
-            InputError: fewer than three corners, a zero or non-finite direction, or an edge that is not seen from `visible`.
+            InputError: fewer than three corners, a zero or non-finite direction, or an edge hidden from `visible`.
         """
         self.vertices, self.visible = _unit(vertices, "reach cone corner"), _unit(visible, "visible point")
         if self.vertices.ndim != 2 or len(self.vertices) < 3 or self.visible.shape != (3,):
-            raise InputError("a reach cone needs at least three corners, shape (k, 3), and one visible point, shape (3,)")
+            raise InputError(
+                "a reach cone needs at least three corners, shape (k, 3), and one visible point, shape (3,)"
+            )
         following = np.roll(self.vertices, -1, axis=0)
         normals = np.cross(self.vertices, following)
         if (normals @ self.visible < 0.0).all():
@@ -45,7 +47,9 @@ class ReachCone:
             normals = np.cross(self.vertices, following)
         lengths = np.linalg.norm(normals, axis=1)
         if lengths.min() < 1e-9 or (normals @ self.visible <= 0.0).any():
-            raise InputError("every edge of a reach cone must be seen from its visible point; move that point or the corners")
+            raise InputError(
+                "every edge of a reach cone must be seen from its visible point; move that point or the corners"
+            )
         self.boundaries: Array = normals / lengths[:, None]
         self._slices = np.cross(self.visible, self.vertices)
         self._following = following
@@ -66,7 +70,7 @@ class ReachCone:
         """Return the angle to the nearest edge, radians, positive inside, and its gradient on the sphere.
 
         A turn of the direction by a small vector w, ``L + w x L``, changes the angle by ``gradient . (w x L)``; the
-        gradient is tangent to the sphere and of length 1, save on an edge's middle line, where the nearest edge changes.
+        gradient is tangent to the sphere and of length 1, save where the nearest edge changes.
 
         Returns:
             (angle, gradient): float and (3,), or (n,) and (n, 3).
@@ -96,7 +100,7 @@ class ReachCone:
         wedge = (side >= 0.0) & (np.roll(side, -1, axis=1) < 0.0)
         # In exactly one wedge, but for V itself (all zero), which is inside.
         inside = (rows @ self.boundaries.T)[np.arange(len(rows)), np.argmax(wedge, axis=1)] >= 0.0
-        return inside | (~wedge.any(axis=1) & (rows @ self.visible > 0.0))
+        return np.asarray(inside | (~wedge.any(axis=1) & (rows @ self.visible > 0.0)))
 
     def _nearest_on_edge(self, rows: Array) -> Array:
         """Nearest point of the boundary, (n, 3)."""

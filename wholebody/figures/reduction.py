@@ -9,7 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.errors import InputError
-from wholebody.figures.figure import ROOT_JOINT, Array, Chain, Description, ExcludedPair, Figure
+from wholebody.figures.description import Array, Chain, Description, ExcludedPair
+from wholebody.figures.figure import ROOT_JOINT, Figure
 
 _LOCKED = "locked together"
 
@@ -58,12 +59,16 @@ def reduce_figure(figure: Figure, keep: tuple[str, ...], q: Array) -> Figure:
 def drop_rigid_pairs(geometry: pin.GeometryModel) -> list[ExcludedPair]:
     """Remove pairs of pieces on one joint from the geometry, since they never move against each other; return them."""
     pieces = geometry.geometryObjects
+    # Read all pairs first: Pinocchio's list hands out references, which move when an entry is removed.
+    pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
+    geometry.removeAllCollisionPairs()
     dropped = []
-    for pair in list(geometry.collisionPairs):
-        a, b = pieces[pair.first], pieces[pair.second]
+    for first, second in pairs:
+        a, b = pieces[first], pieces[second]
         if a.parentJoint == b.parentJoint:
-            geometry.removeCollisionPair(pair)
             dropped.append(ExcludedPair(a.name, b.name, _LOCKED))
+        else:
+            geometry.addCollisionPair(pin.CollisionPair(first, second))
     return dropped
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.figures.figure import ExcludedPair
+from wholebody.figures.description import ExcludedPair
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int, se
     """Put the pairs that can touch into the geometry.
 
     Left out are pieces on one link or joint, pieces of neighbours (no piece on any joint between them), and pairs that
-    overlap in every one of a number of random postures within the limits: shells in shells, which no posture could free.
+    overlap in every one of a number of random postures within the limits: shells in shells, which nothing could free.
 
     Args:
         model: Pinocchio's model.
@@ -87,7 +87,9 @@ def _drop_always_overlapping(
     dropped = []
     pieces = geometry.geometryObjects
     for pair in [geometry.collisionPairs[int(k)] for k in np.flatnonzero(always)]:
-        dropped.append(ExcludedPair(pieces[pair.first].name, pieces[pair.second].name, "overlap in every sampled posture"))
+        dropped.append(
+            ExcludedPair(pieces[pair.first].name, pieces[pair.second].name, "overlap in every sampled posture")
+        )
     for entry in dropped:
         geometry.removeCollisionPair(
             pin.CollisionPair(geometry.getGeometryId(entry.a), geometry.getGeometryId(entry.b))

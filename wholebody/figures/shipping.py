@@ -19,7 +19,7 @@ def write_human(path: str | os.PathLike[str], person: Body) -> None:
 
 
 def shipped_files() -> dict[str, str]:
-    """Return the text of every shipped file by its name below ``urdf/``: the median man, his avatar and his right hand."""
+    """Return the text of every shipped file below ``urdf/``: the median man, his avatar and his right hand."""
     return {
         "human.urdf": urdf_text(blueprint()),
         "avatar.urdf": urdf_text(avatar_blueprint()),

@@ -57,7 +57,9 @@ class State:
         if q.shape != (self.model.nq,):
             raise InputError(f"a posture has shape ({self.model.nq},), not {q.shape}; start from figure.posture(...)")
         if not np.isfinite(q).all():
-            raise InputError(f"posture entry {int(np.flatnonzero(~np.isfinite(q))[0])} is not finite; give finite numbers")
+            raise InputError(
+                f"posture entry {int(np.flatnonzero(~np.isfinite(q))[0])} is not finite; give finite numbers"
+            )
         pin.computeJointJacobians(self.model, self.data, q)
         self.q = q
         self.jacobian = self.data.J

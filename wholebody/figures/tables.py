@@ -1,9 +1,9 @@
-"""The tables that bodies are built from: comma-separated files with their sources in the lines that start with ``#``."""
+"""The tables that bodies are built from; the lines that start with ``#``, and a column, name their sources."""
 
 from __future__ import annotations
 
 import csv
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 from wholebody.errors import UnknownNameError
@@ -13,7 +13,7 @@ _FOLDER = Path(__file__).parent / "data"
 Row = dict[str, str]
 
 
-@lru_cache(maxsize=None)
+@cache
 def table(name: str) -> tuple[Row, ...]:
     """Return the rows of one table, each a mapping from column to text.
 
@@ -31,7 +31,7 @@ def table(name: str) -> tuple[Row, ...]:
         return tuple(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
-@lru_cache(maxsize=None)
+@cache
 def keyed(name: str, column: str) -> dict[str, Row]:
     """Return the rows of a table by the text in one column."""
     return {row[column]: row for row in table(name)}

@@ -1,4 +1,4 @@
-"""A figure from any URDF: its own collision geometry as convex pieces, and the pairs that can touch found by sampling."""
+"""A figure from any URDF: its own collision geometry as convex pieces, and the pairs that can touch, by sampling."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.errors import FileFormatError, InputError, WholebodyError
-from wholebody.figures.figure import Chain, Description, Figure
+from wholebody.figures.description import Chain, Description
+from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import choose_pairs
 from wholebody.figures.urdf_file import Collision, UrdfFile, read_urdf
 

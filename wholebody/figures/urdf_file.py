@@ -1,4 +1,4 @@
-"""Reading a URDF: everything is checked in the file itself, so that an error names its place, before Pinocchio sees it."""
+"""Reading a URDF: all is checked in the file itself, so that an error names its place, before Pinocchio sees it."""
 
 from __future__ import annotations
 
@@ -75,7 +75,9 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
     if robot.tag != "robot":
         raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; give a URDF")
     if "xacro" in text and (path.suffix == ".xacro" or robot.find(".//{http://www.ros.org/wiki/xacro}*") is not None):
-        raise FileFormatError(f"{path}: this is a xacro macro file; expand it first with `xacro {path.name} > robot.urdf`")
+        raise FileFormatError(
+            f"{path}: this is a xacro macro file; expand it first with `xacro {path.name} > robot.urdf`"
+        )
     links = _names(robot.findall("link"), "link", path)
     root = _check_joints(robot, links, path)
     collisions = tuple(
@@ -101,7 +103,7 @@ def _names(elements: list[Element], kind: str, path: Path) -> tuple[str, ...]:
 
 def _check_joints(robot: Element, links: tuple[str, ...], path: Path) -> str:
     """Check the tree of joints; return the root link."""
-    joints = [joint for joint in robot.findall("joint")]
+    joints = robot.findall("joint")
     _names(joints, "joint", path)
     parent_of: dict[str, str] = {}
     for joint in joints:
@@ -109,10 +111,14 @@ def _check_joints(robot: Element, links: tuple[str, ...], path: Path) -> str:
         kind = joint.get("type")
         if kind not in JOINT_TYPES:
             raise FileFormatError(f"{place} has the type {kind!r}; use one of {', '.join(JOINT_TYPES)}")
-        ends = [element.get("link") if (element := joint.find(tag)) is not None else None for tag in ("parent", "child")]
+        ends = [
+            element.get("link") if (element := joint.find(tag)) is not None else None for tag in ("parent", "child")
+        ]
         for tag, end in zip(("parent", "child"), ends, strict=True):
             if end not in links:
-                raise FileFormatError(f"{place} has the {tag} link {end!r}, which is not in the file; add it or mend the name")
+                raise FileFormatError(
+                    f"{place} has the {tag} link {end!r}, which is not in the file; add it or mend the name"
+                )
         parent, child = str(ends[0]), str(ends[1])
         if child in parent_of:
             raise FileFormatError(f"{place}: link {child!r} already hangs on {parent_of[child]!r}; a URDF is a tree")
@@ -125,7 +131,11 @@ def _check_joints(robot: Element, links: tuple[str, ...], path: Path) -> str:
             raise FileFormatError(f"{place} has a zero axis; give a direction")
     roots = [link for link in links if link not in parent_of]
     if len(roots) != 1:
-        found = "no link without a parent: the joints form a loop" if not roots else f"{len(roots)} roots: {', '.join(roots[:4])}"
+        found = (
+            "no link without a parent: the joints form a loop"
+            if not roots
+            else f"{len(roots)} roots: {', '.join(roots[:4])}"
+        )
         raise FileFormatError(f"{path}: a URDF is one tree, but there is {found}; connect it")
     for link in links:
         seen = {link}
@@ -146,7 +156,7 @@ def _check_limit(joint: Element, place: str) -> None:
         raise FileFormatError(f"{place} has the lower limit {low:g} above the upper {high:g}; exchange them")
     for name in ("effort", "velocity"):
         if limit.get(name) is None:
-            raise FileFormatError(f"{place} has a limit without {name}; URDF demands it, add {name}=\"1\"")
+            raise FileFormatError(f'{place} has a limit without {name}; URDF demands it, add {name}="1"')
 
 
 def _collisions(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> list[Collision]:
@@ -179,7 +189,7 @@ def _collisions(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> li
 
 
 def _mesh_file(name: str, place: str, path: Path, package_dirs: tuple[Path, ...]) -> Path:
-    """Find a mesh: relative to the URDF, absolute, ``file://``, or ``package://`` below the folders and the URDF's parents."""
+    """Find a mesh: by path, by ``file://``, or by ``package://`` below `package_dirs` and the parents of the URDF."""
     if not name:
         raise FileFormatError(f"{place} has a mesh without filename; add it")
     folder = path.resolve().parent
@@ -193,7 +203,9 @@ def _mesh_file(name: str, place: str, path: Path, package_dirs: tuple[Path, ...]
     for candidate in candidates:
         if candidate.is_file():
             return candidate
-    raise FileFormatError(f"{place}: the mesh {name!r} is not found; put it in place or name its folder in package_dirs")
+    raise FileFormatError(
+        f"{place}: the mesh {name!r} is not found; put it in place or name its folder in package_dirs"
+    )
 
 
 def _origin(element: Element, place: str) -> pin.SE3:

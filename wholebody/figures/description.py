@@ -1,0 +1,106 @@
+"""What a figure knows by name, beside Pinocchio's model and geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.figures.reach_cones import ReachCone
+
+if TYPE_CHECKING:
+    from wholebody.figures.figure import Figure
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+class Chain(NamedTuple):
+    """Joints from the root outwards, and the frame at the end."""
+
+    joints: tuple[str, ...]
+    tip: str
+
+
+class JointCone(NamedTuple):
+    """Reach cone of a limb.
+
+    Attributes:
+        cone: directions that the limb can take.
+        reference: frame in which the cone stands.
+        limb: frame that carries the limb.
+        axis: (3,) unit direction of the limb in its own frame.
+    """
+
+    cone: ReachCone
+    reference: str
+    limb: str
+    axis: Array
+
+
+class ExcludedPair(NamedTuple):
+    """Two pieces that are never tested, and why."""
+
+    a: str
+    b: str
+    reason: str
+
+
+class Limits(NamedTuple):
+    """Limits of the joints with one degree of freedom that have them.
+
+    Attributes:
+        idx_q: (n,) places in the posture.
+        idx_v: (n,) places in the tangent.
+        lower: (n,) radians or metres.
+        upper: (n,)
+    """
+
+    idx_q: Indices
+    idx_v: Indices
+    lower: Array
+    upper: Array
+
+
+class Description(NamedTuple):
+    """What a figure knows beyond its model and geometry; all of it by name.
+
+    Attributes:
+        groups: group to joints, without the root.
+        chains: limbs, from the root outwards.
+        frames: names that people reach with.
+        segments: links with mass or geometry.
+        postures: name to a function that computes the posture of a figure.
+        cones: reach cones of ball joints.
+        collision_groups: segment to the group whose parts are never tested against each other; may be empty.
+        effort: joint to weight of its effort; joints that are not named have 1.
+        excluded: pairs of pieces that are not tested, with the reason.
+        notes: sentences on what had to be changed about the geometry of a file.
+    """
+
+    groups: Mapping[str, tuple[str, ...]]
+    chains: Mapping[str, Chain]
+    frames: tuple[str, ...]
+    segments: tuple[str, ...]
+    postures: Mapping[str, Callable[[Figure], Array]]
+    cones: Mapping[str, JointCone] = MappingProxyType({})
+    collision_groups: Mapping[str, str] = MappingProxyType({})
+    effort: Mapping[str, float] = MappingProxyType({})
+    excluded: tuple[ExcludedPair, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def limits_of(model: pin.Model) -> Limits:
+    """Return the limits of the joints of a model that have one degree of freedom and limits."""
+    rows = []
+    for joint in list(model.joints)[1:]:
+        if joint.nq == joint.nv == 1:
+            low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+            if np.isfinite(low) or np.isfinite(high):
+                rows.append((joint.idx_q, joint.idx_v, low, high))
+    columns = np.array(rows).reshape(-1, 4).T
+    return Limits(columns[0].astype(np.intp), columns[1].astype(np.intp), columns[2].copy(), columns[3].copy())
