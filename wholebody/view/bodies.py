@@ -90,7 +90,9 @@ class Bodies:
         for body, piece in zip(self.all, self.scene.geometry.geometryObjects, strict=True):
             stage.put(body.path, drawing.piece(piece.geometry, body.path, body.color))
             stage.place(body.path, piece.placement.homogeneous)
-        floor = next((index for index, body in enumerate(self.all) if body.plate and body.color[:3] == style.FLOOR[:3]), None)
+        floor = next(
+            (index for index, body in enumerate(self.all) if body.plate and body.color[:3] == style.FLOOR[:3]), None
+        )
         stage.set("/Ground", "visible", floor is None)  # what shows shadows where there is no floor
         grid = np.eye(4)
         if floor is not None:
@@ -123,7 +125,7 @@ class Bodies:
             stage.place(f"{root}{body.carrier}", data.oMi[body.joint].homogeneous)
 
     def corners(self, data: Any, *, things: bool) -> Array:
-        """Corners (n, 3) in the world of the boxes around the pieces, of the figure or of the things; no half-spaces."""
+        """Corners (n, 3) in the world of the boxes around the figure's pieces, or the things'; no half-spaces."""
         chosen = [n for n, body in enumerate(self.all) if not body.plate and (body.thing is not None) == things]
         return np.concatenate([np.zeros((0, 3)), *(self._box(index, data) for index in chosen)])
 

@@ -104,9 +104,14 @@ class Browser:
         """Spawn Chromium with the reading end of one pipe as its descriptor 3, the writing end of another as 4."""
         theirs_in, self._out = os.pipe()
         self._in, theirs_out = os.pipe()
-        high_in = fcntl.fcntl(theirs_in, fcntl.F_DUPFD_CLOEXEC, 10)  # clear of 3 and 4, so that neither dup2 hits the other
+        high_in = fcntl.fcntl(
+            theirs_in, fcntl.F_DUPFD_CLOEXEC, 10
+        )  # clear of 3 and 4, so that neither dup2 hits the other
         high_out = fcntl.fcntl(theirs_out, fcntl.F_DUPFD_CLOEXEC, 10)
-        actions = [(os.POSIX_SPAWN_OPEN, fd, os.devnull, flag, 0) for fd, flag in ((0, os.O_RDONLY), (1, os.O_WRONLY), (2, os.O_WRONLY))]
+        actions = [
+            (os.POSIX_SPAWN_OPEN, fd, os.devnull, flag, 0)
+            for fd, flag in ((0, os.O_RDONLY), (1, os.O_WRONLY), (2, os.O_WRONLY))
+        ]
         actions += [(os.POSIX_SPAWN_DUP2, high_in, 3), (os.POSIX_SPAWN_DUP2, high_out, 4)]  # type: ignore[list-item]
         command = [executable, *_FLAGS, f"--user-data-dir={self._folder / 'profile'}", "about:blank"]
         try:
@@ -119,7 +124,9 @@ class Browser:
 
     def resize(self, size: tuple[int, int]) -> None:
         """Give the page another width and height, pixels."""
-        self._call("Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=False)
+        self._call(
+            "Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=False
+        )
 
     def open(self, url: str) -> None:
         """Open an address and wait until the page of a `Viewer` has drawn what it was sent.
@@ -168,11 +175,15 @@ class Browser:
             raise BrowserError(f"the page failed: {_message(answer['exceptionDetails'])}")
         return answer["result"].get("value")
 
-    def capture(self) -> bytes:
-        """PNG of the drawing, without the controls on top of it."""
+    def capture(self, first: str = "0") -> bytes:
+        """PNG of the drawing, without the controls on top of it.
+
+        Args:
+            first: JavaScript to carry out before, in the same breath, so that the page draws only once.
+        """
         if self.errors:
             raise BrowserError(f"the page failed: {self.errors[0]}")
-        data: str = self.evaluate("viewer.capture_image()")
+        data: str = self.evaluate(f"{first}; viewer.capture_image()")
         return base64.b64decode(data.partition(",")[2])
 
     def close(self) -> None:
@@ -224,7 +235,9 @@ class Browser:
             raise BrowserError(f"the browser did not answer within {self.timeout:g} s")
         chunk = os.read(self._in, 1 << 20)
         if not chunk:
-            raise BrowserError("the browser ended unexpectedly; try it by hand: chromium --headless --dump-dom about:blank")
+            raise BrowserError(
+                "the browser ended unexpectedly; try it by hand: chromium --headless --dump-dom about:blank"
+            )
         *whole, self._partial = (self._partial + chunk).split(b"\0")
         for text in whole:
             message = json.loads(text)

@@ -59,8 +59,15 @@ def delete(path: str) -> Command:
     return Command(DELETE, path, "", _pack({"type": "delete", "path": path}))
 
 
-def look(target: Array, fov: float, *, eye: Array | None = None, direction: Array | None = None,
-         points: Array | None = None, margin: float = 1.0) -> Command:
+def look(
+    target: Array,
+    fov: float,
+    *,
+    eye: Array | None = None,
+    direction: Array | None = None,
+    points: Array | None = None,
+    margin: float = 1.0,
+) -> Command:
     """Aim the camera at a target, from `eye`, or from `direction` so that all `points` (n, 3) are in the picture.
 
     Args:
@@ -119,7 +126,7 @@ def set_animation(tracks: Sequence[Track], dt: float, frames: int, repetitions: 
         frames: how many there are.
         repetitions: how often it is played; infinity for ever.
     """
-    times = np.arange(frames) * dt
+    times = np.asarray(np.arange(frames) * dt, dtype=float)
     clips: dict[str, list[dict[str, Any]]] = {}
     for track in tracks:
         clips.setdefault(track.path, []).append(track.lower(times))

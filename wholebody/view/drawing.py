@@ -89,13 +89,11 @@ def _turned_to(direction: Array) -> Array:
     x, y, z = x / length, y / length, z / length
     sign = 1.0 if z >= 0 else -1.0  # Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017
     a, b = -1.0 / (sign + z), x * y * -1.0 / (sign + z)
-    return np.array(
-        [[1.0 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]], dtype=float
-    )
+    return np.array([[1.0 + sign * x * x * a, b, x], [sign * b, sign + y * y * a, y], [-sign * x, -y, z]], dtype=float)
 
 
 def arrow_placement(start: Array, direction: Array, length: float) -> Array:
-    """Placement (4, 4), scale included, that lays the unit arrow from `start` along `direction`; long ones stay slender."""
+    """Placement (4, 4), scale included, that lays the unit arrow from `start` along `direction`; long ones slender."""
     placement = np.eye(4)
     width = min(length, style.WIDEST_ARROW)
     placement[:3, :3] = _turned_to(direction) * (width, width, length)
@@ -120,8 +118,10 @@ def capsule_surface(radius: float, half_length: float) -> tuple[Array, NDArray[n
     polar = np.linspace(0.0, np.pi / 2, _ALONG + 1)
     polar = np.concatenate([polar, np.pi - polar[::-1]])
     lift = np.repeat([half_length, -half_length], _ALONG + 1)
-    return revolved(np.column_stack([radius * np.sin(polar), lift + radius * np.cos(polar)]),
-                    np.column_stack([np.sin(polar), np.cos(polar)]))
+    return revolved(
+        np.column_stack([radius * np.sin(polar), lift + radius * np.cos(polar)]),
+        np.column_stack([np.sin(polar), np.cos(polar)]),
+    )
 
 
 def revolved(profile: Array, normals: Array, around: int = _AROUND) -> tuple[Array, NDArray[np.uint32], Array]:
@@ -137,8 +137,12 @@ def revolved(profile: Array, normals: Array, around: int = _AROUND) -> tuple[Arr
     """
     angle = np.arange(around) * 2 * np.pi / around
     turn = np.column_stack([np.cos(angle), np.sin(angle)])
-    vertices = np.concatenate([profile[:, None, :1] * turn, np.broadcast_to(profile[:, None, 1:], (len(profile), around, 1))], 2)
-    outward = np.concatenate([normals[:, None, :1] * turn, np.broadcast_to(normals[:, None, 1:], (len(profile), around, 1))], 2)
+    vertices = np.concatenate(
+        [profile[:, None, :1] * turn, np.broadcast_to(profile[:, None, 1:], (len(profile), around, 1))], 2
+    )
+    outward = np.concatenate(
+        [normals[:, None, :1] * turn, np.broadcast_to(normals[:, None, 1:], (len(profile), around, 1))], 2
+    )
     ring, step = np.meshgrid(np.arange(len(profile) - 1), np.arange(around), indexing="ij")
     here, beside = ring * around + step, ring * around + (step + 1) % around
     below, across = here + around, beside + around
@@ -164,7 +168,9 @@ def arrow(name: str, color: tuple[float, float, float], slender: float = 1.0) ->
     """An arrow of length 1 along z from the origin; thinner with a smaller `slender`."""
     shaft, head = 0.045 * slender, 0.12 * slender
     outline = np.array([[0.0, 1.0], [head, 0.68], [shaft, 0.68], [shaft, 0.0], [0.0, 0.0]])
-    vertices, faces, normals = revolved(outline, np.broadcast_to([1.0, 0.0], outline.shape), 16)  # unlit: any normal will do
+    vertices, faces, normals = revolved(
+        outline, np.broadcast_to([1.0, 0.0], outline.shape), 16
+    )  # unlit: any normal will do
     return _mesh(name, _triangles(vertices, faces, normals), _overlay((*color, 1.0)), order=6)
 
 
@@ -232,8 +238,10 @@ def _matrix(scale: tuple[float, float, float], placement: Array | None) -> list[
     return [float(value) for value in (matrix @ np.diag([*scale, 1.0])).T.ravel()]
 
 
-def _mesh(name: str, shape: Three, material: Three, *, matrix: Any = None, order: int = 0, shadow: bool = True) -> Three:
-    """A three.js mesh. The name is its uuid: animations tell objects apart by it, and the file stays the same each time."""
+def _mesh(
+    name: str, shape: Three, material: Three, *, matrix: Any = None, order: int = 0, shadow: bool = True
+) -> Three:
+    """A three.js mesh. The name is its uuid: animations tell objects apart by it, and files come out the same."""
     made: Three = {
         "uuid": name,
         "type": "Mesh",

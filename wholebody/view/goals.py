@@ -31,7 +31,7 @@ class Goals:
         self.goals = problem.goals
 
     def mark(self, moment: Moment, state: State) -> None:
-        """Mark each goal that has a place: target, the way to it, axes where a direction is asked for, and the error."""
+        """Mark each goal that has a place: target, the way to it, axes where it asks for an orientation, the error."""
         for number, goal in enumerate(self.goals):
             root = f"{style.GOAL_NODE}/{number}"
             here = self._here(goal, state)
@@ -88,7 +88,7 @@ class Goals:
 def _wanted(goal: Any, here: pin.SE3) -> Array:
     if goal.direction is not None:
         return np.asarray(goal.direction, dtype=float)
-    return np.asarray(goal.toward, dtype=float) - here.translation
+    return np.asarray(np.asarray(goal.toward, dtype=float) - here.translation)
 
 
 def _target(goal: Any, here: pin.SE3 | None, state: State, scene: Subject) -> tuple[pin.SE3 | None, bool]:
@@ -97,7 +97,9 @@ def _target(goal: Any, here: pin.SE3 | None, state: State, scene: Subject) -> tu
         return None, False
     target = getattr(goal, "target", None)
     if hasattr(goal, "axis"):
-        return pin.SE3(np.eye(3), here.translation if goal.toward is None else np.asarray(goal.toward, dtype=float)), False
+        return pin.SE3(
+            np.eye(3), here.translation if goal.toward is None else np.asarray(goal.toward, dtype=float)
+        ), False
     if hasattr(goal, "to"):
         base = state.frame(scene.figure.frame_id(goal.to))
         return (base * placement(goal.placement), True) if goal.placement is not None else (None, False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 import shutil
 import subprocess
@@ -13,7 +14,8 @@ from pathlib import Path
 
 from wholebody.errors import InputError, MissingPackageError, WholebodyError
 
-GIF_FASTEST = 25.0  # frames per second: GIF counts hundredths of a second, and browsers slow down what is faster than 50
+FASTEST = {".gif": 25.0, ".mp4": 30.0}
+"""Pictures per second by default at most: GIF counts hundredths of a second, and browsers slow down beyond 50."""
 _COLORS = 96
 
 
@@ -25,7 +27,7 @@ def check_movie(path: str | os.PathLike[str]) -> Path:
         MissingPackageError: it ends in .mp4 and there is no ffmpeg.
     """
     path = Path(path)
-    if path.suffix.lower() not in (".gif", ".mp4"):
+    if path.suffix.lower() not in FASTEST:
         raise InputError(f"{path}: a movie is a .gif or a .mp4; give the file one of these endings")
     if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise MissingPackageError(
@@ -34,17 +36,35 @@ def check_movie(path: str | os.PathLike[str]) -> Path:
     return path
 
 
+def frame_times(path: Path, count: int, dt: float, fps: float | None) -> tuple[list[float], float]:
+    """When the pictures of a movie are taken, seconds from the motion's beginning, and how many there are a second.
+
+    Args:
+        path: of the movie; its ending limits the default rate.
+        count: postures of the motion.
+        dt: seconds from one to the next.
+        fps: pictures per second, or None for the motion's own where the kind of file allows it.
+
+    Raises:
+        InputError: the rate is out of range.
+    """
+    if fps is None:
+        fps = min(1 / dt, FASTEST[path.suffix.lower()])
+    if not 0 < fps <= 100:
+        raise InputError(f"fps is between 0 and 100 pictures per second, not {fps}")
+    return [number / fps for number in range(math.floor((count - 1) * dt * fps + 1e-9) + 1)], fps
+
+
 def write_movie(path: Path, pictures: Iterable[bytes], fps: float) -> None:
-    """Write pictures (PNG) as a movie; the file appears when it is whole.
+    """Write pictures (PNG) as a movie, GIF or MP4 by the ending of the path.
 
     Raises:
         WholebodyError: ffmpeg failed.
     """
-    with replacing(path) as temporary:
-        if path.suffix.lower() == ".gif":
-            _write_gif(temporary, pictures, fps)
-        else:
-            _write_mp4(temporary, pictures, fps)
+    if path.suffix.lower() == ".gif":
+        _write_gif(path, pictures, fps)
+    else:
+        _write_mp4(path, pictures, fps)
 
 
 @contextmanager
@@ -80,10 +100,25 @@ def _write_gif(path: Path, pictures: Iterable[bytes], fps: float) -> None:
 
 
 def _write_mp4(path: Path, pictures: Iterable[bytes], fps: float) -> None:
-    command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "image2pipe", "-c:v", "png", "-framerate", f"{fps:g}", "-i", "-"]
+    command = [
+        "ffmpeg",
+        "-y",
+        "-loglevel",
+        "error",
+        "-f",
+        "image2pipe",
+        "-c:v",
+        "png",
+        "-framerate",
+        f"{fps:g}",
+        "-i",
+        "-",
+    ]
     command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p"]
     with tempfile.TemporaryFile() as log:
-        process = subprocess.Popen([*command, "-movflags", "+faststart", str(path)], stdin=subprocess.PIPE, stdout=log, stderr=log)
+        process = subprocess.Popen(
+            [*command, "-movflags", "+faststart", str(path)], stdin=subprocess.PIPE, stdout=log, stderr=log
+        )
         try:
             assert process.stdin is not None
             for picture in pictures:

@@ -5,6 +5,7 @@
   const THREE = MeshCat.THREE;
   const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
   const obey = viewer.handle_command.bind(viewer);
+  const labels = new Map();
   const page = { ready: false, seek: seek, play: play };
   window.viewer = viewer;
   window.wholebody = page;
@@ -82,11 +83,43 @@
     const sprite = new THREE.Sprite(new THREE.SpriteMaterial(
       { map: texture, depthTest: false, depthWrite: false, transparent: true, sizeAttenuation: false }));
     sprite.scale.set(cmd.size * width / height, cmd.size, 1);
-    sprite.center.set(0.5, -0.35);
     sprite.renderOrder = 20;
     sprite.userData.text = cmd.text;
+    labels.set(cmd.path, sprite);
     viewer.set_object(cmd.path.split("/").filter(x => x), sprite);
   }
+
+  // Lifts labels that would cover each other, the lower ones first in place, by whole label heights.
+  function arrange() {
+    const up = Math.tan(viewer.camera.fov * Math.PI / 360);
+    viewer.camera.updateMatrixWorld();
+    viewer.scene.updateMatrixWorld();
+    const found = [];
+    for (const [path, sprite] of labels) {
+      let top = sprite, seen = true;
+      for (; top.parent; top = top.parent) seen = seen && top.visible;
+      if (top !== viewer.scene) labels.delete(path);
+      const at = new THREE.Vector3().setFromMatrixPosition(sprite.matrixWorld).project(viewer.camera);
+      if (top !== viewer.scene || !seen || at.z > 1) continue;
+      found.push({ sprite, x: at.x, y: at.y, w: sprite.scale.x / (up * viewer.camera.aspect), h: sprite.scale.y / up });
+    }
+    found.sort((a, b) => a.y - b.y);
+    const placed = [];
+    for (const item of found) {
+      let bottom = item.y + 0.4 * item.h;
+      for (let hit = true, tries = 0; hit && tries < 12; tries++) {
+        hit = placed.find(p => Math.abs(p.x - item.x) < (p.w + item.w) / 2 && Math.abs(p.bottom - bottom) < item.h);
+        if (hit) bottom = hit.bottom + 1.05 * item.h;
+      }
+      placed.push({ x: item.x, w: item.w, bottom });
+      item.sprite.center.set(0.5, (item.y - bottom) / item.h);
+    }
+  }
+  const draw = viewer.render.bind(viewer);
+  viewer.render = function () {
+    arrange();
+    draw();
+  };
 
   // Look at a target: from `eye`, or from `direction`, so far away that every one of `points` is in the picture.
   function look(cmd) {
@@ -185,11 +218,12 @@
     const socket = new WebSocket(`ws://${location.host}/socket`);
     socket.binaryType = "arraybuffer";
     let known = false;
-    socket.onopen = () => { known = true; page.ready = true; };
+    socket.onopen = () => { known = true; };
     socket.onmessage = message => {
       try {
         page.take(new Uint8Array(message.data));
       } finally {
+        page.ready = true;
         socket.send("done");
       }
     };

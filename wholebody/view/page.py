@@ -20,16 +20,18 @@ _TEMPLATE = """<!DOCTYPE html>
 <style>
 body {{ margin: 0; background: #dfe3e7; }}
 #meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
-#bar {{ display: none; position: fixed; left: 50%; bottom: 18px; transform: translateX(-50%); gap: 12px; align-items: center;
-  width: min(640px, 90vw); box-sizing: border-box; padding: 8px 14px; border-radius: 10px; background: rgba(255,255,255,.85);
-  font: 13px "Helvetica Neue", Arial, sans-serif; color: #333a42; }}
-#bar button {{ width: 32px; height: 28px; border: 0; border-radius: 6px; background: #4f6f94; color: #fff; cursor: pointer; }}
+#bar {{ display: none; position: fixed; left: 50%; bottom: 18px; transform: translateX(-50%); gap: 12px;
+  align-items: center; width: min(640px, 90vw); box-sizing: border-box; padding: 8px 14px; border-radius: 10px;
+  background: rgba(255,255,255,.85); font: 13px "Helvetica Neue", Arial, sans-serif; color: #333a42; }}
+#bar button {{ width: 32px; height: 28px; border: 0; border-radius: 6px; background: #4f6f94; color: #fff; }}
 #bar input {{ flex: 1; }}
 </style>
 </head>
 <body>
 <div id="meshcat-pane"></div>
-<div id="bar"><button title="play or pause"></button><input type="range" min="0" max="1000" value="0"><span></span></div>
+<div id="bar">
+<button title="play or pause"></button><input type="range" min="0" max="1000" value="0"><span></span>
+</div>
 {picture}
 <script>{meshcat}</script>
 <script>{page}</script>
@@ -61,7 +63,7 @@ def _page(title: str, picture: str) -> str:
 
 @lru_cache(maxsize=1)
 def _meshcat_script() -> str:
-    """meshcat's viewer with three.js in it, found without importing meshcat (which would take IPython along)."""
+    """Meshcat's viewer with three.js in it, found without importing meshcat (which would take IPython along)."""
     found = importlib.util.find_spec("meshcat")
     folder = Path(found.origin).parent if found is not None and found.origin else None
     script = folder / "viewer" / "dist" / "main.min.js" if folder is not None else None

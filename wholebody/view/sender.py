@@ -28,7 +28,7 @@ class ViewerClosedError(WholebodyError):
 
 
 class Sender:
-    """The program's end of a server process. Commands are written to a pipe: nobody else can, and nothing is waited for.
+    """The program's end of a server process. Commands go through a pipe: nobody else can send any, nothing is awaited.
 
     Attributes:
         url: address of the page, on 127.0.0.1.

@@ -1,14 +1,15 @@
 """The process that serves the page and hands every drawing command to the browser tabs that show it.
 
 It runs apart from the program that draws, so that a long computation never freezes the page. It is started as a script
-and imports the standard library and tornado alone. Commands come in over its standard input, so nobody else can send any;
-what it has to tell goes out over its standard output, one JSON object a line. It listens on 127.0.0.1 only, and ends
-when its input ends or its parent is gone.
+and imports the standard library and tornado alone. Commands come in over its standard input, so nobody else can send
+any; what it has to tell goes out over its standard output, one JSON object a line. It listens on 127.0.0.1 only, and
+ends when its input ends or its parent is gone.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import os
 import struct
@@ -202,37 +203,39 @@ class Hub:
 
 def make_application(hub: Hub) -> Any:
     """The web side: the page at /, its socket at /socket, nothing else."""
-    import tornado.web
-    import tornado.websocket
+    from tornado.web import Application, HTTPError, RequestHandler
+    from tornado.websocket import WebSocketHandler
 
-    class LocalOnly(tornado.web.RequestHandler):
+    class LocalOnly(RequestHandler):  # type: ignore[misc]
         """Refuses requests that reached 127.0.0.1 under a foreign name (DNS rebinding)."""
 
         def prepare(self) -> None:
             if self.request.host_name not in HOSTS:
-                raise tornado.web.HTTPError(403)
+                raise HTTPError(403)
 
     class Page(LocalOnly):
         def get(self) -> None:
             self.set_header("Cache-Control", "no-store")
             self.write(hub.page)
 
-    class Tab(LocalOnly, tornado.websocket.WebSocketHandler):
+    class Tab(LocalOnly, WebSocketHandler):  # type: ignore[misc]
         """One open page. It acknowledges each message, and gets the next only then."""
 
         def open(self, *args: str, **kwargs: str) -> None:
             self.set_nodelay(True)
             self.queue = Queue()
             self.queue.waiting = [command.payload for command in hub.store.commands()]
-            self.idle = True
             hub.tabs.add(self)
             tell(tabs=len(hub.tabs))
-            self.send_waiting()
+            self.send()  # even if there is nothing: it tells the page that it is up to date
+
+        def send(self) -> None:
+            self.idle = False
+            self.write_message(bundle(self.queue.take()), binary=True)
 
         def send_waiting(self) -> None:
             if self.idle and self.queue.waiting:
-                self.idle = False
-                self.write_message(bundle(self.queue.take()), binary=True)
+                self.send()
 
         def on_message(self, message: str | bytes) -> None:
             self.idle = True
@@ -244,7 +247,7 @@ def make_application(hub: Hub) -> Any:
             tell(tabs=len(hub.tabs))
             hub.settle()
 
-    return tornado.web.Application([("/", Page), ("/socket", Tab)])
+    return Application([("/", Page), ("/socket", Tab)])
 
 
 async def serve(parent: int) -> None:
@@ -275,8 +278,6 @@ async def serve(parent: int) -> None:
 
 
 if __name__ == "__main__":
-    try:
+    with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
         asyncio.run(serve(int(sys.argv[1])))
-    except (KeyboardInterrupt, BrokenPipeError):
-        pass
     os._exit(0)

@@ -217,4 +217,4 @@ def quaternions(rotations: Array) -> Array:
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     flips = np.sign(np.einsum("ni,ni->n", q[1:], q[:-1]))
     q[1:] *= np.cumprod(np.where(flips == 0, 1.0, flips))[:, None]
-    return q
+    return np.asarray(q)

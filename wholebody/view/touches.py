@@ -37,8 +37,8 @@ def color_contacts(moment: Moment, bodies: Bodies, contacts: Touching) -> None:
 def mark_contacts(moment: Moment, bodies: Bodies, contacts: Touching) -> None:
     """Mark witness points and normals; for penetrations the vector by which the figure's piece would come out.
 
-    A normal starts at the first piece's witness point and leads to the second piece. A penetration vector has the length
-    of the depth, but is drawn at least `style.SHORTEST_DEPTH` long; its label says the depth.
+    A normal starts at the first piece's witness point and leads to the second piece. A penetration vector is as long as
+    the depth, but at least `style.SHORTEST_DEPTH`; its label says the depth.
     """
     for row in range(min(len(contacts.distance), MOST)):
         root = f"{style.CONTACT_NODE}/{row}"

@@ -4,46 +4,43 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 import webbrowser
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from wholebody.errors import InputError
-from wholebody.figures.state import State
+from wholebody.errors import InputError, UnknownNameError
 from wholebody.view import style
-from wholebody.view.aim import aim
-from wholebody.view.bodies import Bodies
-from wholebody.view.browser import Browser
 from wholebody.view.commands import look
-from wholebody.view.goals import Goals
-from wholebody.view.movie import GIF_FASTEST, check_movie, replacing, write_movie
+from wholebody.view.composition import Composition
+from wholebody.view.movie import check_movie, frame_times, replacing, write_movie
 from wholebody.view.page import live_page, static_page
 from wholebody.view.sender import Sender
 from wholebody.view.server import ANIMATION, CAMERA, Command
-from wholebody.view.stage import Marker, Moment, Stage
+from wholebody.view.stage import Stage
+from wholebody.view.studio import Studio
 from wholebody.view.subject import Subject
-from wholebody.view.touches import color_contacts, mark_contacts
 
 Array = NDArray[np.float64]
 
 DEFAULT_DT = 1 / 30  # s: postures without a time step
-MP4_FPS = 30.0
-LARGEST_PICTURE = 8192  # pixels: no software renderer goes beyond
 AIMED_AT = 24  # postures of a motion that the camera takes into account
 
 
 class Viewer:
     """Shows a scene: the posture, ghosts, contacts and penetrations, goals and their errors.
 
-    Nothing is started until it is needed: `open` or `url` start the live page, `picture` and `movie` a headless Chromium,
-    and `save` neither. In the page's controls every folder (figure, objects, contacts, goals, names, ghosts) can be
-    switched off.
+    Nothing is started until it is needed: `open` or `url` start the live page, `picture` and `movie` a headless
+    Chromium, `save` neither. In the page's controls every folder (figure, objects, contacts, goals, names, ghosts) can
+    be switched off.
 
-    Pieces turn orange where they come nearer than `contact_distance` to each other and red where they are inside each other.
+    Pieces turn orange where they come nearer than `contact_distance` to each other, and red where they are inside each
+    other; things are tinted, half-spaces keep their colour. A blue arrow is a contact's normal, from the first piece to
+    the second; a red one is the way out of a penetration.
 
     Example:
         >>> with Viewer(scene) as viewer:          # doctest: +SKIP
@@ -70,27 +67,23 @@ class Viewer:
             title: of the browser's tab.
 
         Raises:
-            InputError: the distance is not a finite number, or there is no thing of a name in `see_through`.
+            InputError: the distance is not a finite number.
+            UnknownNameError: there is no thing of a name in `see_through`.
         """
         if not math.isfinite(contact_distance):
             raise InputError(f"contact_distance is a finite distance in metres, not {contact_distance}")
         for name in see_through:
             if name not in scene.objects:
-                raise InputError(f"see_through: the scene has no thing {name!r}; it has {', '.join(scene.objects) or 'none'}")
-        self.scene = scene
-        self.contact_distance = contact_distance
-        self.names = names
+                raise UnknownNameError("object", name, scene.objects, "see_through")
         self.title = title
-        self._see_through = tuple(see_through)
         self._stage = Stage()
-        self._bodies: Bodies | None = None
-        self._state = State(scene.model)
-        self._goals: Goals | None = None
+        self._composition = Composition(scene, self._stage, contact_distance, tuple(see_through), names)
+        self._studio = Studio()
+        self._sender: Sender | None = None
         self._camera: Command | None = None
         self._seen: list[Array] = []
+        self._ghosts: list[Array] = []
         self._motion: tuple[int, float] | None = None
-        self._sender: Sender | None = None
-        self._browser: Browser | None = None
 
     # ---- what is shown
 
@@ -104,9 +97,9 @@ class Viewer:
         Raises:
             InputError: q has the wrong shape or is not finite.
         """
-        moment = self._moment(np.asarray(q, dtype=float), problem)
-        self._motion = None
-        self._seen = [np.array(q, dtype=float)]
+        posture = self._composition.checked(q)
+        moment = self._composition.moment(posture, problem)
+        self._seen, self._motion = [posture], None
         if self._stage.store.camera is None:
             self._stage.do(self._aim())
         self._stage.show(moment)
@@ -121,24 +114,22 @@ class Viewer:
             repeat: how often it is played; `math.inf` for ever.
 
         Raises:
-            InputError: there is no posture, one has the wrong shape, or the time step is not positive.
+            InputError: there is no posture, one has the wrong shape, or the time step or the repeats are not positive.
         """
-        postures = np.asarray(getattr(motion, "q", motion), dtype=float)
-        if postures.ndim != 2 or not len(postures):
-            raise InputError(f"a motion is postures of shape (n, nq) with n > 0, not {postures.shape}; give a list of postures")
+        postures = [self._composition.checked(q) for q in getattr(motion, "q", motion)]
         step = float(getattr(motion, "dt", DEFAULT_DT) if dt is None else dt)
-        if not (math.isfinite(step) and step > 0):
-            raise InputError(f"dt is a positive number of seconds, not {step}")
-        moments = [self._moment(q, problem) for q in postures]
+        if not postures:
+            raise InputError("a motion has at least one posture; give a list of postures, each of shape (nq,)")
+        if not (math.isfinite(step) and step > 0 and repeat > 0):
+            raise InputError(f"dt and repeat are positive, not {step} s and {repeat}")
+        moments = [self._composition.moment(q, problem) for q in postures]
+        self._motion = (len(postures), step)
         chosen = np.unique(np.linspace(0, len(postures) - 1, AIMED_AT).astype(int))
         self._seen = [postures[index] for index in chosen]
-        self._motion = (len(postures), step)
         self._stage.do(self._aim())
         self._stage.play(moments, step, repeat)
 
-    def ghosts(
-        self, postures: Sequence[ArrayLike], *, color: style.Color = style.GHOST
-    ) -> None:
+    def ghosts(self, postures: Sequence[ArrayLike], *, color: style.Color = style.GHOST) -> None:
         """Show more postures of the figure, transparent; in place of the ghosts that were there.
 
         Args:
@@ -148,11 +139,8 @@ class Viewer:
         Raises:
             InputError: a posture has the wrong shape or is not finite.
         """
-        bodies = self._build()
-        self._stage.remove(style.GHOST_NODE)
-        for number, q in enumerate(postures):
-            self._state.update(np.asarray(q, dtype=float))
-            bodies.ghost(self._stage, number, self._state.data, color)
+        self._ghosts = [self._composition.checked(q) for q in postures]
+        self._composition.ghosts(self._ghosts, color)
         self._stage.flush()
 
     def look(self, eye: ArrayLike | None = None, target: ArrayLike | None = None) -> None:
@@ -167,13 +155,12 @@ class Viewer:
         """
         if (eye is None) != (target is None):
             raise InputError("look takes an eye and a target, or neither; give both")
-        if eye is None or target is None:
-            self._camera = None
-        else:
-            places = [np.asarray(place, dtype=float) for place in (eye, target)]
-            if any(place.shape != (3,) or not np.isfinite(place).all() for place in places) or np.allclose(*places):
+        self._camera = None
+        if eye is not None and target is not None:
+            here, there = np.asarray(eye, dtype=float), np.asarray(target, dtype=float)
+            if not (here.shape == there.shape == (3,) and 1e-6 < np.linalg.norm(here - there) < math.inf):
                 raise InputError(f"look takes two different places of three finite numbers, not {eye} and {target}")
-            self._camera = look(places[1], style.FIELD_OF_VIEW, eye=places[0])
+            self._camera = look(there, style.FIELD_OF_VIEW, eye=here)
         if self._seen:
             self._stage.do(self._aim())
             self._stage.flush()
@@ -187,55 +174,25 @@ class Viewer:
         Raises:
             ViewerClosedError: the server could not be started.
         """
-        if self._sender is None:
-            self._sender = Sender(live_page(self.title))
-            self._stage.connect(self._sender)
-        return self._sender.url
+        return self._live().url
 
     def open(self) -> Viewer:
-        """Show the live page in the user's browser, and print its address in case there is none."""
-        url = self.url
-        print(f"the scene is at {url}")
-        webbrowser.open(url)
+        """Show the live page in the user's browser; where there is none, say its address."""
+        if not webbrowser.open(self.url):
+            sys.stdout.write(f"open {self.url} in a browser to see the scene\n")
         return self
 
     def wait(self, timeout: float = 60.0) -> bool:
-        """Wait until a browser shows the live page.
-
-        Args:
-            timeout: seconds.
-
-        Returns:
-            Whether one does.
-        """
+        """Wait up to `timeout` seconds until a browser shows the live page; return whether one does."""
         return self._live().wait(timeout)
 
     def wait_until_closed(self, timeout: float = math.inf) -> bool:
-        """Wait until the last browser tab with the live page is closed (or Ctrl-C).
-
-        Args:
-            timeout: seconds.
-
-        Returns:
-            Whether it is closed.
-        """
+        """Wait up to `timeout` seconds until no browser shows the live page any more; return whether that is so."""
         return self._live().wait_until_closed(timeout)
 
     def sync(self, timeout: float = 10.0) -> bool:
-        """Wait until every open tab has drawn all that was shown.
-
-        Args:
-            timeout: seconds.
-
-        Returns:
-            Whether they have.
-        """
+        """Wait up to `timeout` seconds until every open tab has drawn all that was shown; return whether they have."""
         return self._live().sync(timeout)
-
-    def _live(self) -> Sender:
-        _ = self.url
-        assert self._sender is not None
-        return self._sender
 
     # ---- files
 
@@ -248,11 +205,10 @@ class Viewer:
         Raises:
             InputError: nothing is shown yet, or the file cannot be written.
         """
-        self._shown()
-        path = Path(path)
-        with replacing(path) as temporary:
-            temporary.write_text(static_page(self._commands(), self.title), encoding="utf-8")
-        return path
+        page = static_page(self._commands(), self.title)
+        with replacing(Path(path)) as temporary:
+            temporary.write_text(page, encoding="utf-8")
+        return Path(path)
 
     def picture(self, path: str | os.PathLike[str], size: tuple[int, int] = (960, 720)) -> Path:
         """Write what is shown as a PNG, drawn by a headless Chromium. A motion is shown at its beginning.
@@ -268,12 +224,10 @@ class Viewer:
             InputError: nothing is shown yet, the size is out of range, or the file cannot be written.
             MissingPackageError: there is no Chromium.
         """
-        self._shown()
-        path = Path(path)
-        with replacing(path) as temporary:
-            page = static_page([command for command in self._commands() if command.op != ANIMATION])
-            temporary.write_bytes(self._opened(page, size).capture())
-        return path
+        page = static_page([command for command in self._commands() if command.op != ANIMATION])
+        with replacing(Path(path)) as temporary:
+            temporary.write_bytes(self._studio.picture(page, size))
+        return Path(path)
 
     def movie(self, path: str | os.PathLike[str], size: tuple[int, int] = (640, 480), fps: float | None = None) -> Path:
         """Write the motion that was played last as a GIF or an MP4, by the ending of the path.
@@ -281,7 +235,7 @@ class Viewer:
         Args:
             path: of the file.
             size: width and height, pixels.
-            fps: pictures per second; at most 25 for a GIF and 30 for an MP4 when left out.
+            fps: pictures per second; when left out the motion's own, at most 25 in a GIF and 30 in an MP4.
 
         Returns:
             The path.
@@ -290,24 +244,14 @@ class Viewer:
             InputError: no motion is shown, the ending is another, or a number is out of range.
             MissingPackageError: there is no Chromium, or no ffmpeg for an MP4.
         """
-        self._shown()
-        path = check_movie(path)
+        page = static_page(self._commands())
         if self._motion is None:
             raise InputError("a movie needs a motion; call play() before movie()")
         count, dt = self._motion
-        if fps is None:
-            fps = min(1 / dt, GIF_FASTEST if path.suffix.lower() == ".gif" else MP4_FPS)
-        if not (math.isfinite(fps) and 0 < fps <= 100):
-            raise InputError(f"fps is between 0 and 100 pictures per second, not {fps}")
-        browser = self._opened(static_page(self._commands()), size)
-        pictures = math.floor((count - 1) * dt * fps + 1e-9) + 1
-
-        def frames() -> Iterator[bytes]:
-            for number in range(pictures):
-                browser.evaluate(f"wholebody.seek({number / fps!r})")
-                yield browser.capture()
-
-        write_movie(path, frames(), fps)
+        path = check_movie(path)
+        times, fps = frame_times(path, count, dt, fps)
+        with replacing(path) as temporary:
+            write_movie(temporary, self._studio.pictures(page, size, times), fps)
         return path
 
     def close(self) -> None:
@@ -315,9 +259,8 @@ class Viewer:
         self._stage.disconnect()
         if self._sender is not None:
             self._sender.close()
-        if self._browser is not None:
-            self._browser.close()
-        self._sender = self._browser = None
+        self._sender = None
+        self._studio.close()
 
     def __enter__(self) -> Viewer:
         """Return the viewer."""
@@ -329,58 +272,18 @@ class Viewer:
 
     # ---- inside
 
-    def _build(self) -> Bodies:
-        """Draw the pieces, anew if things came or went."""
-        if self._bodies is None or self._bodies.revision != self.scene.revision:
-            self._bodies = Bodies(self.scene, self._see_through)
-            self._bodies.build(self._stage)
-        return self._bodies
-
-    def _moment(self, q: Array, problem: Any) -> Moment:
-        bodies = self._build()
-        state = self._state.update(q)
-        moment = Moment()
-        bodies.pose(moment, state.data)
-        contacts = self.scene.contacts(q, within=self.contact_distance)
-        color_contacts(moment, bodies, contacts)
-        mark_contacts(moment, bodies, contacts)
-        self._goals = Goals(self.scene, problem) if problem is not None else None
-        if self._goals is not None:
-            self._goals.mark(moment, state)
-        if self.names:
-            for path, (name, top) in bodies.tops(state.data).items():
-                matrix = np.eye(4)
-                matrix[:3, 3] = top
-                moment.markers[path] = (Marker("label", style.LABEL, style.LABEL_SIZE, name), matrix)
-        return moment
+    def _live(self) -> Sender:
+        if self._sender is None:
+            self._sender = Sender(live_page(self.title))
+            self._stage.connect(self._sender)
+        return self._sender
 
     def _aim(self) -> Command:
         """The camera that was asked for, else one that looks at the figure in what was shown last."""
-        if self._camera is not None:
-            return self._camera
-        bodies, figure, things = self._build(), [], []
-        for q in self._seen:
-            state = self._state.update(q)
-            figure.append(bodies.corners(state.data, things=False))
-            things.append(bodies.corners(state.data, things=True))
-            if self._goals is not None:
-                figure.append(self._goals.targets(state))
-        return aim(np.concatenate(figure), np.concatenate(things))
+        return self._camera or self._composition.aim([*self._seen, *self._ghosts])
 
     def _commands(self) -> list[Command]:
         """What draws the picture anew, with the camera on the figure as it is now."""
-        return [self._aim() if command.op == CAMERA else command for command in self._stage.store.commands()]
-
-    def _shown(self) -> None:
         if not self._seen:
             raise InputError("nothing is shown yet; call show(q) or play(motion) first")
-
-    def _opened(self, page: str, size: tuple[int, int]) -> Browser:
-        """The headless browser with this page in it."""
-        if len(size) != 2 or not all(isinstance(n, (int, np.integer)) and 16 <= n <= LARGEST_PICTURE for n in size):
-            raise InputError(f"size is width and height from 16 to {LARGEST_PICTURE} pixels, not {size}")
-        if self._browser is None:
-            self._browser = Browser()
-        self._browser.resize((int(size[0]), int(size[1])))
-        self._browser.open_html(page)
-        return self._browser
+        return [self._aim() if command.op == CAMERA else command for command in self._stage.store.commands()]

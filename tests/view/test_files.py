@@ -1,0 +1,163 @@
+"""Pictures and movies as files, and what is said where they cannot be made."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from wholebody.errors import InputError, MissingPackageError, UnknownNameError
+from wholebody.view import Viewer, style
+from wholebody.view.browser import find_chromium
+
+browser_needed = pytest.mark.browser
+
+
+@browser_needed
+def test_pictures_and_movies(exhibit: Any, chromium: str, tmp_path: Path) -> None:
+    with Viewer(exhibit) as viewer:
+        q = exhibit.posture(1)
+        viewer.show(q)
+        path = viewer.picture(tmp_path / "scene.png", size=(401, 300))
+        picture = Image.open(path)
+        assert picture.size == (401, 300)
+        values = np.asarray(picture.convert("RGB")).astype(float)
+        tan = np.array(style.FIGURE[:3]) / np.linalg.norm(style.FIGURE[:3])
+        alike = (values @ tan) / np.linalg.norm(values, axis=2)
+        figure = np.argwhere(alike > 0.999)
+        assert len(figure) > 500
+        rows, columns = (figure.min(axis=0) + figure.max(axis=0)) / 2
+        assert abs(rows - 150) < 45
+        assert abs(columns - 200) < 60
+        assert figure.min() > 3  # all of it is in the picture
+
+        viewer.play([exhibit.posture(1 + seed % 3) for seed in range(7)], dt=0.1)
+        with Image.open(viewer.movie(tmp_path / "scene.gif", size=(96, 64))) as movie:
+            assert (movie.size, movie.n_frames, movie.info["duration"]) == ((96, 64), 7, 100)  # type: ignore[attr-defined]
+        viewer.picture(tmp_path / "still.png", size=(401, 300))  # a motion is shown at its beginning
+        still = np.asarray(Image.open(tmp_path / "still.png").convert("RGB")).astype(int)
+        assert still.std() > 15
+        if shutil.which("ffmpeg") and shutil.which("ffprobe"):
+            viewer.movie(tmp_path / "scene.mp4", size=(97, 64), fps=20)
+            asked = [
+                "ffprobe",
+                "-v",
+                "error",
+                "-count_frames",
+                "-show_entries",
+                "stream=nb_read_frames,width,r_frame_rate",
+            ]
+            found = subprocess.run(
+                [*asked, "-of", "csv=p=0", tmp_path / "scene.mp4"],
+                check=True,
+                capture_output=True,
+                text=True,
+                timeout=60,
+            )
+            assert found.stdout.strip() == "98,20/1,13"
+    assert sorted(os.listdir(tmp_path))[0][0] != "."  # no temporary file is left
+
+
+ORPHAN = """
+import time
+from wholebody.view.browser import Browser
+browser = Browser()
+print(browser._pid, browser._folder, flush=True)
+time.sleep(60)
+"""
+
+
+@browser_needed
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads Linux's table of processes")
+def test_the_browser_ends_when_its_parent_is_killed(chromium: str) -> None:
+    program = subprocess.Popen([sys.executable, "-c", ORPHAN], stdout=subprocess.PIPE, text=True)
+    try:
+        assert program.stdout is not None
+        pid, folder = program.stdout.readline().split()
+        program.kill()
+        program.wait()
+        end = time.monotonic() + 10.0
+        while (alive := "Z" not in _state(pid)) and time.monotonic() < end:
+            time.sleep(0.05)
+        assert not alive
+        shutil.rmtree(folder, ignore_errors=True)
+    finally:
+        program.kill()
+        program.wait()
+        if program.stdout is not None:
+            program.stdout.close()
+
+
+def _state(pid: str) -> str:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return "Z"
+
+
+def test_without_a_browser_pages_are_saved_and_pictures_refused(
+    exhibit: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("WHOLEBODY_CHROMIUM", "/nowhere/chromium")
+    assert find_chromium() is None
+    viewer = Viewer(exhibit)
+    viewer.play([exhibit.posture(1), exhibit.posture(2)], dt=0.1)
+    viewer.save(tmp_path / "scene.html")
+    for attempt in (lambda: viewer.picture(tmp_path / "x.png"), lambda: viewer.movie(tmp_path / "x.gif")):
+        with pytest.raises(MissingPackageError, match="apt-get install chromium"):
+            attempt()
+    assert os.listdir(tmp_path) == ["scene.html"]
+
+
+def test_saving_the_same_twice_gives_the_same_bytes(exhibit: Any, tmp_path: Path) -> None:
+    texts = []
+    for _ in range(2):
+        viewer = Viewer(exhibit, names=True)
+        viewer.play([exhibit.posture(1), exhibit.posture(2)], dt=0.1)
+        texts.append(viewer.save(tmp_path / "scene.html").read_bytes())
+    assert texts[0] == texts[1]
+
+
+def test_mistakes_are_named(exhibit: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    viewer = Viewer(exhibit)
+    q = exhibit.posture(1)
+    with pytest.raises(InputError, match="nothing is shown"):
+        viewer.save(tmp_path / "x.html")
+    with pytest.raises(InputError, match="shape"):
+        viewer.show(q[:-1])
+    with pytest.raises(InputError, match="not finite"):
+        viewer.show(np.full_like(q, np.nan))
+    with pytest.raises(InputError, match="list of postures"):
+        viewer.play([])
+    with pytest.raises(InputError, match="dt"):
+        viewer.play([q], dt=0.0)
+    viewer.show(q)
+    with pytest.raises(InputError, match="call play"):
+        viewer.movie(tmp_path / "x.gif")
+    viewer.play([q])
+    with pytest.raises(InputError, match=r"\.gif or a \.mp4"):
+        viewer.movie(tmp_path / "x.avi")
+    with pytest.raises(InputError, match="fps"):
+        viewer.movie(tmp_path / "x.gif", fps=0)
+    with pytest.raises(InputError, match="size"):
+        viewer.picture(tmp_path / "x.png", size=(0, 100))
+    with pytest.raises(InputError, match="make the folder"):
+        viewer.save(tmp_path / "absent" / "x.html")
+    with pytest.raises(InputError, match="both"):
+        viewer.look(eye=(1, 0, 0))
+    with pytest.raises(InputError, match="different places"):
+        viewer.look((1, 0, 0), (1, 0, 0))
+    with pytest.raises(UnknownNameError, match="table"):
+        Viewer(exhibit, see_through=["tabel"])
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(MissingPackageError, match="ffmpeg"):
+        viewer.movie(tmp_path / "x.mp4")
+    assert os.listdir(tmp_path) == []

@@ -1,0 +1,54 @@
+"""The human among real things, as users see it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from wholebody.figures import load
+from wholebody.geometry.shapes import Box, HalfSpace, Sphere
+from wholebody.scene import Scene
+from wholebody.view import Viewer
+from wholebody.view.browser import Browser
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.mark.parametrize("detail", ["capsules", "hulls"])
+def test_the_human_in_a_scene_is_where_pinocchio_says(
+    detail: str, browser: Browser, as_pinocchio_says: Any, nodes: Any, tmp_path: Path
+) -> None:
+    figure = load("human", detail=detail)
+    scene = Scene(figure)
+    scene.add(HalfSpace((0.0, 0.0, 1.0)), name="floor")
+    scene.add(Box((0.5, 1.2, 0.03)), name="table", at=(0.6, 0.0, 0.75))
+    scene.attach(Sphere(0.08), to="thorax", name="pouch", at=(0.25, 0.0, 0.0))
+    viewer = Viewer(scene)
+    viewer.show(figure.posture("standing"))
+    scene.move("table", at=(0.8, 0.1, 0.7, 0.0, 0.0, 0.38268343, 0.92387953))
+    q = figure.posture("arms_forward")
+    viewer.show(q)
+    browser.open(viewer.save(tmp_path / "scene.html").as_uri())
+    as_pinocchio_says(scene, q)
+    scene.remove("pouch")
+    viewer.show(q)
+    browser.open(viewer.save(tmp_path / "scene.html").as_uri())
+    as_pinocchio_says(scene, q)
+    assert nodes(["/objects/pouch"]) == [None]
+
+
+def test_a_picture_of_the_human(chromium: str, tmp_path: Path) -> None:
+    figure = load("human")
+    scene = Scene(figure).add(HalfSpace((0.0, 0.0, 1.0)), name="floor")
+    with Viewer(scene) as viewer:
+        viewer.show(figure.posture("standing"))
+        values = np.asarray(Image.open(viewer.picture(tmp_path / "x.png", (320, 240))).convert("RGB")).astype(int)
+    middle = values[60:200, 150:170].reshape(-1, 3)
+    tan = (middle[:, 0] > middle[:, 1] + 15) & (middle[:, 1] > middle[:, 2] + 10)
+    assert tan.mean() > 0.4
+    assert values.max() <= 255
+    assert (values.min(axis=2) > 250).mean() < 0.02  # nothing is burnt out

@@ -1,0 +1,93 @@
+"""Turns a posture of a scene into a moment to show: pieces, contacts, goals, names, and where to look from."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.figures.state import State
+from wholebody.view import style
+from wholebody.view.aim import aim
+from wholebody.view.bodies import Bodies
+from wholebody.view.goals import Goals
+from wholebody.view.server import Command
+from wholebody.view.stage import Marker, Moment, Stage
+from wholebody.view.subject import Subject
+from wholebody.view.touches import color_contacts, mark_contacts
+
+Array = NDArray[np.float64]
+
+
+class Composition:
+    """A scene on a stage."""
+
+    def __init__(
+        self, scene: Subject, stage: Stage, contact_distance: float, see_through: Collection[str], names: bool
+    ) -> None:
+        """Keep what to draw and how; nothing is drawn before the first posture.
+
+        Args:
+            scene: what is shown.
+            stage: where it is shown.
+            contact_distance: pieces nearer than this are shown as touching, metres.
+            see_through: names of things to draw transparent.
+            names: write the names of things beside them.
+        """
+        self._scene, self._stage = scene, stage
+        self._contact_distance, self._see_through, self._names = contact_distance, see_through, names
+        self._state = State(scene.model)
+        self._bodies: Bodies | None = None
+        self._goals: Goals | None = None
+
+    @property
+    def bodies(self) -> Bodies:
+        """The pieces; drawn when they are first asked for, and anew after things came or went."""
+        if self._bodies is None or self._bodies.revision != self._scene.revision:
+            self._bodies = Bodies(self._scene, self._see_through)
+            self._bodies.build(self._stage)
+        return self._bodies
+
+    def checked(self, q: Any) -> Array:
+        """Copy of a posture (nq,).
+
+        Raises:
+            InputError: it has the wrong shape or is not finite.
+        """
+        return np.array(self._state.update(np.asarray(q, dtype=float)).q)
+
+    def moment(self, q: Array, problem: Any) -> Moment:
+        """What is shown at a posture, with the goals of a problem if there is one."""
+        bodies, state, moment = self.bodies, self._state.update(q), Moment()
+        bodies.pose(moment, state.data)
+        contacts = self._scene.contacts(q, within=self._contact_distance)
+        color_contacts(moment, bodies, contacts)
+        mark_contacts(moment, bodies, contacts)
+        self._goals = Goals(self._scene, problem) if problem is not None else None
+        if self._goals is not None:
+            self._goals.mark(moment, state)
+        if self._names:
+            for path, (name, top) in bodies.tops(state.data).items():
+                matrix = np.eye(4)
+                matrix[:3, 3] = top
+                moment.markers[path] = (Marker("label", style.LABEL, style.LABEL_SIZE, name), matrix)
+        return moment
+
+    def ghosts(self, postures: Iterable[Array], color: style.Color) -> None:
+        """Draw the figure, transparent, at these postures, in place of earlier ghosts."""
+        self._stage.remove(style.GHOST_NODE)
+        for number, q in enumerate(postures):
+            self.bodies.ghost(self._stage, number, self._state.update(q).data, color)
+
+    def aim(self, postures: Iterable[Array]) -> Command:
+        """Look at the figure so that it is in the picture at all of these postures, and the goals shown last too."""
+        figure, things = [], []
+        for q in postures:
+            state = self._state.update(q)
+            figure.append(self.bodies.corners(state.data, things=False))
+            things.append(self.bodies.corners(state.data, things=True))
+            if self._goals is not None:
+                figure.append(self._goals.targets(state))
+        return aim(np.concatenate(figure), np.concatenate(things))
