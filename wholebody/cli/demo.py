@@ -1,0 +1,53 @@
+"""`wholebody demo`: pose one of the tasks that come with the package."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+HELP = "pose a task that comes with the package"
+DESCRIPTION = """\
+Pose a task that comes with the package (by default a person who reaches between the boards of a shelf), and say where
+the pictures are. The task file is a good one to copy and change."""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser("demo", help=HELP, description=DESCRIPTION, formatter_class=shape)
+    parser.add_argument("name", nargs="?", default="shelf", metavar="NAME", help="which task (default: shelf)")
+    parser.add_argument("--list", action="store_true", help="list the tasks")
+    parser.add_argument("--out", type=Path, default=Path("demo"), metavar="DIR", help="where to write (default: demo)")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """List the tasks, or pose one."""
+    from wholebody.cli.pose import pose
+    from wholebody.errors import UnknownNameError
+
+    tasks = shipped_tasks()
+    if arguments.list:
+        for name, path in tasks.items():
+            print(f"{name:24} {path}")
+        return 0
+    if arguments.name not in tasks:
+        raise UnknownNameError("demo", arguments.name, tasks)
+    code = pose(tasks[arguments.name], None, arguments.out)
+    print(f"the task is {tasks[arguments.name]}; to turn the scene about, open {arguments.out / 'scene.html'}")
+    return code
+
+
+def shipped_tasks() -> dict[str, Path]:
+    """Task files by name: inside an installed package, or among the examples of a checkout.
+
+    Raises:
+        WholebodyError: the installation lacks them.
+    """
+    from wholebody.errors import WholebodyError
+
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package / "examples", package.parent / "examples" / "tasks"):
+        if (folder / "shelf.toml").is_file():
+            return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    raise WholebodyError(f"there are no examples in or beside {package}; install wholebody again")

@@ -1,0 +1,45 @@
+"""`wholebody doctor`: print whether this installation is sound."""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "check this installation: versions, methods, QP solvers, tools"
+DESCRIPTION = """\
+Print the versions of all packages, use every method and QP solver once, and name wrong combinations and search paths
+with what mends them. Ends with exit code 1 when something is wrong; what is absent but not needed is no fault."""
+
+_MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[red]broken[/]"}
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    commands.add_parser("doctor", help=HELP, description=DESCRIPTION, formatter_class=shape).set_defaults(run=run)
+
+
+def run(_: argparse.Namespace) -> int:
+    """Examine and print; 1 where there are faults."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    from wholebody.doctor import examine
+    from wholebody.version import __version__
+
+    console = Console()
+    with console.status("trying everything once (about ten seconds)"):
+        report = examine()
+    console.print(f"[bold]wholebody {__version__}[/], {report.python}", highlight=False, soft_wrap=True)
+    made = Table(box=None, padding=(0, 2, 0, 0), header_style="dim")
+    for column in ("kind", "name", "", "detail", "to have it"):
+        made.add_column(column, overflow="fold")
+    for entry in report.entries:
+        mend = entry.mend if entry.state != "works" else ""
+        made.add_row(entry.kind, entry.name, _MARKS[entry.state], escape(entry.detail), escape(mend))
+    console.print(made)
+    for fault, mend in report.faults:
+        console.print(f"[red]wrong:[/] {escape(fault)}\n  mend: {escape(mend)}", highlight=False, soft_wrap=True)
+    if report.healthy:
+        console.print("[green]nothing is wrong[/]")
+    return 0 if report.healthy else 1

@@ -1,0 +1,65 @@
+"""`wholebody figure`: describe a figure, or write a person of given size as a URDF."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+HELP = "describe a figure, or write a person as a URDF"
+DESCRIPTION = """\
+List the joints with their limits, the frames to reach with, groups and postures of a figure:
+human, avatar, hand, or the path of a URDF. With --out, write a person as a URDF instead."""
+EPILOG = """\
+examples:
+  wholebody figure human --sex female --stature 1.62 --mass 60
+  wholebody figure human --sex female --stature 1.62 --mass 60 --out small-woman.urdf
+  wholebody figure robot.urdf"""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser("figure", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
+    parser.add_argument("name", metavar="FIGURE", help="human, avatar, hand, or the path of a URDF")
+    parser.add_argument("--sex", choices=("male", "female"), help="of a person (default: male)")
+    parser.add_argument("--stature", type=float, metavar="M", help="height of a person, m (default: median)")
+    parser.add_argument("--mass", type=float, metavar="KG", help="of a person, kg (default: what the stature suggests)")
+    parser.add_argument(
+        "--detail", choices=("spheres", "capsules", "hulls"), help="of the geometry (default: capsules)"
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE.urdf", help="write a person's URDF to this file")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Describe or write."""
+    from rich.console import Console
+
+    from wholebody.cli.tables import show_figure
+    from wholebody.figures import load
+
+    given: dict[str, Any] = {name: getattr(arguments, name) for name in ("sex", "stature", "mass", "detail")}
+    options = {name: value for name, value in given.items() if value is not None}
+    if arguments.out is not None:
+        return _write(arguments.name, options, arguments.out)
+    show_figure(Console(), load(arguments.name, **options))
+    return 0
+
+
+def _write(name: str, options: dict[str, Any], out: Path) -> int:
+    from wholebody.errors import InputError
+    from wholebody.figures.anthropometry import body
+    from wholebody.figures.shipping import write_human
+
+    if name != "human" or "detail" in options:
+        raise InputError("--out writes the person in capsules; write: wholebody figure human --out FILE.urdf")
+    if out.suffix != ".urdf":
+        raise InputError(f"--out: {out} does not end in .urdf; give it that ending")
+    person = body(options.get("sex", "male"), options.get("stature"), options.get("mass"))
+    try:
+        write_human(out, person)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror}); give another place") from None
+    print(f"wrote {out}: {person.sex}, {person.stature:.3f} m, {person.mass:.1f} kg")
+    return 0

@@ -1,0 +1,57 @@
+"""The entry of the command `wholebody`: finds the command, runs it, and turns errors into one sentence."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+
+from wholebody.cli import demo, doctor, figure, pose, show
+from wholebody.errors import WholebodyError
+from wholebody.version import __version__
+
+DESCRIPTION = """\
+Pose whole bodies among things: people, avatars, hands and robots, in contact and never inside.
+
+A task file (TOML) names a figure, the things around it and what to reach; `wholebody pose` finds a posture that
+reaches it, touches and never penetrates, judges it independently, and draws it. Begin with: wholebody demo"""
+
+EXIT_CODES = """\
+exit codes:
+  0  done
+  1  done, but the answer is not what was asked for: a goal out of reach, an unsound installation
+  2  something in the command, a task or another file is wrong; the message says what, where, and how to mend it"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands."""
+    shape = argparse.RawDescriptionHelpFormatter
+    top = argparse.ArgumentParser(prog="wholebody", description=DESCRIPTION, epilog=EXIT_CODES, formatter_class=shape)
+    top.add_argument("--version", action="version", version=f"wholebody {__version__}")
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for command in (pose, show, figure, demo, doctor):
+        command.add_to(commands)
+    return top
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        argv: the arguments; those of the process if left out.
+
+    Returns:
+        The exit code: 0, 1 or 2 (see `EXIT_CODES`), 130 after Ctrl-C.
+    """
+    arguments = parser().parse_args(argv)
+    try:
+        return int(arguments.run(arguments))
+    except WholebodyError as error:
+        print(f"wholebody: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:  # the reader of our output, such as head, has had enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0

@@ -1,0 +1,56 @@
+"""Scene and picture of a posture, into a folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError, MissingPackageError
+from wholebody.problem import Problem
+from wholebody.taskfile.task import View
+from wholebody.view import Viewer
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, before anything is computed.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made ({error.strerror}); give another folder with --out") from None
+
+
+def viewer_of(problem: Problem, view: View, title: str) -> Viewer:
+    """A viewer of the problem's scene, its camera as the task asks."""
+    viewer = Viewer(problem.scene, see_through=view.see_through, title=title)
+    if view.eye is not None:
+        viewer.look(view.eye, view.target)
+    return viewer
+
+
+def draw(problem: Problem, q: NDArray[np.float64], view: View, folder: Path, title: str) -> tuple[list[Path], str]:
+    """Write scene.html and, where there is a Chromium, scene.png.
+
+    Args:
+        problem: whose scene and goals are drawn.
+        q: (nq,) the posture.
+        view: the camera.
+        folder: where to write; it exists.
+        title: of the page.
+
+    Returns:
+        The files, and a sentence for people where a picture could not be drawn.
+    """
+    with viewer_of(problem, view, title) as viewer:
+        viewer.show(q, problem=problem)
+        written = [viewer.save(folder / "scene.html")]
+        try:
+            written.append(viewer.picture(folder / "scene.png"))
+        except MissingPackageError as error:
+            return written, f"no picture: {error}"
+    return written, ""

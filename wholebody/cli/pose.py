@@ -1,0 +1,82 @@
+"""`wholebody pose`: solve the problem of a task file, and write posture, scene and picture."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+HELP = "find a posture for a task file"
+DESCRIPTION = """\
+Find a posture for a task file, print how good it is, and write into a folder:
+
+  result.json   the posture, joints by name (rad), and its assessment
+  scene.html    the scene, for any browser, without a network
+  scene.png     a picture of it (needs Chromium)
+
+docs/taskfile.md lists all that a task file can say."""
+EPILOG = """\
+examples:
+  wholebody pose shelf.toml
+  wholebody pose shelf.toml --method qp --out results/shelf
+  wholebody pose shelf.toml --json | jq .joints"""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser("pose", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
+    parser.add_argument("task", type=Path, metavar="TASK.toml", help="the task file")
+    parser.add_argument("--method", metavar="NAME", help="method to use instead of the file's: qp")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON instead of tables")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Pose, report and write; 1 where the posture is not a solution."""
+    out = arguments.out or Path("out") / arguments.task.stem
+    return pose(arguments.task, arguments.method, out, as_json=arguments.json)
+
+
+def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False) -> int:
+    """Pose the figure of a task file.
+
+    Args:
+        path: the task file.
+        method: name of the method, None for what the file asks for.
+        out: folder to write to; made if absent.
+        as_json: print the result as JSON instead of tables.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        WholebodyError: the task cannot be read, or the folder cannot be written to.
+    """
+    from rich.console import Console
+
+    from wholebody.cli import picture, result, tables
+    from wholebody.methods.solve import method_named, solve
+    from wholebody.taskfile import read_task
+
+    console = Console()
+    notes = Console(stderr=True) if as_json else console
+    with notes.status("reading the task"):
+        task = read_task(path)
+        chosen = method_named(method) if method else task.method
+    picture.make_folder(out)
+    with notes.status("posing"):
+        solution = solve(task.problem, chosen)
+    text = result.as_json(result.describe(task, solution, out))
+    result.write(out / "result.json", text)
+    if as_json:
+        print(text, end="")
+    else:
+        tables.show_solution(console, task, solution)
+    with notes.status("drawing"):
+        written, note = picture.draw(task.problem, solution.q, task.view, out, task.title)
+    for file in (out / "result.json", *written):
+        notes.print(f"wrote {file}", highlight=False, soft_wrap=True)
+    if note:
+        notes.print(note, highlight=False, soft_wrap=True)
+    return 0 if solution.solved else 1

@@ -1,0 +1,80 @@
+"""`wholebody show`: look at a figure, a task before it is solved, or a result."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from wholebody.problem import Problem
+    from wholebody.taskfile.task import View
+
+HELP = "look at a figure, a task or a result"
+DESCRIPTION = """\
+Show in a browser, until its tab is closed (or Ctrl-C):
+
+  a figure   human, avatar, hand, or the path of a URDF
+  a task     a task file, as it starts, with its goals
+  a result   result.json, as `wholebody pose` wrote it"""
+EPILOG = """\
+examples:
+  wholebody show human --posture sitting
+  wholebody show out/shelf/result.json
+  wholebody show shelf.toml --save shelf.png"""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser("show", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
+    parser.add_argument("what", metavar="FIGURE|TASK|RESULT", help="what to show")
+    parser.add_argument("--posture", metavar="NAME", help="a posture of the figure by name")
+    parser.add_argument("--save", type=Path, metavar="FILE", help="write FILE.html or FILE.png; open no browser")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Show, and wait until it is closed."""
+    from wholebody.cli.picture import viewer_of
+    from wholebody.errors import InputError
+
+    save: Path | None = arguments.save
+    if save is not None and save.suffix.lower() not in (".html", ".png"):
+        raise InputError(f"--save: {save} ends in neither .html nor .png; give it one of them")
+    problem, q, view, title = _subject(arguments.what)
+    if arguments.posture is not None:
+        q = problem.scene.figure.posture(arguments.posture)
+    with viewer_of(problem, view, title) as viewer:
+        viewer.show(q, problem=problem)
+        if save is None:
+            viewer.open()
+            viewer.wait_until_closed()
+        elif save.suffix.lower() == ".html":
+            print(f"wrote {viewer.save(save)}")
+        else:
+            print(f"wrote {viewer.picture(save)}")
+    return 0
+
+
+def _subject(what: str) -> tuple[Problem, NDArray[np.float64], View, str]:
+    """Problem, posture, view and title of what is to be shown."""
+    from wholebody.cli import result
+    from wholebody.figures import load
+    from wholebody.problem import Problem
+    from wholebody.scene import Scene
+    from wholebody.taskfile import read_task
+    from wholebody.taskfile.task import View
+
+    path = Path(what)
+    if path.suffix.lower() == ".json":
+        task, q = result.read(path)
+        return task.problem, q, task.view, task.title
+    if path.suffix.lower() == ".toml":
+        task = read_task(path)
+        return task.problem, task.problem.start, task.view, task.title
+    problem = Problem(Scene(load(what)))
+    return problem, problem.start, View(), what

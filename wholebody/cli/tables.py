@@ -1,0 +1,124 @@
+"""Tables for people: goals, contacts, measures, figures."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+from wholebody.cli.result import goals_left
+from wholebody.figures.state import State
+
+if TYPE_CHECKING:
+    from wholebody.figures import Figure
+    from wholebody.problem import Problem, Solution
+    from wholebody.taskfile import Task
+
+CONTACTS = 10
+"""Most pairs that are listed."""
+
+NEAR = 0.01
+"""Metres beyond the clearance at which a pair is listed."""
+
+_COLORS = {"solved": "green", "unreachable": "yellow", "stalled": "yellow", "infeasible": "red"}
+
+
+def table(*columns: str, title: str = "") -> Table:
+    """An empty table; every column but the first is aligned right."""
+    made = Table(title=title or None, title_justify="left", title_style="bold", box=None, padding=(0, 2, 0, 0))
+    for number, column in enumerate(columns):
+        made.add_column(column, justify="right" if number else "left", header_style="dim", overflow="fold")
+    return made
+
+
+def show_solution(console: Console, task: Task, solution: Solution) -> None:
+    """Print everything about a solution."""
+    problem, judged = task.problem, solution.assessment
+    figure = problem.scene.figure
+    console.print(f"[bold]{task.title}[/]", highlight=False)
+    console.print(
+        f"{figure.name}: {figure.model.nv} degrees of freedom, {len(problem.scene.objects)} things, "
+        f"{problem.scene.geometry.ngeoms} pieces, {len(problem.scene.geometry.collisionPairs)} pairs that can touch",
+        highlight=False,
+    )
+    console.print(
+        f"[{_COLORS[solution.status]}]{solution.status}[/] by {solution.method} in {1e3 * solution.seconds:.0f} ms, "
+        f"{solution.iterations} iterations: {solution.message}\n",
+        highlight=False,
+    )
+    console.print(_goals(task, solution))
+    console.print(_contacts(problem, solution))
+    console.print(_measures(problem, solution))
+    held = table("judged independently", "", title="")
+    held.add_row("deepest penetration", f"{1e3 * judged.penetration:.4f} mm")
+    held.add_row("limits, worst violation", f"{math.degrees(judged.limit_violation):.4f} deg")
+    held.add_row("constraints, worst violation", f"{1e3 * judged.constraint_violation:.4f} mm or mrad")
+    held.add_row("first-order optimality", f"{judged.optimality:.1e}")
+    console.print(held)
+
+
+def _goals(task: Task, solution: Solution) -> Table:
+    made = table("goal", "distance left", "angle left")
+    for goal in goals_left(task, solution.q):
+        distance = "" if goal.distance is None else f"{1e3 * goal.distance:.3f} mm"
+        angle = "" if goal.angle is None else f"{math.degrees(goal.angle):.3f} deg"
+        made.add_row(goal.name, distance, angle)
+    return made
+
+
+def _contacts(problem: Problem, solution: Solution) -> Table:
+    """The nearest pairs of owners, each with its nearest pieces."""
+    owners = problem.scene.piece_owner
+    found = problem.scene.contacts(solution.q, within=problem.clearance + NEAR)
+    nearest: dict[tuple[str, str], float] = {}
+    for (a, b), distance in zip(found.pair, found.distance, strict=True):
+        nearest.setdefault((owners[a], owners[b]), float(distance))
+    made = table("nearest pairs", "", "distance")
+    for (a, b), distance in list(nearest.items())[:CONTACTS]:
+        made.add_row(a, b, f"{round(1e3 * distance, 2) + 0.0:.2f} mm")
+    if len(nearest) > CONTACTS:
+        made.add_row(f"and {len(nearest) - CONTACTS} more within {1e3 * (problem.clearance + NEAR):.0f} mm", "", "")
+    if not nearest:
+        made.add_row(f"none within {1e3 * (problem.clearance + NEAR):.0f} mm", "", "")
+    return made
+
+
+def _measures(problem: Problem, solution: Solution) -> Table:
+    state = State(problem.scene.model).update(solution.q)
+    made = table("measure", "weight", "value")
+    for term in problem.measures:
+        made.add_row(type(term).__name__, f"{term.weight:g}", f"{term.value(state):.4f}")
+    return made
+
+
+def show_figure(console: Console, figure: Figure) -> None:
+    """Print what a figure is: size, names of joints, frames, groups and postures."""
+    model = figure.model
+    mass = sum(inertia.mass for inertia in model.inertias)
+    console.print(
+        f"[bold]{figure.name}[/]: {model.nv} degrees of freedom, {mass:.1f} kg, {figure.geometry.ngeoms} pieces "
+        f"({figure.detail}), {len(figure.geometry.collisionPairs)} pairs that can touch, {figure.root} root\n",
+        highlight=False,
+    )
+    names = table("names", "")
+    names.columns[1].justify = "left"
+    listed = {
+        "postures": figure.postures,
+        "groups": figure.groups,
+        "frames": figure.frames,
+        "segments": figure.segments,
+    }
+    for kind, known in listed.items():
+        names.add_row(kind, ", ".join(known))
+    console.print(names)
+    joints = table("joint", "lowest", "highest", title="")
+    limits = figure.limits
+    ranges = dict(zip(limits.idx_q.tolist(), zip(limits.lower, limits.upper, strict=True), strict=True))
+    for name in figure.joints:
+        joint = model.joints[figure.joint_id(name)]
+        low, high = ranges.get(joint.idx_q, (-math.inf, math.inf))
+        slides = joint.shortname().startswith("JointModelP")
+        joints.add_row(name, *(f"{end:.3f} m" if slides else f"{math.degrees(end):.1f} deg" for end in (low, high)))
+    console.print(joints)

@@ -1,0 +1,255 @@
+"""Kinds of values in a task file: what each accepts, how it says so, and what it says to a wrong one."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from wholebody.errors import UnknownNameError
+from wholebody.figures.figure import Figure
+from wholebody.taskfile.where import Where
+
+FARTHEST = 100.0
+"""Metres from the origin: what lies farther is taken for a slip of units."""
+
+_SLIPS = {
+    "m": ((0.01, "centimetres"), (0.001, "millimetres")),
+    "rad": ((math.pi / 180.0, "degrees"),),
+    "kg": ((0.001, "grams"),),
+}
+"""Unit -> the units that people write by mistake, with what a number in them is worth."""
+
+
+class Kind(ABC):
+    """What a key accepts."""
+
+    @property
+    @abstractmethod
+    def words(self) -> str:
+        """What it accepts, for the documentation and for errors."""
+
+    @abstractmethod
+    def read(self, value: Any, where: Where) -> Any:
+        """Return the value as Python wants it.
+
+        Raises:
+            FileFormatError: it is of another kind or out of range.
+        """
+
+    def names(self, value: Any, figure: Figure, where: Where) -> None:  # noqa: B027 - most kinds name nothing
+        """Check names against the figure.
+
+        Raises:
+            UnknownNameError: the figure does not know one of them.
+        """
+
+
+@dataclass(frozen=True)
+class Number(Kind):
+    """A finite number within a range, both ends included."""
+
+    low: float
+    high: float
+    unit: str = ""
+    whole: bool = False
+
+    @property
+    def words(self) -> str:
+        """Range and unit."""
+        return f"{'whole number' if self.whole else 'number'} from {self.low:g} to {self.high:g} {self.unit}".strip()
+
+    def read(self, value: Any, where: Where) -> float:
+        """Return the number."""
+        if isinstance(value, bool) or not isinstance(value, int if self.whole else (int, float)):
+            raise where.fault(f"{value!r} is not a {self.words}; write a plain number")
+        if not self.low <= value <= self.high:
+            raise where.fault(f"{value!r} is not a {self.words}{self._slip(value)}")
+        return value if self.whole else float(value)
+
+    def _slip(self, value: float) -> str:
+        for factor, unit in _SLIPS.get(self.unit, ()):
+            if math.isfinite(value) and self.low <= value * factor <= self.high:
+                return f"; if it is in {unit}, write {value * factor:.6g}"
+        return "; change it"
+
+
+@dataclass(frozen=True)
+class Vector(Kind):
+    """A fixed count of numbers of one kind."""
+
+    count: int
+    number: Number
+    axes: str = ""
+
+    @property
+    def words(self) -> str:
+        """Count and unit."""
+        return f"{self.axes or f'{self.count} numbers'}{', ' + self.number.unit if self.number.unit else ''}"
+
+    def read(self, value: Any, where: Where) -> tuple[float, ...]:
+        """Return the numbers."""
+        if not isinstance(value, list) or len(value) != self.count:
+            raise where.fault(f"{_short(value)} is not {self.words}; write {self.count} numbers in brackets")
+        return tuple(self.number.read(entry, where.at(f"[{i}]")) for i, entry in enumerate(value))
+
+
+@dataclass(frozen=True)
+class Placement(Kind):
+    """Position, or position and orientation."""
+
+    @property
+    def words(self) -> str:
+        """The three ways of writing it."""
+        return "[x, y, z], [x, y, z, qx, qy, qz, qw] or a 4x4 matrix, m"
+
+    def read(self, value: Any, where: Where) -> Any:
+        """Return the placement, as `wholebody.geometry.placement` takes it."""
+        if isinstance(value, list) and len(value) == 4 and all(isinstance(row, list) for row in value):
+            row = Vector(4, Number(-FARTHEST, FARTHEST, "m"))
+            return [row.read(entries, where.at(f"[{i}]")) for i, entries in enumerate(value)]
+        if isinstance(value, list) and len(value) == 7:
+            return POSITION.read(value[:3], where) + QUATERNION.read(value[3:], where)
+        if isinstance(value, list) and len(value) == 3:
+            return POSITION.read(value, where)
+        raise where.fault(f"{_short(value)} is no place; write {self.words}")
+
+
+@dataclass(frozen=True)
+class Text(Kind):
+    """Any text that is not empty."""
+
+    @property
+    def words(self) -> str:
+        """Return "text"."""
+        return "text"
+
+    def read(self, value: Any, where: Where) -> str:
+        """Return the text."""
+        if not isinstance(value, str) or not value.strip():
+            raise where.fault(f"{_short(value)} is not a text; write it in quotes")
+        return value
+
+
+@dataclass(frozen=True)
+class Choice(Kind):
+    """One of a few words."""
+
+    options: tuple[str, ...]
+
+    @property
+    def words(self) -> str:
+        """The words."""
+        return " or ".join(f'"{option}"' for option in self.options)
+
+    def read(self, value: Any, where: Where) -> str:
+        """Return the word."""
+        if value not in self.options:
+            raise where.fault(f"{_short(value)} is not {self.words}; write one of them")
+        return str(value)
+
+
+@dataclass(frozen=True)
+class Flag(Kind):
+    """True or false."""
+
+    @property
+    def words(self) -> str:
+        """Return "true or false"."""
+        return "true or false"
+
+    def read(self, value: Any, where: Where) -> bool:
+        """Return the flag."""
+        if not isinstance(value, bool):
+            raise where.fault(f"{_short(value)} is not {self.words}; write one of them, without quotes")
+        return value
+
+
+@dataclass(frozen=True)
+class Name(Text):
+    """A name that the figure knows."""
+
+    noun: str
+    known: Callable[[Figure], Iterable[str]]
+
+    @property
+    def words(self) -> str:
+        """What is named."""
+        return f"name of a {self.noun}"
+
+    def names(self, value: Any, figure: Figure, where: Where) -> None:
+        """Look the name up."""
+        known = list(self.known(figure))
+        if value not in known:
+            raise UnknownNameError(self.noun, value, known, str(where))
+
+
+@dataclass(frozen=True)
+class Several(Kind):
+    """One or more values of one kind."""
+
+    kind: Kind
+    least: int = 1
+
+    @property
+    def words(self) -> str:
+        """What there are several of."""
+        return f"list, each a {self.kind.words}" if isinstance(self.kind, Text) else f"list, each {self.kind.words}"
+
+    def read(self, value: Any, where: Where) -> list[Any]:
+        """Return the list."""
+        if not isinstance(value, list) or len(value) < self.least:
+            raise where.fault(f"{_short(value)} is not a {self.words}; write {self.least} or more in brackets")
+        return [self.kind.read(entry, where.at(f"[{i}]")) for i, entry in enumerate(value)]
+
+    def names(self, value: Any, figure: Figure, where: Where) -> None:
+        """Look all names up."""
+        for i, entry in enumerate(value):
+            self.kind.names(entry, figure, where.at(f"[{i}]"))
+
+
+@dataclass(frozen=True)
+class Joints(Kind):
+    """Values of joints by name."""
+
+    @property
+    def words(self) -> str:
+        """Return how it is written."""
+        return "{ joint = value, ... }, rad (m for sliding joints)"
+
+    def read(self, value: Any, where: Where) -> dict[str, float]:
+        """Return the values by name."""
+        if not isinstance(value, dict) or not value:
+            raise where.fault(f"{_short(value)} is not a table of joints; write {{ joint_name = 0.5 }}")
+        number = Number(-2.0 * math.pi, 2.0 * math.pi, "rad")
+        return {name: number.read(entry, where.at(name)) for name, entry in value.items()}
+
+    def names(self, value: Any, figure: Figure, where: Where) -> None:
+        """Look the joints up."""
+        for name in value:
+            JOINT.names(name, figure, where.at(name))
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+_ROOT: dict[str, tuple[str, ...]] = {"free": ("root",), "fixed": ()}
+
+POSITION = Vector(3, Number(-FARTHEST, FARTHEST, "m"), "[x, y, z]")
+DIRECTION = Vector(3, Number(-1e6, 1e6), "[x, y, z], any length")
+PLACEMENT = Placement()
+QUATERNION = Vector(4, Number(-1.001, 1.001), "[qx, qy, qz, qw]")
+LENGTH = Number(1e-4, FARTHEST, "m")
+WEIGHT = Number(1e-9, 1e9)
+JOINT = Name("joint", lambda figure: figure.joints)
+GROUP = Name(
+    "joint or group", lambda figure: {*figure.joints, *figure.groups, *(["root"] if figure.root == "free" else [])}
+)
+FRAME = Name("frame", lambda figure: {*figure.frames, *figure.segments, *figure.joints})
+SEGMENT = Name("segment", lambda figure: figure.segments)
+POSTURE = Name("posture", lambda figure: figure.postures)
+CONE = Name("reach cone", lambda figure: figure.cones)

@@ -1,0 +1,152 @@
+"""From TOML to checked values: nothing is computed before every key of the file is known to be in order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from wholebody.errors import FileFormatError, UnknownNameError
+from wholebody.figures.figure import Figure
+from wholebody.taskfile.schema import TABLES, TOP
+from wholebody.taskfile.tables import Form, Key, Table
+from wholebody.taskfile.where import Where
+
+LARGEST = 10_000_000
+"""Bytes; a task file is written by hand."""
+
+
+class Entry(NamedTuple):
+    """One table of the file, checked.
+
+    Attributes:
+        where: its place.
+        form: its type, None where the table has none.
+        name: name of the type.
+        keys: what can stand in it.
+        values: what does.
+    """
+
+    where: Where
+    form: Form | None
+    name: str
+    keys: Mapping[str, Key]
+    values: dict[str, Any]
+
+    def check_names(self, figure: Figure) -> None:
+        """Check names against the figure.
+
+        Raises:
+            UnknownNameError: with the nearest names, file and key.
+        """
+        for name, value in self.values.items():
+            self.keys[name].kind.names(value, figure, self.where.at(name))
+
+    def make(self) -> Any:
+        """Make the object of this type.
+
+        Raises:
+            FileFormatError: the values are in order one by one but not together.
+        """
+        assert self.form is not None
+        assert self.form.make is not None
+        try:
+            return self.form.make(**self.values)
+        except (UnknownNameError, ValueError, TypeError) as error:
+            raise self.where.fault(str(error)) from None
+
+
+class Contents(NamedTuple):
+    """A task file, checked: its top and its tables by name."""
+
+    top: Entry
+    tables: dict[str, list[Entry]]
+
+    def one(self, name: str) -> Entry | None:
+        """The only table of a name, or None."""
+        found = self.tables.get(name)
+        return found[0] if found else None
+
+
+def read_contents(path: Path) -> Contents:
+    """Read a task file and check every table, key and value.
+
+    Raises:
+        FileFormatError: with file, line, key and mend.
+        UnknownNameError: a table, key or type that does not exist, with the nearest ones.
+    """
+    text = _text(path)
+    where = Where(path, text)
+    data = _parse(path, text)
+    plain = {name: value for name, value in data.items() if name not in TABLES}
+    for name in plain:
+        if name not in {key.name for key in TOP}:
+            raise UnknownNameError("key or table", name, [*(key.name for key in TOP), *TABLES], str(where))
+    top = Entry(where, None, "", {key.name: key for key in TOP}, _values(plain, TOP, where))
+    tables = {name: _entries(name, data[name], TABLES[name], where) for name in TABLES if name in data}
+    if "figure" not in tables:
+        raise where.fault('there is no [figure] table; add [figure] with name = "human"')
+    return Contents(top, tables)
+
+
+def _text(path: Path) -> str:
+    if path.is_dir() or not path.exists():
+        there = sorted(file.name for file in path.parent.glob("*.toml")) if path.parent.is_dir() else []
+        raise UnknownNameError("task file", path.name, there, str(path.parent))
+    if path.stat().st_size > LARGEST:
+        raise FileFormatError(f"{path}: is larger than {LARGEST // 1_000_000} MB; a task file is a short TOML file")
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileFormatError(f"{path}: cannot be read as text ({error}); a task file is TOML in UTF-8") from None
+
+
+def _parse(path: Path, text: str) -> dict[str, Any]:
+    import sys
+
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        import tomli as tomllib
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FileFormatError(f"{path.name}: is not TOML: {error}") from None
+
+
+def _entries(name: str, data: Any, table: Table, where: Where) -> list[Entry]:
+    written = data if isinstance(data, list) else [data]
+    wanted = f"[[{name}]]" if table.many else f"[{name}]"
+    if isinstance(data, list) != table.many or not all(isinstance(entry, dict) for entry in written):
+        raise where.in_table(name).fault(f"is written in another way; write {wanted}")
+    places = [where.in_table(name, number + 1 if table.many else 0) for number in range(len(written))]
+    return [_entry(entry, table, place) for entry, place in zip(written, places, strict=True)]
+
+
+def _entry(data: dict[str, Any], table: Table, where: Where) -> Entry:
+    data = dict(data)
+    form, name = None, ""
+    if table.forms is not None:
+        known = list(table.forms)
+        for key, implied in table.implied:
+            if key in data:
+                data.setdefault(table.chooser, implied)
+        if table.chooser not in data:
+            raise where.fault(f"key {table.chooser} is missing; write {table.chooser} = one of {', '.join(known)}")
+        name = data.pop(table.chooser)
+        if name not in known:
+            raise UnknownNameError(f"{where.table} {table.chooser}", str(name), known, str(where.at(table.chooser)))
+        form = table.forms[name]
+    keys = (*table.keys, *(form.keys if form else ()))
+    return Entry(where, form, name, {key.name: key for key in keys}, _values(data, keys, where))
+
+
+def _values(data: dict[str, Any], keys: tuple[Key, ...], where: Where) -> dict[str, Any]:
+    known = {key.name: key for key in keys}
+    for name in data:
+        if name not in known:
+            raise UnknownNameError("key", name, known, str(where.at(name)))
+    for key in keys:
+        if key.required and key.name not in data:
+            raise where.fault(f"key {key.name} is missing; write {key.name} = {key.kind.words}")
+    return {name: known[name].kind.read(value, where.at(name)) for name, value in data.items()}

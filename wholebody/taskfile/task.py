@@ -1,0 +1,220 @@
+"""A task: the problem that a task file states, and the method it asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError, UnknownNameError, WholebodyError
+from wholebody.figures import Figure, load
+from wholebody.geometry.placement import placement
+from wholebody.geometry.shapes import Mesh, Shape
+from wholebody.methods.solve import Method, method_named
+from wholebody.problem import Problem
+from wholebody.scene import Scene
+from wholebody.taskfile.reading import Contents, Entry, read_contents
+from wholebody.taskfile.where import Where
+
+_T = TypeVar("_T")
+
+
+class View(NamedTuple):
+    """How a picture of the task is taken.
+
+    Attributes:
+        eye: where the camera is, metres; None where it finds its own place.
+        target: what is in the middle of the picture, metres; given with the eye.
+        see_through: names of things drawn transparent.
+    """
+
+    eye: tuple[float, float, float] | None = None
+    target: tuple[float, float, float] | None = None
+    see_through: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a task file says.
+
+    Attributes:
+        path: the file.
+        title: its title, or its name.
+        problem: the problem, ready to be solved.
+        method: the method it asks for, with its settings.
+        goal_names: what each goal is called in tables: its type and what it moves.
+        view: how a picture of it is taken.
+    """
+
+    path: Path
+    title: str
+    problem: Problem
+    method: Method
+    goal_names: tuple[str, ...]
+    view: View
+
+
+def read_task(path: str | PathLike[str]) -> Task:
+    """Read a task file; docs/taskfile.md lists all it can say.
+
+    Args:
+        path: a TOML file. Paths in it are relative to its folder.
+
+    Raises:
+        FileFormatError: a value of the wrong kind or out of range, with file, key and mend.
+        UnknownNameError: an unknown key, type, joint, frame or posture, or a missing file, with the nearest names.
+        InputError: values that are in order one by one but cannot go together.
+    """
+    contents = read_contents(Path(path))
+    figure = _figure(contents)
+    for entries in contents.tables.values():
+        for entry in entries:
+            if entry.where.table != "figure":
+                entry.check_names(figure)
+    start = _start(contents, figure)
+    scene = _scene(contents, figure)
+    terms = {name: _terms(contents, name, scene, start) for name in ("goal", "constraint", "measure")}
+    top = contents.top
+    problem = _said(
+        top.where,
+        lambda: Problem(
+            scene,
+            start,
+            goals=terms["goal"],
+            constraints=terms["constraint"],
+            measures=terms["measure"] or None,
+            clearance=top.values.get("clearance", 0.0),
+            touching=top.values.get("touching", ()),
+        ),
+    )
+    method = contents.one("method")
+    return Task(
+        path=Path(path),
+        title=top.values.get("title", Path(path).stem),
+        problem=problem,
+        method=method.make() if method else method_named("qp"),
+        goal_names=tuple(_goal_name(entry) for entry in contents.tables.get("goal", ())),
+        view=_view(contents, scene),
+    )
+
+
+def _figure(contents: Contents) -> Figure:
+    entry = contents.one("figure")
+    assert entry is not None
+    options = dict(entry.values)
+    joints = options.pop("joints", None)
+    spec: str | Path = entry.name
+    if entry.name == "urdf":
+        spec = _file(options.pop("path"), entry.where.at("path"))
+        if "package_dirs" in options:
+            options["package_dirs"] = [entry.where.file.parent / folder for folder in options["package_dirs"]]
+    figure: Figure = _said(entry.where, lambda: load(spec, **options))
+    if joints is None:
+        return figure
+    entry.check_names(figure)
+    return _said(entry.where.at("joints"), lambda: figure.reduced(joints))
+
+
+def _start(contents: Contents, figure: Figure) -> NDArray[np.float64]:
+    entry = contents.one("start")
+    if entry is None:
+        return figure.posture(figure.postures[0])
+    q = figure.posture(entry.values.get("posture", figure.postures[0]))
+    joints = entry.values.get("joints", {})
+    q = _said(entry.where.at("joints"), lambda: figure.with_joints(q, joints))
+    if not figure.within_limits(q):
+        clamped = figure.joint_values(figure.clamp(q))
+        far = max(joints, key=lambda name: abs(joints[name] - clamped[name]))
+        raise entry.where.at(f"joints.{far}").fault(
+            f"{joints[far]:g} is out of the joint's limits; the nearest within them is {clamped[far]:.4f} rad"
+        )
+    if "root" in entry.values:
+        if figure.root != "free":
+            raise entry.where.at("root").fault("the figure's root is fixed; leave the key out, or load a free root")
+        place = _said(entry.where.at("root"), lambda: placement(entry.values["root"], "root"))
+        q[:7] = pin.SE3ToXYZQUAT(place)
+    return q
+
+
+def _scene(contents: Contents, figure: Figure) -> Scene:
+    scene = Scene(figure)
+    for entry in [*contents.tables.get("object", ()), *contents.tables.get("attach", ())]:
+        options = dict(entry.values)
+        thing = {name: options.pop(name) for name in ("name", "at", "color", "to") if name in options}
+        if "color" in thing:
+            thing["color"] = _color(thing["color"], entry.where.at("color"))
+        shape = _shape(entry, options)
+        add: Callable[..., Scene] = scene.attach if "to" in thing else scene.add
+        _said(entry.where, lambda add=add, shape=shape, thing=thing: add(shape, **thing))  # type: ignore[misc]
+    return scene
+
+
+def _shape(entry: Entry, options: dict[str, Any]) -> Shape:
+    assert entry.form is not None
+    if entry.form.make is not None:
+        shape: Shape = entry._replace(values=options).make()
+        return shape
+    file = _file(options.pop("path"), entry.where.at("path"))
+    return _said(entry.where.at("path"), lambda: Mesh(file, **options))
+
+
+def _terms(contents: Contents, name: str, scene: Scene, start: NDArray[np.float64]) -> list[Any]:
+    """Terms of one table; each is tried on the scene here so that an error can name its place in the file."""
+    terms = []
+    for entry in contents.tables.get(name, ()):
+        term = entry.make()
+        _said(entry.where, lambda term=term: term.resolve(scene, start))  # type: ignore[misc]
+        terms.append(term)
+    return terms
+
+
+def _view(contents: Contents, scene: Scene) -> View:
+    entry = contents.one("view")
+    if entry is None:
+        return View()
+    view = View(**entry.values)
+    if (view.eye is None) != (view.target is None):
+        raise entry.where.fault("eye and target belong together; write both or neither")
+    for i, name in enumerate(view.see_through):
+        if name not in scene.objects:
+            raise UnknownNameError("thing", name, scene.objects, str(entry.where.at(f"see_through[{i}]")))
+    return view
+
+
+def _color(parts: list[float], where: Where) -> tuple[float, float, float, float]:
+    if len(parts) > 4:
+        raise where.fault(f"has {len(parts)} parts; write red, green, blue and, if wanted, alpha")
+    red, green, blue, alpha = (*parts, 1.0)[:4]
+    return red, green, blue, alpha
+
+
+def _file(name: str, where: Where) -> Path:
+    """A file that the task file names, relative to its folder."""
+    path = where.file.parent / name
+    if not path.is_file():
+        folder = path.parent if path.parent.is_dir() else where.file.parent
+        raise UnknownNameError("file", name, [file.name for file in folder.iterdir() if file.is_file()], str(where))
+    return path
+
+
+def _goal_name(entry: Entry) -> str:
+    moved = entry.values.get("frame", entry.values.get("target", "") if entry.name == "posture" else "")
+    return f"{entry.name} {moved}".strip()
+
+
+def _said(where: Where, call: Callable[[], _T]) -> _T:
+    """Call, and let what goes wrong name the place in the file."""
+    try:
+        return call()
+    except UnknownNameError as error:
+        raise UnknownNameError(error.kind, error.name, error.known, str(where)) from None
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    except WholebodyError as error:
+        raise type(error)(f"{where}: {error}") from None

@@ -1,0 +1,144 @@
+"""Goals, constraints, measures and methods that a task file can name."""
+
+from __future__ import annotations
+
+from wholebody import tasks
+from wholebody.methods.qp.method import QP
+from wholebody.taskfile import kinds
+from wholebody.taskfile.kinds import DIRECTION, FRAME, PLACEMENT, POSITION, QUATERNION, WEIGHT, Number
+from wholebody.taskfile.tables import Form, Key
+
+
+def _weight(unit: str) -> Key:
+    return Key("weight", WEIGHT, f"factor on its square [{unit}]; 1 if left out")
+
+
+GOALS = {
+    "point": Form(
+        "Bring a point of a frame to a place.",
+        (
+            Key("frame", FRAME, "what moves", True),
+            Key("target", POSITION, "where to, in the world", True),
+            Key("offset", POSITION, "the point in the frame's axes; its origin if left out"),
+            _weight("1/m^2"),
+        ),
+        tasks.Point,
+    ),
+    "frame": Form(
+        "Bring a frame to a place and an orientation.",
+        (
+            Key("frame", FRAME, "what moves", True),
+            Key("target", PLACEMENT, "in the world", True),
+            _weight("1/m^2, 1/rad^2"),
+        ),
+        tasks.Frame,
+    ),
+    "orientation": Form(
+        "Turn a frame; its place is free.",
+        (Key("frame", FRAME, "what turns", True), Key("target", QUATERNION, "in the world", True), _weight("1/rad^2")),
+        tasks.Orientation,
+    ),
+    "axis": Form(
+        "Turn an axis of a frame into a direction, or towards a place: a gaze, a palm.",
+        (
+            Key("frame", FRAME, "what turns", True),
+            Key("axis", DIRECTION, "in the frame's axes", True),
+            Key("direction", DIRECTION, "in the world; this or toward"),
+            Key("toward", POSITION, "a place in the world; this or direction"),
+            _weight("1/rad^2"),
+        ),
+        tasks.Axis,
+    ),
+    "center_of_mass": Form(
+        "Bring the centre of mass to a place, or above one.",
+        (
+            Key("target", POSITION, "in the world", True),
+            Key("axes", kinds.Choice(("xyz", "xy")), "xy leaves the height free; xyz if left out"),
+            _weight("1/m^2"),
+        ),
+        tasks.CenterOfMass,
+    ),
+    "relative": Form(
+        "Bring a frame to a place relative to another: two hands on one box.",
+        (
+            Key("frame", FRAME, "what moves", True),
+            Key("to", FRAME, "what it is placed relative to", True),
+            Key("placement", PLACEMENT, "in the axes of that; as at the start if left out"),
+            Key("orientation", kinds.Flag(), "false leaves it free to turn; true if left out"),
+            _weight("1/m^2, 1/rad^2"),
+        ),
+        tasks.Relative,
+    ),
+    "posture": Form(
+        "Come to a posture of the figure, or near it.",
+        (
+            Key("target", kinds.POSTURE, "which", True),
+            Key("joints", kinds.Several(kinds.GROUP), "that take part; all and the root if left out"),
+            _weight("1/rad^2, 1/m^2"),
+        ),
+        tasks.Posture,
+    ),
+}
+
+CONSTRAINTS = {
+    "hold": Form(
+        "Keep a frame at a place, in the world or relative to another frame.",
+        (
+            Key("frame", FRAME, "what is kept", True),
+            Key("at", PLACEMENT, "where; as at the start if left out"),
+            Key("orientation", kinds.Flag(), "false leaves it free to turn; true if left out"),
+            Key("relative_to", FRAME, "what it keeps its place to; the world if left out"),
+        ),
+        tasks.Hold,
+    ),
+    "plane": Form(
+        "Keep a frame in a plane, or on one side of it.",
+        (
+            Key("frame", FRAME, "what is kept", True),
+            Key("normal", DIRECTION, "of the plane, in the world", True),
+            Key("point", POSITION, "in the plane; where the frame starts if left out"),
+            Key("side", kinds.Choice(("on", "above")), "above lets it leave along the normal; on if left out"),
+        ),
+        tasks.Plane,
+    ),
+    "balance": Form(
+        "Keep the centre of mass over the feet, as they stand at the start; hold the feet as well.",
+        (
+            Key("feet", kinds.Several(kinds.SEGMENT), "segments that stand; both feet if left out"),
+            Key("margin", Number(0.0, 0.5, "m"), "from the edge; 0 if left out"),
+        ),
+        tasks.Balance,
+    ),
+    "freeze": Form(
+        "Keep joints as they are at the start.",
+        (Key("joints", kinds.Several(kinds.GROUP), 'joints and groups; "root" is the place of the figure', True),),
+        lambda joints: tasks.Freeze(*joints),
+    ),
+    "reach_cones": Form(
+        "Keep limbs within the directions that shoulders and hips allow.",
+        (Key("names", kinds.Several(kinds.CONE), "which cones; all if left out"),),
+        tasks.ReachCones,
+    ),
+}
+
+MEASURES = {
+    "effort": Form("Displacement from the start, by the effort it takes.", (_weight("1/rad^2"),), tasks.Effort),
+    "discomfort": Form("Nearness of joints to their limits.", (_weight("no unit"),), tasks.Discomfort),
+    "displacement": Form("Displacement from the neutral posture.", (_weight("1/rad^2"),), tasks.Displacement),
+    "potential_energy": Form("Lifting and lowering of segments.", (_weight("1/J^2"),), tasks.PotentialEnergy),
+}
+
+METHODS = {
+    "qp": Form(
+        "Sequential quadratic programming.",
+        (
+            Key("solver", kinds.Text(), 'QP solver: "osqp" (if left out), "daqp", or what `wholebody doctor` lists'),
+            Key("tolerance", Number(1e-10, 0.1), "metres and radians to which goals are met; 1e-5 if left out"),
+            Key("iterations", Number(1, 100_000, whole=True), "of one descent"),
+            Key("budget", Number(0.0, 3600.0, "s"), "for further tries when the first ends short of the goals"),
+            Key("restarts", Number(0, 1000, whole=True), "most of those tries"),
+            Key("seed", Number(0, 2**32 - 1, whole=True), "of those tries"),
+        ),
+        QP,
+    ),
+}

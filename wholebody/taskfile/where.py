@@ -1,0 +1,68 @@
+"""The place in a task file that an error speaks of."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from wholebody.errors import FileFormatError
+
+_HEADER = re.compile(r"^\s*\[\[?\s*([\w.-]+)\s*\]\]?")
+
+
+@dataclass(frozen=True)
+class Where:
+    """A table of a task file, or a key in it.
+
+    Attributes:
+        file: the task file.
+        text: what it says; used to find lines.
+        table: name of the table; empty at the top of the file.
+        number: which of the tables of that name, from 1; 0 where there can be one only.
+        key: key in the table; empty for the table as a whole.
+    """
+
+    file: Path
+    text: str = ""
+    table: str = ""
+    number: int = 0
+    key: str = ""
+
+    def at(self, key: str) -> Where:
+        """The place of a key in this table."""
+        return replace(self, key=f"{self.key}.{key}" if self.key else key)
+
+    def in_table(self, table: str, number: int = 0) -> Where:
+        """The place of a table in this file."""
+        return replace(self, table=table, number=number, key="")
+
+    def fault(self, sentence: str) -> FileFormatError:
+        """Make an error that names this place."""
+        return FileFormatError(f"{self}: {sentence}")
+
+    def __str__(self) -> str:
+        """Return file, line where it is known, table and key."""
+        line = self._line()
+        table = f"{self.table} {self.number}" if self.number else self.table
+        parts = [f"{self.file.name}:{line}" if line else self.file.name, table, f"key {self.key}" if self.key else ""]
+        return ", ".join(part for part in parts if part)
+
+    def _line(self) -> int | None:
+        """Line of the key if it is written on a line of its own, else of its table's header."""
+        header: int | None = None if self.table else 0
+        seen = 0
+        key = self.key.split(".")[0].split("[")[0]
+        for number, line in enumerate(self.text.splitlines(), start=1):
+            found = _HEADER.match(line)
+            if found and self.table:
+                if header is not None:
+                    break
+                if found[1] == self.table:
+                    seen += 1
+                    header = number if seen == max(self.number, 1) else None
+            elif found:
+                break
+            elif header is not None and key and re.match(rf"\s*{re.escape(key)}\s*=", line):
+                return number
+        return header or None
