@@ -69,14 +69,10 @@ def _with_cavities(parts: list[Component]) -> list[Component]:
     """Give cavities to the part around them, and turn the closed parts that are inside out."""
     solid = [part for part in parts if not part.closed or part.volume > 0]
     for hollow in (part for part in parts if part.closed and part.volume <= 0):
-        low, high = hollow.vertices.min(axis=0), hollow.vertices.max(axis=0)
         around = [
             k
             for k, part in enumerate(solid)
-            if part.closed
-            and part.volume > -hollow.volume
-            and (part.vertices.min(axis=0) <= low).all()
-            and (part.vertices.max(axis=0) >= high).all()
+            if part.closed and part.volume > -hollow.volume and _winds_around(part, hollow.vertices[0])
         ]
         if around:
             k = min(around, key=lambda i: solid[i].volume)
@@ -90,3 +86,12 @@ def _with_cavities(parts: list[Component]) -> list[Component]:
         elif hollow.volume < 0:
             solid.append(Component(hollow.vertices, hollow.faces[:, ::-1].copy(), True, -hollow.volume))
     return solid
+
+
+def _winds_around(part: Component, point: Array) -> bool:
+    """Whether a point is inside a closed part: solid angles (Van Oosterom and Strackee 1983) sum to 4 pi."""
+    a, b, c = (part.vertices[part.faces[:, k]] - point for k in range(3))
+    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+    above = np.einsum("ij,ij->i", a, np.cross(b, c))
+    below = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
+    return bool(np.arctan2(above, below).sum() > np.pi)

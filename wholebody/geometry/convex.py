@@ -168,9 +168,9 @@ def convex_pieces(
 
     Parts that hang together are found first. A convex part is kept as it is, with all its vertices; another closed part
     is decomposed by CoACD (Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware
-    concavity and tree search"), and its pieces are simplified outwards, so that none of the surface is left uncovered; a
-    part with holes in its surface has no inside, so its hull is taken; and a flat part is thickened to twice `SMALLEST`.
-    `notes` says which.
+    concavity and tree search"), and its pieces are simplified outwards, so that none of the surface is left
+    uncovered; a part with holes in its surface has no inside, so its hull is taken; and a flat part is thickened to
+    twice `SMALLEST`. `notes` says which.
 
     Args:
         vertices: (n, 3), metres.
@@ -276,7 +276,8 @@ def _coacd(part: Component, max_vertices: int, threshold: float) -> list[Array]:
     except ImportError:
         raise MissingPackageError("a mesh that is not convex needs coacd: pip install coacd") from None
     coacd.set_log_level("error")
-    # CoACD's own cap on vertices (decimate) leaves parts of the surface outside. Re-meshing (preprocess) inflates thin parts by half, and a closed manifold does not need it.
+    # CoACD's own cap on vertices (decimate) leaves parts of the surface outside; its re-meshing (preprocess) inflates
+    # thin parts by half, and a closed manifold does not need it.
     parts = coacd.run_coacd(
         coacd.Mesh(part.vertices, part.faces.astype(np.int32)),
         threshold=threshold,

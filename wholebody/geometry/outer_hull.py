@@ -1,6 +1,6 @@
 """Fewer vertices for a hull without losing any of it: a simpler hull around it.
 
-Dropping vertices would leave parts of the surface uncovered, and then a posture could be free of contact and still inside.
+Dropping vertices would leave parts of the surface uncovered, and a posture could be free of contact and still inside.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def outer_hull(points: Array, max_vertices: int) -> Array:
     hull = ConvexHull(points)
     corners = points[hull.vertices]
     if len(corners) <= max_vertices:
-        return corners
+        return np.asarray(corners)
     inside = corners.mean(axis=0)
     axes = np.linalg.svd(corners - inside, full_matrices=False)[2]
     box = np.vstack([axes, -axes])
@@ -47,7 +47,7 @@ def outer_hull(points: Array, max_vertices: int) -> Array:
         if len(trial) > max_vertices:
             break
         best = trial
-    return best
+    return np.asarray(best)
 
 
 def _vertices(planes: Array, inside: Array) -> Array:

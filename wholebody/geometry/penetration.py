@@ -41,9 +41,9 @@ def global_depth(depths: Array, normals: Array) -> Array:
     """Global penetration of two objects from their overlapping convex pairs.
 
     PD_g = sum(pd_i^2 n_i) / sum(pd_i), equation 1 of Schmidl and Lin, "Real-time physically-based interaction between
-    avatars and virtual environments". It is a quick estimate: A moves by it, or A by half of it and B by minus half, and
-    the overlap is asked for again. Opposed normals cancel (their figure 4b), and then it is near zero however deep the
-    overlap.
+    avatars and virtual environments". It is a quick estimate: A moves by it, or A by half of it and B by minus half,
+    and the overlap is asked for again. Opposed normals cancel (their figure 4b), and then it is near zero however
+    deep the overlap.
 
     Args:
         depths: (k,) penetration depth of each pair, metres, positive.

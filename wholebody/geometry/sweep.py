@@ -172,19 +172,31 @@ class Sweep:
             return 0.0
         best = 0.0
         for points, plane, out in ((first, second, -normal), (second, first, normal)):
-            if len(self._cores[points].points) and self._supports(plane):
-                best = max(best, self._plane_keeps(points, plane, out, float(row[0]), level))
+            if len(self._cores[points].points) and (
+                len(self._cores[plane].points) or np.isinf(self._cores[plane].reach)
+            ):
+                for direction in self._planes(plane, out):
+                    best = max(best, self._plane_keeps(points, plane, direction, float(row[0]), level))
         return best
 
-    def _supports(self, piece: int) -> bool:
-        return bool(len(self._cores[piece].points)) or bool(np.isinf(self._cores[piece].reach))
+    def _planes(self, piece: int, normal: Array) -> list[Array]:
+        """Directions to bound a piece in, near a normal of coal's: its face that looks there, and the normal itself.
+
+        Any direction gives a true bound, and a wide face a useless one if it is not met exactly: where faces touch,
+        coal's normal can be 1e-4 rad off.
+        """
+        core, rotation = self._cores[piece], self._results.oMg[piece].rotation
+        if not len(core.faces):
+            return [normal]
+        faces = core.faces[:, :3] @ rotation.T
+        face = faces[int(np.argmax(faces @ normal))]
+        return [face] if np.isinf(core.reach) else [face, normal]
 
     def _plane_keeps(self, points: int, plane: int, normal: Array, distance: float, level: float) -> float:
         """Time until a core point of `points` can come down to `level` over the supporting plane of `plane`."""
         core, base = self._cores[points], self._cores[plane]
         at, below = self._results.oMg[points], self._results.oMg[plane]
         if np.isinf(base.reach):
-            normal = below.rotation @ base.faces[0, :3]
             height = float(base.faces[0, 3] + normal @ below.translation)
         else:
             height = float((base.points @ (below.rotation.T @ normal)).max() + normal @ below.translation)
@@ -204,7 +216,7 @@ class Sweep:
         if joint == 0:
             return np.zeros_like(places)
         motion = self._data.oMi[joint].act(self._data.v[joint])
-        return np.asarray(motion.linear + np.cross(motion.angular, places))
+        return np.asarray(motion.linear + places @ pin.skew(motion.angular).T)
 
     def _place(self, q: Array, velocity: Array) -> None:
         pin.forwardKinematics(self.model, self._data, q, velocity)
