@@ -21,6 +21,7 @@ from wholebody.problem import Problem
 Array = NDArray[np.float64]
 
 ACTIVE = 1e-4  # m, rad: nearer to its bound than this a constraint may push back
+FLAT = 1e-2  # share of the largest curvature below which a degree of freedom counts as having that much
 MET = 1e-4  # m, rad: goals nearer than this count as met when optimality is judged
 
 
@@ -37,9 +38,9 @@ class Assessment:
         limit_violation: how far the worst joint is out of its limits, radians or metres.
         constraint_violation: how far the worst constraint is from holding, metres or radians.
         measure: weighted sum of the measures.
-        optimality: first-order optimality, 0 at a perfect one: the share of the objective's gradient that no goal, limit,
-            constraint or contact balances. The objective is the measures where the goals are met, else the squared goal
-            errors.
+        optimality: first-order optimality, radians or metres, 0 at a perfect one: the largest displacement that what no
+            goal, limit, constraint or contact balances of the objective's gradient would still make, over the objective's
+            curvature. The objective is the measures where the goals are met, else the squared goal errors.
         goal_errors: (goals,) norm of each goal's error, metres or radians (whichever is larger).
     """
 
@@ -192,7 +193,7 @@ def _dense(part: Wrench | Array, state: State) -> Array:
 
 
 def _optimality(problem: Problem, state: State, pairs: _Pairs) -> float:
-    """Share of the objective's gradient left after the best nonnegative combination of all active gradients."""
+    """What is left of the objective's gradient after the best nonnegative combination of all active gradients."""
     from scipy.optimize import nnls
 
     nv = state.model.nv
@@ -200,9 +201,11 @@ def _optimality(problem: Problem, state: State, pairs: _Pairs) -> float:
     met = all(np.abs(error).max(initial=0.0) <= MET for error, _, _ in goals)
     if met:
         objective = sum((term.weight * term.gradient(state) for term in problem.measures), np.zeros(nv))
+        curvature = sum((term.weight * term.curvature(state) for term in problem.measures), np.zeros(nv))
         free = [jacobian for _, jacobian, _ in goals]
     else:
         objective = sum((goal.weight * error @ jacobian for error, jacobian, goal in goals), np.zeros(nv))
+        curvature = sum((goal.weight * (jacobian**2).sum(axis=0) for _, jacobian, goal in goals), np.zeros(nv))
         free = []
     pushing = [pairs.gradients(problem, state)]
     for constraint in problem.constraints:
@@ -219,11 +222,12 @@ def _optimality(problem: Problem, state: State, pairs: _Pairs) -> float:
     identity = np.eye(nv)
     pushing += [identity[lower >= -ACTIVE], -identity[upper <= ACTIVE]]
     signed, one_sided = np.vstack([np.zeros((0, nv)), *free]), np.vstack(pushing)
-    scale = float(np.linalg.norm(objective))
-    if scale < 1e-12:
+    scale = np.maximum(curvature, FLAT * curvature.max(initial=0.0))
+    if not scale.any():
         return 0.0
     rows = np.vstack([signed, -signed, one_sided])
-    if not len(rows):
-        return 1.0
-    _, left = nnls(rows.T, objective, maxiter=20 * (len(rows) + nv))
-    return float(left / scale)
+    left = objective
+    if len(rows):
+        push, _ = nnls(rows.T, objective, maxiter=20 * (len(rows) + nv))
+        left = objective - push @ rows
+    return float((np.abs(left) / scale).max())

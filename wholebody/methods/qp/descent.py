@@ -33,6 +33,8 @@ SWITCH = 10.0  # the measures lead once they gain more than this times the squar
 LEAST_WITHIN = 0.05  # m: pairs nearer than this, or than a step is long, get rows
 SLOW = 0.1  # share of the violation that must go in PATIENCE iterations, else only the nearest posture is sought
 PATIENCE = 6
+RENEWALS = 2  # times that a descent with small steps begins anew with long ones before it is taken for settled
+MENDABLE = 0.03  # m, rad: violation that the next step is trusted to mend
 NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
 
 
@@ -107,7 +109,8 @@ class Descent:
         self._memory = Anderson()
         guess: ActiveSet | None = None
         history: list[float] = []
-        count, converged = 0, False
+        count, converged, renewals = 0, False, RENEWALS
+        self._anchor: _Visit | None = None
         while count < self.iterations and time.perf_counter() < self.deadline:
             count += 1
             program = self.subproblem.program(
@@ -118,6 +121,10 @@ class Descent:
             gain = here.violation.total - self.subproblem.violation(here.rows, answer.x).total
             saving = -float(program.linear @ answer.x + 0.5 * (program.diagonal * answer.x) @ answer.x)
             if self._settled(here, answer, gain, saving):
+                if self._radius < FIRST_RADIUS and renewals:  # small steps alone are no sign of an optimum
+                    renewals -= 1
+                    self._radius, self._damping = FIRST_RADIUS, 0.0
+                    continue
                 converged = True
                 break
             there = self._advance(here, program, answer, gain, saving)
@@ -127,15 +134,19 @@ class Descent:
                 if self._stagnates(history):
                     self._measures = False
                     self._memory.forget()
+            elif self._anchor is not None:
+                here, self._anchor = self._anchor, None
             elif self._radius < LEAST_RADIUS:
                 converged = True
                 break
+        if self._anchor is not None:
+            here = self._anchor
         return Local(here.at.q, here.violation, here.at.measure, converged, count)
 
     def _settled(self, here: _Visit, answer: QPSolution, gain: float, saving: float) -> bool:
         """Whether nothing worth having is foreseen."""
         left = here.violation.total
-        if left > self.tolerance and gain > max(0.5 * self.tolerance, 1e-3 * left):
+        if here.violation.worst > self.tolerance and gain > max(0.05 * self.tolerance, 1e-3 * left):
             return False
         if not self._measures:
             return True
@@ -144,7 +155,7 @@ class Descent:
 
     def _stagnates(self, history: list[float]) -> bool:
         """Whether the violation has hardly lessened for a while, so that the measures should not hold it up."""
-        if not self._measures or len(history) <= PATIENCE or history[-1] <= 10.0 * self.tolerance:
+        if not self._measures or len(history) <= PATIENCE or history[-1] <= 100.0 * self.tolerance:
             return False
         return min(history[-PATIENCE:]) > (1.0 - SLOW) * min(history[:-PATIENCE])
 
@@ -160,19 +171,25 @@ class Descent:
                 self._memory.went(there[1])
                 self._record(there[0], there[1], "accelerated")
                 self._shift = self._multipliers(program, dq)
+                self._anchor = None
                 return there[0]
         tried = self._try(here, dq)
         verdict = _Verdict(False, False, False, "blocked") if tried is None else self._judge(here, tried, gain, saving)
         if tried is not None:
             self._record(tried[0], dq, verdict.by)
         step = float(np.abs(dq).max(initial=0.0))
+        if tried is not None and not verdict.accepted and self._promises(here, tried[0]):
+            self._anchor = here
+            self._memory.forget()
+            self._shift = np.zeros_like(self._shift)
+            return tried[0]
         if tried is None or not verdict.accepted:
             self._radius = 0.3 * min(step, self._radius)
             self._damping = max(0.3, 2.0 * self._damping) if verdict.by != "rejected measure" else self._damping
             self._shift = np.zeros_like(self._shift)
             self._memory.forget()
             return None
-        there = tried[0]
+        there, self._anchor = tried[0], None
         if verdict.by == "measure":
             self._memory.went(dq)
         else:
@@ -182,12 +199,18 @@ class Descent:
             self._funnel = max(min(narrower, FUNNEL), after)
         if verdict.good:
             self._damping *= 0.3
-            if step > 0.5 * self._radius or here.violation.goal > PULL * self._radius:
+            if step > 0.5 * self._radius or here.violation.left > PULL * self._radius:
                 self._radius = min(2.0 * self._radius, LARGEST_RADIUS)
         elif verdict.poor:
             self._radius = 0.5 * self._radius
         self._shift = self._multipliers(program, dq)
         return there
+
+    def _promises(self, here: _Visit, there: _Visit) -> bool:
+        """Whether a rejected step went well but for curved constraints, so that one more may put that right (watchdog)."""
+        if self._anchor is not None or not self._measures:
+            return False
+        return there.violation.goal < here.violation.goal and max(there.violation.elastic, there.violation.hold) < MENDABLE
 
     def _multipliers(self, program: QuadraticProgram, dq: Array) -> Array:
         """What the rows would still lack after the step because the measures pull: to be asked for in the next one."""
@@ -224,10 +247,13 @@ class Descent:
     def _judge(self, here: _Visit, tried: tuple[_Visit, Array], gain: float, saving: float) -> _Verdict:
         """Whether to go there, given what was foreseen: `gain` of violation and `saving` of the measures."""
         there = tried[0]
-        before, after = here.violation.total, there.violation.total
+        compared = here if self._anchor is None else self._anchor
+        before, after = compared.violation.total, there.violation.total
+        if self._anchor is not None:
+            gain = max(0.1 * gain, 1e-3 * before)
         measures_lead = self._measures and saving > SWITCH * before**2 and before <= self._funnel
         if measures_lead and after <= self._funnel:
-            saved = here.at.measure - there.at.measure
+            saved = compared.at.measure - there.at.measure
             if saved >= 0.05 * saving:
                 return _Verdict(True, saved >= 0.5 * saving, saved < 0.25 * saving, "measure")
         gained = before - after
@@ -238,7 +264,7 @@ class Descent:
     def _record(self, there: _Visit, dq: Array, what: str) -> None:
         step = float(np.abs(dq).max(initial=0.0))
         note = f"{self.note}: {what}" if self.note else what
-        self.trace.append(Iterate(there.violation.goal, there.violation.total, there.at.measure, step, note))
+        self.trace.append(Iterate(there.violation.left, max(there.violation.hold, there.violation.elastic), there.at.measure, step, note))
 
 
 JUMP_TOLERANCE = 2e-4  # m: overlap on the way that does not count; finer than any piece is thick

@@ -154,7 +154,7 @@ class _Search:
         """Keep the better one; whether what is asked holds now."""
         if self._best is None or _rank(local, self.method.tolerance) < _rank(self._best, self.method.tolerance):
             self._best, self.how = local, how
-        return self.best.violation.total <= self.method.tolerance
+        return self.best.violation.worst <= self.method.tolerance
 
 
 def _rank(local: Local, tolerance: float) -> tuple[float, float, float]:
@@ -162,7 +162,7 @@ def _rank(local: Local, tolerance: float) -> tuple[float, float, float]:
     held = max(local.violation.hold, local.violation.elastic)
     return (
         held if held > tolerance else 0.0,
-        local.violation.goal if local.violation.goal > tolerance else 0.0,
+        local.violation.goal if local.violation.left > tolerance else 0.0,
         local.measure,
     )
 

@@ -23,26 +23,33 @@ PULL = 0.4  # m per rad of radius: of a goal farther away, or a deeper overlap, 
 BOX = 2.0  # radii: the box around a step, which seldom holds it; asking for little at a time keeps programs easy instead
 HOLD_SHARE = 3.0  # what a metre of hold counts against a metre of goal when a step is judged
 ELASTIC_SHARE = 10.0  # and a metre of overlap; above any ratio at which overlap could buy goal
-LEAST_CURVATURE = 1e-2  # 1/rad^2: of a degree of freedom that no measure speaks for
+LEAST_CURVATURE = 1e-3  # share of the largest curvature that a degree of freedom has which no measure speaks for
 
 
 class Violation(NamedTuple):
     """How far a posture is from what is asked: metres and radians.
 
     Attributes:
-        goal: norm of the goal errors.
+        goal: norm of the goal errors, each times the root of its weight's share of the largest.
         hold: norm of the equality constraints' errors.
         elastic: sum of what pairs lack in distance and inequalities in value.
+        left: norm of the goal errors, without weights.
     """
 
     goal: float
     hold: float
     elastic: float
+    left: float
 
     @property
     def total(self) -> float:
         """One figure, in which overlap counts most."""
         return self.goal + HOLD_SHARE * self.hold + ELASTIC_SHARE * self.elastic
+
+    @property
+    def worst(self) -> float:
+        """What is compared with the tolerance."""
+        return max(self.left, self.hold, self.elastic)
 
 
 class Rows(NamedTuple):
@@ -74,6 +81,7 @@ class Subproblem:
         self._lower = np.concatenate(lower) if lower else np.zeros(0)
         self._upper = np.concatenate(upper) if upper else np.zeros(0)
         self._goal_weight = np.concatenate(weight) if weight else np.zeros(0)
+        self._goal_share = self._goal_weight / self._goal_weight.max(initial=1e-300)
         self._equal = np.flatnonzero(self._lower == self._upper)
         self._low = np.flatnonzero((self._lower != self._upper) & np.isfinite(self._lower))
         self._high = np.flatnonzero((self._lower != self._upper) & np.isfinite(self._upper))
@@ -103,8 +111,13 @@ class Subproblem:
             lack = lack - rows.elastic @ displacement
         worst = np.zeros(rows.groups)
         np.maximum.at(worst, rows.group, lack)
-        goal = error[: rows.goals]
-        return Violation(float(np.sqrt(goal @ goal)), float(np.linalg.norm(error[rows.goals :])), float(worst.sum()))
+        goal, hold = error[: rows.goals], error[rows.goals :]
+        return Violation(
+            float(np.sqrt((self._goal_share * goal) @ goal)),
+            float(np.sqrt(hold @ hold)),
+            float(worst.sum()),
+            float(np.sqrt(goal @ goal)),
+        )
 
     def program(
         self, at: Linearisation, rows: Rows, radius: float, damping: float, shift: Array, measures: bool
@@ -119,13 +132,14 @@ class Subproblem:
             shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
             measures: whether the measures count; without them the nearest posture to the goals is sought.
         """
-        diagonal = np.maximum(at.curvature, LEAST_CURVATURE)
+        floor = float(at.curvature.max(initial=0.0)) * LEAST_CURVATURE or 1.0
+        diagonal = np.maximum(at.curvature, floor)
         linear = at.gradient if measures else np.zeros_like(at.gradient)
         diagonal = np.maximum(diagonal if measures else np.minimum(diagonal, 1.0), np.abs(linear) / radius)
         error = rows.soft_error.copy()
-        distance = float(np.linalg.norm(error[: rows.goals]))
-        if distance > PULL * radius:
-            error[: rows.goals] *= PULL * radius / distance
+        farthest = float(np.abs(error[: rows.goals]).max(initial=0.0))
+        if farthest > PULL * radius:
+            error[: rows.goals] *= PULL * radius / farthest
         if damping > 0.0 and rows.goals:
             pull = rows.soft_weight[: rows.goals] * np.abs(error[: rows.goals])
             diagonal = diagonal + damping * (pull @ np.abs(rows.soft[: rows.goals]))
