@@ -166,7 +166,7 @@ def test_denavit_hartenberg_of_a_textbook_arm(tmp_path):
         <joint name="j1" type="continuous">
         <parent link="base"/><child link="a"/><origin xyz="0 0 0.2"/><axis xyz="0 0 1"/></joint>
         <joint name="j2" type="continuous">
-        <parent link="a"/><child link="b"/><origin xyz="0 0 0.1"/><axis xyz="0 1 0"/></joint>
+        <parent link="a"/><child link="b"/><origin xyz="0 0.2 0.1"/><axis xyz="0 1 0"/></joint>
         <joint name="j3" type="continuous">
         <parent link="b"/><child link="c"/><origin xyz="0.5 0 0"/><axis xyz="0 1 0"/></joint>
         <joint name="end" type="fixed"><parent link="c"/><child link="tip"/><origin xyz="0.3 0 0"/></joint></robot>"""
@@ -175,6 +175,8 @@ def test_denavit_hartenberg_of_a_textbook_arm(tmp_path):
     dh = denavit_hartenberg(figure, "tip")
     assert np.abs(dh.alpha) == pytest.approx([np.pi / 2, 0, 0], abs=1e-12)
     assert dh.a == pytest.approx([0, 0.5, 0], abs=1e-12)
+    # The second axis meets the first 0.1 m above its joint; of all normals of parallel axes the one without d is taken.
+    assert dh.d == pytest.approx([0.1, 0, 0], abs=1e-12)
     rng = np.random.default_rng(2)
     angles = rng.uniform(-3, 3, 3)
     q = figure.with_joints(figure.neutral, dict(zip(("j1", "j2", "j3"), angles, strict=True)))

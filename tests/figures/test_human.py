@@ -262,11 +262,23 @@ CONTACTS = [
 ]
 
 
+SHRUG = {"clavicle_elevation": 30, "neck1_lateral": -45, "neck2_flexion": 10, "spine4_lateral": -11}
+CONTACTS += [
+    ("ear to shoulder", SHRUG, ("head", "left_clavicle")),
+    ("ear to arm", {**SHRUG, "shoulder_abduction": 120, "clavicle_elevation": 40}, ("head", "left_upper_arm")),
+]
+
+
 @pytest.mark.parametrize(("what", "degrees", "pair"), CONTACTS, ids=[contact[0] for contact in CONTACTS])
 @pytest.mark.parametrize("detail", ["capsules", "hulls"])
 def test_real_self_contact_is_caught(what, degrees, pair, detail):
     figure = person("M50", detail)
-    values = {f"{side}_{name}": math.radians(value) for side in ("left", "right") for name, value in degrees.items()}
+    values = {
+        joint: math.radians(value)
+        for name, value in degrees.items()
+        for joint in (name, f"left_{name}", f"right_{name}")
+        if joint in figure.joints
+    }
     q = figure.with_joints(figure.posture("standing"), values)
     assert figure.within_limits(q)
     geometry, geometry_data = figure.geometry, pin.GeometryData(figure.geometry)
@@ -277,6 +289,25 @@ def test_real_self_contact_is_caught(what, degrees, pair, detail):
         names = frozenset(geometry.geometryObjects[i].name.partition(":")[0] for i in (entry.first, entry.second))
         distance[names] = min(distance.get(names, 1.0), geometry_data.distanceResults[k].min_distance)
     assert distance[frozenset(pair)] < 0.0, what
+
+
+@pytest.mark.parametrize("detail", ["capsules", "hulls"])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_index_finger_leads_the_hand(side, detail):
+    # A wall that the tip touches square on is touched by nothing else of the hand.
+    figure = person("M50", detail)
+    tip = figure.model.frames[figure.frame_id(f"{side}_index_tip")]
+    for piece in figure.geometry.geometryObjects:
+        if piece.name.startswith(f"{side}_hand"):
+            across = tip.placement.inverse() * piece.placement
+            shape = piece.geometry
+            if detail == "hulls":
+                reach = (np.array(shape.points()) @ across.rotation[0]).max()
+            elif type(shape).__name__ == "Box":
+                reach = np.abs(across.rotation[0]) @ shape.halfSide
+            else:
+                reach = shape.radius + abs(across.rotation[0, 2]) * shape.halfLength
+            assert across.translation[0] + reach < 1e-9
 
 
 def test_spheres_are_the_thirty_nine_across_five_groups():

@@ -98,9 +98,9 @@ class ReachCone:
     def _inside(self, rows: Array) -> NDArray[np.bool_]:
         side = rows @ self._slices.T
         wedge = (side >= 0.0) & (np.roll(side, -1, axis=1) < 0.0)
-        # In exactly one wedge, but for V itself (all zero), which is inside.
-        inside = (rows @ self.boundaries.T)[np.arange(len(rows)), np.argmax(wedge, axis=1)] >= 0.0
-        return np.asarray(inside | (~wedge.any(axis=1) & (rows @ self.visible > 0.0)))
+        # Around V and -V rounding may find no wedge; there every boundary gives the same answer, so the first one does.
+        boundary = self.boundaries[np.argmax(wedge, axis=1)]
+        return np.asarray(np.einsum("ij,ij->i", rows, boundary) >= 0.0)
 
     def _nearest_on_edge(self, rows: Array) -> Array:
         """Nearest point of the boundary, (n, 3)."""
