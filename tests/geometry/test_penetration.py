@@ -152,6 +152,7 @@ def test_round_shapes_are_exact_where_one_knows() -> None:
         assert found is not None
         assert found.separated
         assert np.linalg.norm(found.separation) == pytest.approx(expected, abs=1e-5)
+        assert found.least
 
 
 def test_crossing_capsules_have_a_direction() -> None:

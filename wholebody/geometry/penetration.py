@@ -24,7 +24,7 @@ class ObjectPenetration(NamedTuple):
         global_depth: (3,) PD_g, metres, out of B into A: the estimate of `global_depth`.
         separation: (3,) least translation of A that takes all pairs of pieces apart, metres.
         separated: the translation does take them apart (coal was asked again); false where none can.
-        least: no shorter translation exists; for round pieces it is the best of its neighbourhood, and this is false.
+        least: it is proven that no shorter translation exists; see `wholebody.geometry.separation.Separation`.
         pairs: number of overlapping pairs of pieces.
     """
 

@@ -43,8 +43,8 @@ class Separation(NamedTuple):
     Attributes:
         translation: (3,) metres.
         separated: coal finds no pair overlapping after it.
-        least: the search proved that no shorter one exists. Never for round pieces, whose sides are sampled and then
-            refined: there the translation is the best of its neighbourhood.
+        least: it is proven that no shorter one exists. With several overlapping pairs of round pieces, whose sides are
+            sampled and then refined, that is seldom so: there the translation is the best of many local searches.
     """
 
     translation: Array
@@ -83,6 +83,9 @@ def least_separation(
         best = _descents(pairs, best, escapes)
     if best is None:
         return Separation(np.zeros(3), False, False)
+    # No translation can be shorter than the depth of the deepest pair alone.
+    depths = pairs.overlapping(np.zeros(3), TOUCHING)[1]
+    least = least or float(np.linalg.norm(best)) <= depths.max(initial=0.0) + OVERLAP
     return Separation(best, not pairs.overlapping(best, OVERLAP)[0], least)
 
 
