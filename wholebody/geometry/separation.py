@@ -85,7 +85,7 @@ def least_separation(
         return Separation(np.zeros(3), False, False)
     # No translation can be shorter than the depth of the deepest pair alone.
     depths = pairs.overlapping(np.zeros(3), TOUCHING)[1]
-    least = least or float(np.linalg.norm(best)) <= depths.max(initial=0.0) + OVERLAP
+    least = least or bool(np.linalg.norm(best) <= depths.max(initial=0.0) + OVERLAP)
     return Separation(best, not pairs.overlapping(best, OVERLAP)[0], least)
 
 
