@@ -192,10 +192,13 @@ class Several(Kind):
 
     kind: Kind
     least: int = 1
+    example: str = ""
 
     @property
     def words(self) -> str:
         """What there are several of."""
+        if self.example:
+            return f"list such as {self.example}"
         return f"list, each a {self.kind.words}" if isinstance(self.kind, Text) else f"list, each {self.kind.words}"
 
     def read(self, value: Any, where: Where) -> list[Any]:

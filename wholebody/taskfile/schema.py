@@ -18,7 +18,7 @@ TOP = (
     Key("clearance", Number(0.0, 0.5, "m"), "least distance between any two pieces; 0 if left out"),
     Key(
         "touching",
-        kinds.Several(kinds.Several(kinds.Text(), 2)),
+        kinds.Several(kinds.Several(kinds.Text(), 2), example='[["right_hand", "table"]]'),
         "pairs of segments or objects that may come nearer than the clearance, to touching",
     ),
 )

@@ -178,7 +178,7 @@ def _view(contents: Contents, scene: Scene) -> View:
     entry = contents.one("view")
     if entry is None:
         return View()
-    view = View(**entry.values)
+    view = View(**{**entry.values, "see_through": tuple(entry.values.get("see_through", ()))})
     if (view.eye is None) != (view.target is None):
         raise entry.where.fault("eye and target belong together; write both or neither")
     for i, name in enumerate(view.see_through):

@@ -30,8 +30,9 @@ class Where:
     key: str = ""
 
     def at(self, key: str) -> Where:
-        """The place of a key in this table."""
-        return replace(self, key=f"{self.key}.{key}" if self.key else key)
+        """The place of a key in this table, or of an entry (such as "[0]") in this key."""
+        dot = "." if self.key and not key.startswith("[") else ""
+        return replace(self, key=f"{self.key}{dot}{key}")
 
     def in_table(self, table: str, number: int = 0) -> Where:
         """The place of a table in this file."""

@@ -1,0 +1,210 @@
+"""The command line as people use it: what it prints, writes and returns."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.cli import main
+from wholebody.cli.demo import shipped_tasks
+from wholebody.view import browser
+
+TASK = """\
+title = "A small reach"
+clearance = 0.002
+
+[figure]
+name = "human"
+detail = "spheres"
+
+[[object]]
+name = "ball"
+shape = "sphere"
+radius = 0.1
+at = [0.6, 0.0, 1.0]
+
+[[goal]]
+type = "point"
+frame = "right_index_tip"
+target = [0.35, -0.25, 1.0]
+
+[[goal]]
+type = "axis"
+frame = "gaze"
+axis = [1, 0, 0]
+toward = [0.35, -0.25, 1.0]
+"""
+
+
+@pytest.fixture
+def task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.toml").write_text(TASK)
+    return tmp_path / "small.toml"
+
+
+@pytest.fixture
+def no_browser(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(browser, "find_chromium", lambda: None)
+
+
+@pytest.mark.usefixtures("no_browser")
+def test_pose_reports_writes_and_goes_on_without_a_browser(task: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["pose", "small.toml"]) == 0
+    printed = capsys.readouterr().out
+    for part in ("A small reach", "solved", "point right_index_tip", "axis gaze", "Effort", "deepest penetration"):
+        assert part in printed
+    assert "no picture: " in printed
+    folder = task.parent / "out" / "small"
+    assert sorted(file.name for file in folder.iterdir()) == ["result.json", "scene.html"]
+    assert "<html" in (folder / "scene.html").read_text()[:200].lower()
+
+
+@pytest.mark.usefixtures("no_browser")
+def test_the_result_is_the_posture(task: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["pose", str(task), "--out", "here", "--method", "qp", "--json"]) == 0
+    captured = capsys.readouterr()
+    result = json.loads(captured.out)
+    assert "wrote here/result.json" in captured.err
+    assert json.loads(Path("here/result.json").read_text()) == result
+    assert result["status"] == "solved"
+    figure = wb.load("human", detail="spheres")
+    q = figure.with_joints(figure.posture("standing"), result["joints"])
+    q[:7] = result["root"]
+    np.testing.assert_array_equal(q, result["q"])
+    data = figure.model.createData()
+    pin.framesForwardKinematics(figure.model, data, q)
+    tip = data.oMf[figure.frame_id("right_index_tip")].translation
+    np.testing.assert_allclose(tip, [0.35, -0.25, 1.0], atol=1e-4)
+    reach, gaze = result["goals"]
+    assert reach["distance"] == pytest.approx(np.linalg.norm(tip - [0.35, -0.25, 1.0]), abs=1e-9)
+    assert (reach["angle"], gaze["distance"]) == (None, None)
+
+
+@pytest.mark.usefixtures("no_browser")
+def test_a_goal_out_of_reach_is_an_answer_with_its_own_code(task: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    far = (
+        TASK.replace("[0.35, -0.25, 1.0]", "[0.35, -0.25, 9.0]")
+        + '[[constraint]]\ntype = "hold"\nframe = "left_foot"\n'
+    )
+    task.write_text(far + "[method]\nname = 'qp'\nbudget = 0.0\n")
+    assert main(["pose", str(task), "--json"]) == 1
+    result = json.loads(capsys.readouterr().out)
+    assert result["status"] != "solved"
+    assert result["assessment"]["penetration"] < 1e-4
+
+
+@pytest.mark.browser
+def test_pose_draws_and_the_result_can_be_shown_again(task: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    require_browser()
+    assert main(["pose", str(task), "--out", "drawn"]) == 0
+    assert Path("drawn/scene.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    shutil.move("drawn", "moved")
+    shutil.copytree("moved", "drawn")
+    assert main(["show", "drawn/result.json", "--save", "again.png"]) == 0
+    assert Path("again.png").read_bytes() == Path("drawn/scene.png").read_bytes()
+    assert main(["show", str(task), "--save", "before.html"]) == 0
+    assert main(["show", "hand", "--save", "hand.html"]) == 0
+    assert "wrote hand.html" in capsys.readouterr().out
+
+
+def require_browser() -> None:
+    if browser.find_chromium() is None:
+        (pytest.fail if os.environ.get("WHOLEBODY_REQUIRE_BROWSER") else pytest.skip)("there is no Chromium")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["pose", "absent.toml"], ["no task file is called 'absent.toml'", "small.toml"]),
+        (["pose", "small.toml", "--method", "magic"], ["no method is called 'magic'", "qp"]),
+        (["pose", "small.toml", "--out", "small.toml/x"], ["small.toml/x", "--out"]),
+        (["show", "humna"], ["no figure is called 'humna'", "human"]),
+        (["show", "human", "--posture", "siting", "--save", "a.html"], ["no posture", "sitting"]),
+        (["show", "human", "--save", "a.gif"], [".html", ".png"]),
+        (["show", "absent.json"], ["absent.json", "result.json"]),
+        (["figure", "human", "--stature", "175"], ["175", "between"]),
+        (["figure", "avatar", "--out", "a.urdf"], ["--out", "human"]),
+        (["figure", "human", "--out", "a.txt"], [".urdf"]),
+        (["demo", "shef"], ["no demo", "shelf"]),
+    ],
+)
+def test_what_is_wrong_is_one_sentence_and_code_2(
+    task: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], parts: list[str]
+) -> None:
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith("wholebody: ")
+    assert captured.err.count("\n") == 1
+    assert "Traceback" not in captured.err
+    for part in parts:
+        assert part in captured.err, captured.err
+    assert not list(task.parent.rglob("*.part"))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "{}",
+        "[]",
+        '{"task": "small.toml", "q": [1, 2]}',
+        '{"task": "small.toml", "q": "x"}',
+        '{"task": "gone.toml", "q": [1]}',
+        "{",
+    ],
+)
+def test_a_result_that_is_none_is_refused(task: Path, content: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (task.parent / "result.json").write_text(content)
+    assert main(["show", "result.json", "--save", "a.html"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_figure_describes_and_writes_what_can_be_loaded_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["figure", "human", "--sex", "female", "--stature", "1.62", "--mass", "60"]) == 0
+    printed = capsys.readouterr().out
+    assert "55 degrees of freedom, 60.0 kg" in printed
+    assert re.search(r"left_elbow_flexion\s+0.0 deg\s+150.0 deg", printed)
+    out = tmp_path / "woman.urdf"
+    assert main(["figure", "human", "--sex", "female", "--stature", "1.62", "--mass", "60", "--out", str(out)]) == 0
+    model = pin.buildModelFromUrdf(str(out), pin.JointModelFreeFlyer())
+    assert model.nv == 55
+    assert pin.computeTotalMass(model) == pytest.approx(60.0, abs=1e-6)
+
+
+def test_demo_tasks_can_all_be_read(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", "--list"]) == 0
+    listed = capsys.readouterr().out
+    for name, path in shipped_tasks().items():
+        assert name in listed
+        assert wb.read_task(path).problem.goals
+
+
+@pytest.mark.parametrize("command", [[], ["pose"], ["show"], ["figure"], ["demo"], ["doctor"]])
+def test_help_is_there_and_light(command: list[str]) -> None:
+    code = (
+        "import sys; from wholebody.cli import main\n"
+        f"try: main({[*command, '--help']!r})\n"
+        "except SystemExit as end: assert end.code == 0\n"
+        "assert 'pinocchio' not in sys.modules and 'rich' not in sys.modules"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "usage: wholebody" in done.stdout
+
+
+def test_a_wrong_option_is_code_2() -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["pose"])
+    assert ended.value.code == 2

@@ -1,0 +1,167 @@
+"""What task files may say and what they are told when they say something else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from wholebody.errors import WholebodyError
+from wholebody.taskfile import read_task
+
+GOOD = """\
+clearance = 0.01
+
+[figure]
+name = "human"
+detail = "spheres"
+
+[start]
+posture = "standing"
+joints = { left_elbow_flexion = 0.5 }
+
+[[object]]
+name = "table"
+shape = "box"
+size = [0.7, 1.2, 0.04]
+at = [0.65, 0.0, 0.74]
+
+[[attach]]
+name = "ring"
+shape = "sphere"
+radius = 0.01
+to = "right_hand"
+at = [0.0, 0.0, -0.3]
+
+[[goal]]
+type = "point"
+frame = "right_index_tip"
+target = [0.4, -0.2, 1.0]
+
+[[constraint]]
+type = "hold"
+frame = "left_foot"
+
+[[measure]]
+type = "effort"
+weight = 2.0
+
+[method]
+name = "qp"
+tolerance = 1e-6
+"""
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[[str], Path]:
+    def write(text: str) -> Path:
+        path = tmp_path / "task.toml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
+    task = read_task(write(GOOD))
+    assert task.title == "task"
+    assert task.goal_names == ("point right_index_tip",)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        # a wrong number
+        ("clearance = 0.01", "clearance = 10", ["task.toml:1", "key clearance", "from 0 to 0.5 m"]),
+        ("clearance = 0.01", "clearance = nan", ["task.toml:1", "key clearance", "nan"]),
+        ("clearance = 0.01", "clearance = true", ["key clearance", "True is not a number"]),
+        ('detail = "spheres"', "stature = 175", ["task.toml:5", "key stature", "centimetres, write 1.75"]),
+        ('detail = "spheres"', "mass = 70000", ["key mass", "grams, write 70"]),
+        (
+            "left_elbow_flexion = 0.5",
+            "left_elbow_flexion = 30",
+            ["task.toml:9", "joints.left_e", "degrees, write 0.52"],
+        ),
+        (
+            "left_elbow_flexion = 0.5",
+            "left_elbow_flexion = -1.0",
+            ["task.toml:9", "the joint's limits", "0.0000"],
+        ),
+        ("radius = 0.01", "radius = -0.01", ["task.toml:20", "attach 1, key radius", "0.0001 to 100 m"]),
+        ("target = [0.4, -0.2, 1.0]", "target = [400, -200, 1000]", ["goal 1, key target[0]", "write 4"]),
+        ("target = [0.4, -0.2, 1.0]", "target = [0.4, -0.2]", ["task.toml:27", "write 3 numbers"]),
+        ("target = [0.4, -0.2, 1.0]", "target = [0.4, inf, 1.0]", ["goal 1, key target[1]", "inf"]),
+        ("tolerance = 1e-6", "tolerance = 1.0", ["task.toml:39", "method, key tolerance"]),
+        ("weight = 2.0", "weight = 0", ["measure 1, key weight"]),
+        # a wrong name
+        ('name = "human"', 'name = "humna"', ["figure name", "did you mean human"]),
+        (
+            'detail = "spheres"',
+            'detial = "spheres"',
+            ["task.toml:5", "no key", "did you mean detail"],
+        ),
+        ("left_elbow_flexion = 0.5", "left_elbow_flexoin = 0.5", ["no joint", "left_elbow_flexion"]),
+        ('posture = "standing"', 'posture = "siting"', ["task.toml:8", "no posture", "sitting"]),
+        (
+            'frame = "right_index_tip"',
+            'frame = "right_index"',
+            ["task.toml:26", "goal 1, key frame", "right_index_t"],
+        ),
+        ('frame = "left_foot"', 'frame = "left_fot"', ["task.toml:31", "constraint 1, key frame", "left_foot"]),
+        ('to = "right_hand"', 'to = "right_hnd"', ["attach 1, key to", "right_hand"]),
+        ('type = "point"', 'type = "pont"', ["no goal type", "did you mean point"]),
+        ('shape = "box"', 'shape = "cube"', ["object 1, key shape", "no object shape is called 'cube'"]),
+        ('name = "qp"', 'name = "magic"', ["method", "qp"]),
+        ("[[goal]]", "[[gaol]]", ["no key or table is called 'gaol'", "goal"]),
+        # a wrong structure
+        ("[[goal]]", "[goal]", ["goal", "write [[goal]]"]),
+        ("[figure]", "[[figure]]", ["figure", "write [figure]"]),
+        ('name = "human"\n', "", ["figure", "key name is missing", "human, avatar, hand, urdf"]),
+        ('frame = "right_index_tip"\n', "", ["goal 1", "key frame is missing"]),
+        ('type = "point"\n', "", ["goal 1", "key type is missing", "point, frame"]),
+        ("[figure]\n", "", ["task.toml"]),
+        ("clearance = 0.01", "clearance = ", ["is not TOML", "line 1"]),
+        ('name = "ring"', 'name = "table"', ["attach 1", "already has"]),
+        # what does not go together
+        ('shape = "box"\nsize = [0.7, 1.2, 0.04]', 'shape = "mesh"\npath = "chiar.obj"', ["task.toml:14", "chair.obj"]),
+        ('type = "point"', 'type = "axis"\naxis = [0, 0, 0]\ndirection = [1, 0, 0]', ["goal 1", "target"]),
+        (
+            'type = "point"\nframe = "right_index_tip"\ntarget = [0.4, -0.2, 1.0]',
+            'type = "axis"\nframe = "gaze"\naxis = [1, 0, 0]',
+            ["task.toml:24", "goal 1", "direction"],
+        ),
+        ("[method]", '[view]\nsee_through = ["tabel"]\n[method]', ["view", "see_through", "did you mean table"]),
+        ("[method]", "[view]\neye = [1, 1, 1]\n[method]", ["view", "target"]),
+        ('name = "qp"', 'name = "qp"\nsolver = "oqsp"', ["method", "osqp"]),
+        ("clearance = 0.01", 'touching = [["right_hand", "tabel"]]', ["table"]),
+    ],
+)
+def test_what_is_wrong_is_told_in_one_sentence(
+    write: Callable[[str], Path], tmp_path: Path, old: str, new: str, expected: list[str]
+) -> None:
+    (tmp_path / "chair.obj").touch()
+    assert old in GOOD
+    with pytest.raises(WholebodyError) as caught:
+        read_task(write(GOOD.replace(old, new, 1)))
+    said = str(caught.value)
+    assert said.startswith("task.toml")
+    assert "\n" not in said
+    for part in expected:
+        assert part in said, said
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"a = 1\x00", b"[" * 10_000])
+def test_what_is_no_text_or_no_toml_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "task.toml"
+    path.write_bytes(content)
+    with pytest.raises(WholebodyError, match="TOML"):
+        read_task(path)
+
+
+def test_a_file_that_is_not_there_is_told_with_its_neighbours(tmp_path: Path) -> None:
+    (tmp_path / "shelf.toml").touch()
+    with pytest.raises(WholebodyError, match="did you mean shelf[.]toml"):
+        read_task(tmp_path / "shef.toml")
+    with pytest.raises(WholebodyError):
+        read_task(tmp_path)

@@ -1,0 +1,117 @@
+"""What a task file becomes is what the same calls in Python make."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.figures.state import State
+from wholebody.taskfile.schema import TABLES
+from wholebody.taskfile.terms import CONSTRAINTS, GOALS, MEASURES
+
+TURNED = [0.0, 0.0, 0.7071067811865476, 0.7071067811865476]
+
+EVERYTHING = Path(__file__).parents[1] / "data" / "tasks" / "everything.toml"
+
+
+@pytest.fixture(scope="module")
+def everything() -> wb.Task:
+    return wb.read_task(EVERYTHING)
+
+
+def test_every_type_of_the_schema_is_in_the_example() -> None:
+    text = EVERYTHING.read_text()
+    for forms in (GOALS, CONSTRAINTS, MEASURES):
+        for name in forms:
+            assert f'type = "{name}"' in text
+    for name in TABLES["object"].forms or {}:
+        assert f'shape = "{name}"' in text
+
+
+def test_scene_and_start(everything: wb.Task) -> None:
+    problem = everything.problem
+    figure = problem.scene.figure
+    assert everything.title == "everything"
+    assert (figure.detail, figure.model.nv) == ("spheres", 55)
+    assert problem.clearance == 0.004
+    assert problem.touching == (("right_hand", "ball"),)
+    np.testing.assert_allclose(problem.start[:7], [0.1, 0.0, 0.9, *TURNED])
+    assert figure.joint_values(problem.start)["left_elbow_flexion"] == 0.5
+    objects = problem.scene.objects
+    assert [type(thing.shape).__name__ for thing in objects.values()] == [
+        "Box", "Sphere", "Capsule", "Ellipsoid", "HalfSpace", "Hull", "Mesh", "Box",
+    ]  # fmt: skip
+    assert objects["pack"].segment == "thorax"
+    assert objects["box"].color == (1.0, 0.0, 0.0, 1.0)
+    np.testing.assert_allclose(objects["box"].placement.rotation @ [1, 0, 0], [0, 1, 0], atol=1e-12)
+    np.testing.assert_allclose(objects["rod"].placement.translation, [2, 1, 0])
+    np.testing.assert_allclose(np.abs(objects["tetrahedron"].shape.vertices).max(), 1.0)
+    assert everything.view == ((1.0, 2.0, 3.0), (0.0, 0.0, 1.0), ("box",))
+
+
+def test_terms_are_those_that_python_makes(everything: wb.Task) -> None:
+    problem = everything.problem
+    turn = pin.Quaternion(np.array(TURNED)).matrix()
+    same = wb.Problem(
+        problem.scene,
+        problem.start,
+        goals=[
+            wb.Point("right_index_tip", (0.5, 0, 1), offset=(0, 0, 0.1), weight=2.0),
+            wb.Frame("left_palm", pin.SE3(turn, np.array([0.5, 0, 1.0]))),
+            wb.Orientation("right_palm", TURNED),
+            wb.Axis("gaze", (1, 0, 0), toward=(3, 0, 0)),
+            wb.CenterOfMass((0, 0, 1), axes="xy"),
+            wb.Relative("left_palm", "right_palm", (0, 0.3, 0), orientation=False),
+            wb.Posture("sitting", joints=["left_leg"]),
+        ],
+        constraints=[
+            wb.Hold("left_foot", orientation=False),
+            wb.Plane("left_elbow", (0, 1, 0), side="above"),
+            wb.Balance(("left_foot", "right_foot"), margin=0.01),
+            wb.Freeze("lower_body", "root"),
+            wb.ReachCones(["right_shoulder"]),
+        ],
+        measures=[wb.Effort(), wb.Discomfort(0.1), wb.Displacement(), wb.PotentialEnergy(0.01)],
+    )
+    q = pin.integrate(problem.scene.model, problem.start, np.linspace(-0.1, 0.1, 55))
+    state = State(problem.scene.model).update(q)
+    for mine, theirs in zip(same.goals, problem.goals, strict=True):
+        assert type(mine) is type(theirs)
+        assert mine.weight == theirs.weight
+        np.testing.assert_allclose(mine.error(state), theirs.error(state), atol=1e-12)
+    for mine, theirs in zip(same.constraints, problem.constraints, strict=True):
+        np.testing.assert_allclose(mine.value(state), theirs.value(state), atol=1e-12)
+        np.testing.assert_allclose(mine.upper, theirs.upper)
+    for mine, theirs in zip(same.bounds, problem.bounds, strict=True):
+        np.testing.assert_allclose(mine.bounds(state, None), theirs.bounds(state, None))
+    for mine, theirs in zip(same.measures, problem.measures, strict=True):
+        assert mine.weight * mine.value(state) == pytest.approx(theirs.weight * theirs.value(state))
+
+
+def test_method_has_its_settings(everything: wb.Task) -> None:
+    method = everything.method
+    assert isinstance(method, wb.QP)
+    assert (method.solver, method.tolerance, method.iterations) == ("daqp", 1e-7, 50)
+    assert (method.budget, method.restarts, method.seed) == (0.5, 2, 3)
+
+
+def test_what_is_left_out_is_what_python_leaves_out(tmp_path: Path) -> None:
+    (tmp_path / "least.toml").write_text('[figure]\nname = "human"\n')
+    task = wb.read_task(tmp_path / "least.toml")
+    assert task.title == "least"
+    np.testing.assert_array_equal(task.problem.start, wb.load("human").posture("standing"))
+    assert [type(measure) for measure in task.problem.measures] == [wb.Effort]
+    assert task.problem.goals == ()
+    assert task.problem.clearance == 0.0
+
+
+def test_a_figure_with_fewer_joints_and_a_urdf_by_path(tmp_path: Path, root: Path) -> None:
+    (tmp_path / "arm.toml").write_text('[figure]\nname = "human"\njoints = ["right_arm"]\n')
+    assert wb.read_task(tmp_path / "arm.toml").problem.scene.model.nv == 9
+    (tmp_path / "man.urdf").write_text((root / "urdf" / "human.urdf").read_text())
+    (tmp_path / "own.toml").write_text('[figure]\npath = "man.urdf"\nroot = "free"\n')
+    assert wb.read_task(tmp_path / "own.toml").problem.scene.model.nv == 55
