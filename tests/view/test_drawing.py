@@ -42,6 +42,15 @@ def test_the_faces_of_a_hull_wind_outwards() -> None:
     convex = coal.Convex.convexHull(points, True, None)
     found = volume(np.asarray(convex.points()), drawing.convex_faces(convex))
     assert found == pytest.approx(ConvexHull(cloud).volume, rel=1e-9)
+    faces = coal.StdVec_Triangle()
+    for number in range(convex.num_polygons):  # as a file may have them: some one way round, some the other
+        corner = convex.polygons(number)
+        order = (0, 2, 1) if number % 2 else (0, 1, 2)
+        faces.append(coal.Triangle(*(corner[k] for k in order)))
+    points = coal.StdVec_Vec3s()
+    points.extend(list(np.asarray(convex.points())))
+    mixed = coal.Convex(points, faces)
+    assert volume(np.asarray(mixed.points()), drawing.convex_faces(mixed)) == pytest.approx(found, rel=1e-9)
 
 
 @given(directions, st.floats(0.01, 2.0))

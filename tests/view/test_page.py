@@ -127,15 +127,17 @@ def test_a_motion_is_where_pinocchio_says_at_every_frame(
         browser.evaluate("wholebody.play()")
         browser.until("!viewer.animator.playing")
         as_pinocchio_says(exhibit, motion.q[7])
+        viewer.play(motion, dt=2.0)
         page = viewer.save(tmp_path / "motion.html").as_uri()
+        browser.until("viewer.animator.time > 0.1")
         viewer.show(rest)  # ends the motion
         assert viewer.sync(10.0)
+        assert browser.evaluate("viewer.animator.actions.length") == 0
         as_pinocchio_says(exhibit, rest)
         browser.open(page)
-        assert browser.evaluate("viewer.animator.duration") == pytest.approx(0.35)
-        browser.until("!viewer.animator.playing")  # it plays by itself to the end
-        as_pinocchio_says(exhibit, motion.q[7])
-        browser.evaluate("wholebody.seek(0.15)")
+        assert browser.evaluate("viewer.animator.duration") == pytest.approx(14.0)
+        browser.until("viewer.animator.playing && viewer.animator.time > 0.1")  # it plays by itself
+        browser.evaluate("wholebody.seek(6.0)")
         as_pinocchio_says(exhibit, motion.q[3])
 
 
@@ -270,6 +272,31 @@ def test_colours_at_projected_places(exhibit: Any, browser: Browser, tmp_path: P
     red, green_, blue = picture[row, column]
     assert blue > 1.3 * red
     assert blue > 1.3 * green_
+
+
+@pytest.mark.parametrize("size", [(320, 160), (160, 320)])
+def test_the_camera_holds_the_figure_and_its_ghosts_in_the_middle(
+    size: tuple[int, int], exhibit: Any, browser: Browser, piece_nodes: Any, nodes: Any, tmp_path: Path
+) -> None:
+    viewer = Viewer(exhibit)
+    viewer.show(exhibit.posture(1))
+    far = exhibit.posture(2)
+    far[:3] += (0.5, 6.0, 0.3)
+    viewer.ghosts([far])
+    browser.resize(size)
+    browser.open(viewer.save(tmp_path / "scene.html").as_uri())
+    figure = [entry for entry in piece_nodes(exhibit) if entry["path"].startswith("/figure/")]
+    shown = [*figure, *nodes([f"/ghosts/0{entry['path']}" for entry in figure])]
+    places = [entry["matrix"][:3, 3].tolist() for entry in shown]
+    seen = np.array(
+        browser.evaluate(
+            "(places => { viewer.camera.updateMatrixWorld(); return places.map(([x, y, z]) =>"
+            f" new MeshCat.THREE.Vector3(x, z, -y).project(viewer.camera).toArray()) }})({places})"
+        )
+    )
+    assert np.abs(seen[:, :2]).max() < 1.0  # all of it is in the picture,
+    assert np.abs(seen[:, :2]).max() > 0.7  # fills it,
+    assert np.abs(seen[:, 0].min() + seen[:, 0].max()) < 0.4  # in its middle
 
 
 def test_ghosts_are_transparent_throw_no_shadow_and_are_replaced(exhibit: Any, browser: Browser, nodes: Any) -> None:

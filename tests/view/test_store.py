@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from wholebody.view.server import ANIMATION, CAMERA, DELETE, OBJECT, PROPERTY, STOP, TRANSFORM, Command, Queue, Store
@@ -52,6 +52,16 @@ def page_of(payloads: list[bytes]) -> dict[Any, Any]:
 
 
 @given(st.lists(commands(), max_size=30))
+@example(
+    [
+        Command(op, path, key, repr((op, path, key, 0)).encode())
+        for op, path, key in (
+            (TRANSFORM, "/a/b", ""),
+            (PROPERTY, "/a/b/<object>", "color"),
+            (OBJECT, "/a/b", ""),
+        )
+    ]
+)
 def test_a_page_opened_later_shows_the_same(history: list[Command]) -> None:
     store = Store()
     for command in history:

@@ -10,7 +10,7 @@ from wholebody.view.server import Command
 
 Array = NDArray[np.float64]
 
-NEAR = 0.5
+NEAR = 0.3
 """How far around the figure things are kept in the picture, metres; a wall is as long as it likes."""
 
 

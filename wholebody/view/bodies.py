@@ -120,13 +120,14 @@ class Bodies:
             if body.joint == 0 and body.thing is not None:
                 continue
             path = f"{root}{body.path}"
-            stage.put(path, drawing.piece(piece.geometry, path, color, shadow=False))
+            stage.put(path, drawing.piece(piece.geometry, path, color))
             stage.place(path, piece.placement.homogeneous)
             stage.place(f"{root}{body.carrier}", data.oMi[body.joint].homogeneous)
 
     def corners(self, data: Any, *, things: bool) -> Array:
-        """Corners (n, 3) in the world of the boxes around the figure's pieces, or the things'; no half-spaces."""
-        chosen = [n for n, body in enumerate(self.all) if not body.plate and (body.thing is not None) == things]
+        """Corners (n, 3) in the world of the boxes around the figure's pieces, or the things'; no plates, no glass."""
+        solid = [index for index, body in enumerate(self.all) if not body.plate and body.color[3] == 1.0]
+        chosen = [index for index in solid if (self.all[index].thing is not None) == things]
         return np.concatenate([np.zeros((0, 3)), *(self._box(index, data) for index in chosen)])
 
     def tops(self, data: Any) -> dict[str, tuple[str, Array]]:

@@ -19,21 +19,19 @@ _FRONT, _BOTH = 0, 2
 _AROUND, _ALONG = 32, 8
 
 
-def piece(geometry: Any, name: str, color: Color, *, shadow: bool = True) -> Three:
-    """A piece as it is, in its own coordinates.
+def piece(geometry: Any, name: str, color: Color) -> Three:
+    """A piece as it is, in its own coordinates. It throws a shadow unless it is transparent or a half-space.
 
     Args:
         geometry: coal's Sphere, Capsule, Box, Ellipsoid, Convex, Halfspace, Cylinder, Cone or a BVHModel.
         name: an identifier that nothing else in the page has.
         color: red, green, blue, alpha.
-        shadow: whether it throws a shadow.
 
     Raises:
         InputError: a geometry that cannot be drawn.
     """
     shape, scale, center, flat = _shape(geometry, name)
-    if type(geometry).__name__ == "Halfspace":
-        shadow = False
+    shadow = color[3] == 1.0 and type(geometry).__name__ != "Halfspace"
     return _mesh(name, shape, _material(color, flat=flat), matrix=_matrix(scale, center), shadow=shadow)
 
 

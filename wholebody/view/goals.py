@@ -38,7 +38,7 @@ class Goals:
             target, directed = _target(goal, here, state, self.scene)
             if here is None or target is None:
                 continue
-            if np.linalg.norm(target.translation - here.translation) > 1e-9 or not directed:
+            if np.linalg.norm(target.translation - here.translation) > 1e-9 or not (directed or hasattr(goal, "axis")):
                 moment.markers[f"{root}/target"] = (_TARGET, _at(target.translation))
             line = drawing.rod_placement(here.translation, target.translation, style.LINE_RADIUS)
             if line is not None:

@@ -24,7 +24,7 @@ OBJECTS: tuple[Color, ...] = (
 )
 """Muted, told apart by hue, none near the two colours of state."""
 
-SEE_THROUGH = 0.30
+SEE_THROUGH = 0.22
 """Opacity of things that should not hide the figure."""
 
 TINT = 0.45
@@ -32,7 +32,7 @@ TINT = 0.45
 
 NORMAL = (0.13, 0.36, 0.60)
 WITNESS = (0.10, 0.22, 0.38)
-DEPTH = (0.70, 0.00, 0.16)
+DEPTH = (0.34, 0.00, 0.14)
 TARGET = (0.10, 0.62, 0.33)
 MISS = (0.10, 0.62, 0.33)
 AXES = ((0.85, 0.22, 0.20), (0.22, 0.65, 0.28), (0.20, 0.40, 0.85))
@@ -47,7 +47,7 @@ TARGET_RADIUS = 0.016  # m
 LINE_RADIUS = 0.0025  # m
 AXES_LENGTH = 0.10  # m
 SHORTEST_DEPTH = 0.05  # m: shallower penetration vectors are drawn this long, else nobody would see them
-LABEL_SIZE = 0.021  # of the distance it is looked at from: about 16 pixels of 720
+LABEL_SIZE = 0.018  # of the distance it is looked at from: about 22 pixels of 720
 
 PLATE = (6.0, 6.0, 0.04)  # m: what is drawn of a half-space
 
@@ -58,7 +58,7 @@ CONTACT_NODE, GOAL_NODE, NAME_NODE = "/contacts", "/goals", "/names"
 FIELD_OF_VIEW = 32.0  # degrees, vertical
 DIRECTION = (1.0, -0.72, 0.42)
 """From the figure towards the camera: from its front right, a little above."""
-MARGIN = 1.12
+MARGIN = 1.08
 
 
 def object_color(number: int) -> Color:

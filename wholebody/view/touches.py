@@ -18,6 +18,9 @@ INSIDE = -1e-5
 MOST = 60
 """Markers are drawn for this many of the nearest contacts; a page with thousands of nodes stutters."""
 
+LABELLED = 3
+"""The depth is written beside this many of the deepest penetrations."""
+
 _NORMAL = Marker("arrow", style.NORMAL, 0.8)
 _WITNESS = Marker("ball", style.WITNESS, style.WITNESS_RADIUS)
 _DEPTH = Marker("arrow", style.DEPTH, 1.3)
@@ -38,7 +41,7 @@ def mark_contacts(moment: Moment, bodies: Bodies, contacts: Touching) -> None:
     """Mark witness points and normals; for penetrations the vector by which the figure's piece would come out.
 
     A normal starts at the first piece's witness point and leads to the second piece. A penetration vector is as long as
-    the depth, but at least `style.SHORTEST_DEPTH`; its label says the depth.
+    the depth, but at least `style.SHORTEST_DEPTH`; the label of the deepest ones says how deep.
     """
     for row in range(min(len(contacts.distance), MOST)):
         root = f"{style.CONTACT_NODE}/{row}"
@@ -56,8 +59,9 @@ def mark_contacts(moment: Moment, bodies: Bodies, contacts: Touching) -> None:
             out, origin = normal, end
         length = max(-distance, style.SHORTEST_DEPTH)
         moment.markers[f"{root}/depth"] = (_DEPTH, drawing.arrow_placement(origin, out, length))
-        text = Marker("label", style.DEPTH_LABEL, style.LABEL_SIZE, f"{-1000 * distance:.1f} mm")
-        moment.markers[f"{root}/text"] = (text, _at(origin + out * length))
+        if row < LABELLED:
+            text = Marker("label", style.DEPTH_LABEL, style.LABEL_SIZE, f"{-1000 * distance:.1f} mm")
+            moment.markers[f"{root}/text"] = (text, _at(origin + out * length))
 
 
 def _at(point: Array) -> Array:

@@ -40,7 +40,7 @@ class Viewer:
 
     Pieces turn orange where they come nearer than `contact_distance` to each other, and red where they are inside each
     other; things are tinted, half-spaces keep their colour. A blue arrow is a contact's normal, from the first piece to
-    the second; a red one is the way out of a penetration.
+    the second; a dark red one is the way out of a penetration.
 
     Example:
         >>> with Viewer(scene) as viewer:          # doctest: +SKIP
