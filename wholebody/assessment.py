@@ -38,9 +38,9 @@ class Assessment:
         limit_violation: how far the worst joint is out of its limits, radians or metres.
         constraint_violation: how far the worst constraint is from holding, metres or radians.
         measure: weighted sum of the measures.
-        optimality: first-order optimality, radians or metres, 0 at a perfect one: the largest displacement that what no
-            goal, limit, constraint or contact balances of the objective's gradient would still make, over the objective's
-            curvature. The objective is the measures where the goals are met, else the squared goal errors.
+        optimality: first-order optimality, radians or metres, 0 at a perfect one: what no goal, limit, constraint or
+            contact balances of the objective's gradient, divided by the objective's curvature; largest entry. The
+            objective is the measures where the goals are met, else the squared goal errors.
         goal_errors: (goals,) norm of each goal's error, metres or radians (whichever is larger).
     """
 

@@ -90,7 +90,7 @@ class Lineariser:
         self._terms: list[Any] = [*goals, *constraints]
 
     def at(self, q: Array, within: float) -> Linearisation:
-        """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres beyond their clearance."""
+        """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance."""
         state, scene = self.state, self.scene
         state.update(q)
         reach = within + (float(self.clearances.max()) if len(self.clearances) else 0.0)
@@ -114,7 +114,7 @@ class Lineariser:
             gap=rows.gap,
             gap_jacobian=jacobian[goal_rows + value_rows :],
             gap_contact=rows.contact,
-            clearance=self.clearances[contacts.index][rows.contact],
+            clearance=self.clearances[contacts.number][rows.contact],
             measure=measure,
             gradient=gradient,
             curvature=curvature,

@@ -29,7 +29,7 @@ class Problem:
     """Scene, start, goals, constraints and measures: stated once, for every method.
 
     Joint limits and non-penetration are always part of it. A pair that begins nearer than the clearance but not inside
-    (soles on a floor, a hand on a table) is asked to keep what it has; a pair that begins inside is asked for all of it.
+    (soles on a floor, a hand on a table) is asked to keep what it has; one that begins inside is asked for all of it.
 
     Attributes:
         scene: figure and things.
@@ -85,6 +85,16 @@ class Problem:
         self.clearances = self._clearances()
         self._revision = scene.revision
 
+    def retarget(self, goals: Iterable[Goal]) -> None:
+        """Replace the goals, for a goal that moves from frame to frame; everything else stays.
+
+        Raises:
+            InputError: not a list of goals.
+            UnknownNameError: a name that the figure does not have.
+        """
+        listed = _checked(goals, (Goal,), "goals")
+        self.goals = tuple(goal.resolve(self.scene, self.start) for goal in listed)
+
     def lineariser(self, dt: float | None = None) -> Lineariser:
         """What linearises this problem at postures; each method makes its own.
 
@@ -92,9 +102,7 @@ class Problem:
             InputError: objects came to or left the scene after the problem was stated.
         """
         self.check_fresh()
-        return Lineariser(
-            self.scene, self.goals, self.constraints, self.bounds, self.measures, self.clearances, dt
-        )
+        return Lineariser(self.scene, self.goals, self.constraints, self.bounds, self.measures, self.clearances, dt)
 
     def check_fresh(self) -> None:
         """Raise InputError if objects came to or left the scene after the problem was stated (moving them is fine)."""
@@ -113,7 +121,7 @@ class Problem:
         near = scene.proximity.near(state.data, self.clearance + 1e-9)
         kept = np.maximum(near.distance, 0.0)
         resting = near.distance >= -1e-6
-        asked[near.index[resting]] = np.minimum(asked[near.index[resting]], kept[resting])
+        asked[near.number[resting]] = np.minimum(asked[near.number[resting]], kept[resting])
         return asked
 
 

@@ -70,7 +70,7 @@ class Scene:
 
     @property
     def geometry(self) -> pin.GeometryModel:
-        """Pinocchio's geometry model: the pieces of the figure, of what it carries, of what stands around; all pairs."""
+        """Pinocchio's geometry model: pieces of the figure, of what it carries, of what stands around; all pairs."""
         return self._build().geometry
 
     @property
@@ -215,7 +215,9 @@ class Scene:
         if not isinstance(name, str) or not name:
             raise InputError("an object needs a name; give name='table'")
         if name in self._objects or name in self.figure.segments:
-            raise InputError(f"the scene already has a {name!r}; give the new object another name, or move() the old one")
+            raise InputError(
+                f"the scene already has a {name!r}; give the new object another name, or move() the old one"
+            )
         return name
 
     # ---- asking it
@@ -238,7 +240,10 @@ class Scene:
             raise InputError(f"within is a finite distance in metres, not {within}")
         near = self.proximity.near(self.state(q).data, float(within))
         order = np.argsort(near.distance, kind="stable")
-        return Contacts(*(np.array(field[order]) for field in near))
+        return Contacts(
+            near.pair[order], near.distance[order], near.normal[order], near.point_a[order], near.point_b[order],
+            near.number[order],
+        )  # fmt: skip
 
     def penetration(self, q: Array) -> list[ObjectPenetration]:
         """How deep owners (segments, objects) are in each other at q: PD_g and the least separating translation.
@@ -283,9 +288,7 @@ class _Built:
         self.sweep: Sweep | None = None
 
 
-def _assemble(
-    figure: Figure, objects: Iterable[SceneObject], excluded: dict[tuple[str, str], str]
-) -> _Built:
+def _assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tuple[str, str], str]) -> _Built:
     """Geometry model of a figure with things: the figure's pieces first, then carried ones, then the world's."""
     model = figure.model
     geometry = pin.GeometryModel()

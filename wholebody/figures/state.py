@@ -85,11 +85,13 @@ class State:
         Returns:
             (k, nv) rows for the tangent displacement of the posture.
         """
-        return (wrenches @ self.jacobian) * (self.support[joint] - self.support[against])
+        result: Array = (wrenches @ self.jacobian) * (self.support[joint] - self.support[against])
+        return result
 
     def wrench_jacobian(self, wrench: Wrench) -> Array:
         """Jacobian (m, nv) of one `Wrench`."""
-        return (wrench.rows @ self.jacobian) * (self.support[wrench.joint] - self.support[wrench.against])
+        result: Array = (wrench.rows @ self.jacobian) * (self.support[wrench.joint] - self.support[wrench.against])
+        return result
 
     def center_of_mass(self) -> Array:
         """Centre of mass in the world, shape (3,), metres."""

@@ -65,9 +65,7 @@ class ContactRowBuilder:
         self._axis = np.array([core.axis for core in cores]).reshape(-1, 3)
         self._is_capsule = self._axis.any(axis=1)
         flat = (self._point_count >= 2) | np.isinf(proximity.reach)
-        self._extended = (
-            flat[proximity.pairs[:, 0]] & flat[proximity.pairs[:, 1]] if len(proximity.pairs) else np.zeros(0, bool)
-        )
+        self._extended = flat[proximity.pairs].all(axis=1)
 
     def rows(self, contacts: Contacts) -> ContactRows:
         """Rows of all contacts, at the placements of the last query."""
@@ -76,7 +74,7 @@ class ContactRowBuilder:
         wrench = _wrenches(contacts.normal, contacts.point_a)
         first, second = joint[contacts.pair[:, 0]], joint[contacts.pair[:, 1]]
         index = np.arange(k)
-        wide = np.flatnonzero(self._extended[contacts.index] & (contacts.distance < LEVER_DISTANCE))
+        wide = np.flatnonzero(self._extended[contacts.number] & (contacts.distance < LEVER_DISTANCE))
         if not len(wide):
             return ContactRows(contacts.distance, wrench, index, first, second)
         contact, point, gap = self._patch(contacts, wide)
@@ -112,11 +110,11 @@ class ContactRowBuilder:
         reach, sag = self._over_other(other[side], facing[side], towards[side], lever)
 
         # a side whose points all lie over the other piece is the patch: the other side's points add nothing
-        whole = np.ones(2 * count, dtype=bool)
-        np.logical_and.at(whole, side, reach >= 1.0)
+        over = np.ones(2 * count, dtype=bool)
+        np.logical_and.at(over, side, reach >= 1.0)
         has = np.zeros(2 * count, dtype=bool)
         has[side] = True
-        whole &= has
+        whole: NDArray[np.bool_] = over & has
         partner = np.concatenate([whole[count:], whole[:count]])
         partner[count:] &= ~whole[count:]  # both whole: keep the first side
         length = np.sqrt(np.einsum("ij,ij->i", lever, lever)) * reach

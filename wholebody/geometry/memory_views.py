@@ -59,7 +59,7 @@ def distance_view(results: Any) -> Array | None:
         if _address(results[i].normal) != base + RESULT_STRIDE * i:
             return None
     buffer = (ctypes.c_char * (RESULT_STRIDE * (count - 1) + 8 * RESULT_FIELDS)).from_address(base - 8)
-    view: Array = np.ndarray((count, RESULT_FIELDS), float, buffer=buffer, strides=(RESULT_STRIDE, 8))
+    view: Array = np.ndarray((count, RESULT_FIELDS), float, buffer=memoryview(buffer), strides=(RESULT_STRIDE, 8))
     for i in {0, count // 3, count // 2, count - 1}:
         if not np.array_equal(view[i], read_result(results[i]), equal_nan=True):
             return None
@@ -68,6 +68,4 @@ def distance_view(results: Any) -> Array | None:
 
 def read_result(result: Any) -> Array:
     """One DistanceResult through its official getters, as the row of `distance_view`."""
-    return np.concatenate(
-        [[result.min_distance], result.normal, result.getNearestPoint1(), result.getNearestPoint2()]
-    )
+    return np.concatenate([[result.min_distance], result.normal, result.getNearestPoint1(), result.getNearestPoint2()])

@@ -27,7 +27,7 @@ class Contacts(NamedTuple):
         normal: (k, 3) unit vector from the first piece to the second, also in penetration.
         point_a: (k, 3) witness point on the first piece, world.
         point_b: (k, 3) witness point on the second; point_b - point_a = distance * normal.
-        index: (k,) index of the pair in the geometry model's collision pairs.
+        number: (k,) place of the pair among the geometry model's collision pairs.
     """
 
     pair: Indices
@@ -35,7 +35,7 @@ class Contacts(NamedTuple):
     normal: Array
     point_a: Array
     point_b: Array
-    index: Indices
+    number: Indices
 
 
 class Proximity:

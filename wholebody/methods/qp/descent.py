@@ -1,10 +1,10 @@
 """Sequential quadratic programming from one start to the nearest posture that fits.
 
-Each iteration linearises, solves one quadratic program that asks for a piece of the way, and judges the posture it leads
-to by two figures, the violation and the measures, with a funnel (Gould and Toint 2010): while what is asked is far, a
-step must lessen the violation; near, it must lessen the measures and stay inside a funnel of violation that narrows. No
-penalty weight has to be guessed, and measures may improve along curved constraints in long steps. Steps that could have
-jumped over something are swept.
+Each iteration linearises, solves one quadratic program that asks for a piece of the way, and judges the posture it
+leads to by two figures, the violation and the measures, with a funnel (Gould and Toint 2010): while what is asked is
+far, a step must lessen the violation; near, it must lessen the measures and stay inside a funnel of violation that
+narrows. No penalty weight has to be guessed, and measures may improve along curved constraints in long steps. Steps
+that could have jumped over something are swept.
 """
 
 from __future__ import annotations
@@ -88,6 +88,7 @@ class Descent:
         offset: (goal rows,) subtracted from the goal errors: a nearer goal on the way to the true one.
         trace: grows by one entry an iteration.
         note: what to call the iterations in the trace.
+        measures: whether the measures count from the beginning; without them only the goals are sought.
     """
 
     subproblem: Subproblem
@@ -99,18 +100,22 @@ class Descent:
     offset: Array | None = None
     trace: list[Iterate] = field(default_factory=list)
     note: str = ""
+    measures: bool = True
+
+    def __post_init__(self) -> None:
+        """Begin with a wide trust region and nothing remembered."""
+        self._radius, self._damping, self._measures = FIRST_RADIUS, 0.0, self.measures
+        self._anchor: _Visit | None = None  # where to go back to if a step that broke a rule is not mended
+        self._memory = Anderson()
 
     def run(self, start: Array) -> Local:
         """Descend from a posture within limits, shape (nq,)."""
-        self._radius, self._damping, self._measures = FIRST_RADIUS, 0.0, True
         here = self._visit(start)
         self._funnel = max(FUNNEL, here.violation.total)
         self._shift = np.zeros(len(here.rows.soft_error))
-        self._memory = Anderson()
         guess: ActiveSet | None = None
         history: list[float] = []
         count, converged, renewals = 0, False, RENEWALS
-        self._anchor: _Visit | None = None
         while count < self.iterations and time.perf_counter() < self.deadline:
             count += 1
             program = self.subproblem.program(
@@ -134,6 +139,8 @@ class Descent:
                 if self._stagnates(history):
                     self._measures = False
                     self._memory.forget()
+                elif self.measures and not self._measures and here.violation.worst <= 10.0 * self.tolerance:
+                    self._measures = True
             elif self._anchor is not None:
                 here, self._anchor = self._anchor, None
             elif self._radius < LEAST_RADIUS:
@@ -145,8 +152,10 @@ class Descent:
 
     def _settled(self, here: _Visit, answer: QPSolution, gain: float, saving: float) -> bool:
         """Whether nothing worth having is foreseen."""
-        left = here.violation.total
-        if here.violation.worst > self.tolerance and gain > max(0.05 * self.tolerance, 1e-3 * left):
+        violation = here.violation
+        held = max(violation.hold, violation.elastic) <= self.tolerance
+        worth = max(0.05 * self.tolerance, 1e-3 * violation.total if held else 0.0)
+        if violation.worst > self.tolerance and gain > worth:
             return False
         if not self._measures:
             return True
@@ -162,17 +171,17 @@ class Descent:
     def _advance(
         self, here: _Visit, program: QuadraticProgram, answer: QPSolution, gain: float, saving: float
     ) -> _Visit | None:
-        """Go where the program says, or a little farther along what the last steps foretell; None if neither is good."""
+        """Go where the program says, or farther along what the last steps foretell; None if neither is good."""
         dq = answer.x
         fast = self._memory.propose(dq) if self._measures and gain <= FUNNEL * 0.1 else None
         if fast is not None:
-            there = self._try(here, np.clip(fast, program.lower, program.upper))
-            if there is not None and self._judge(here, there, gain, saving).by == "measure":
-                self._memory.went(there[1])
-                self._record(there[0], there[1], "accelerated")
+            leap = self._try(here, np.clip(fast, program.lower, program.upper))
+            if leap is not None and self._judge(here, leap, gain, saving).by == "measure":
+                self._memory.went(leap[1])
+                self._record(leap[0], leap[1], "accelerated")
                 self._shift = self._multipliers(program, dq)
                 self._anchor = None
-                return there[0]
+                return leap[0]
         tried = self._try(here, dq)
         verdict = _Verdict(False, False, False, "blocked") if tried is None else self._judge(here, tried, gain, saving)
         if tried is not None:
@@ -207,10 +216,12 @@ class Descent:
         return there
 
     def _promises(self, here: _Visit, there: _Visit) -> bool:
-        """Whether a rejected step went well but for curved constraints, so that one more may put that right (watchdog)."""
+        """Whether a rejected step went well but for curved constraints: one more may put that right (watchdog)."""
         if self._anchor is not None or not self._measures:
             return False
-        return there.violation.goal < here.violation.goal and max(there.violation.elastic, there.violation.hold) < MENDABLE
+        return (
+            there.violation.goal < here.violation.goal and max(there.violation.elastic, there.violation.hold) < MENDABLE
+        )
 
     def _multipliers(self, program: QuadraticProgram, dq: Array) -> Array:
         """What the rows would still lack after the step because the measures pull: to be asked for in the next one."""
@@ -232,7 +243,7 @@ class Descent:
 
     def _passed(self, here: _Visit, there: _Visit, pair: int) -> bool:
         """Whether a pair that touches on the way is apart again after it: jumped over, not bumped into."""
-        near = np.flatnonzero(there.at.contacts.index == pair)
+        near = np.flatnonzero(there.at.contacts.number == pair)
         return not len(near) or bool(there.at.contacts.distance[near[0]] > -JUMP_TOLERANCE)
 
     def _visit(self, q: Array) -> _Visit:
@@ -264,7 +275,11 @@ class Descent:
     def _record(self, there: _Visit, dq: Array, what: str) -> None:
         step = float(np.abs(dq).max(initial=0.0))
         note = f"{self.note}: {what}" if self.note else what
-        self.trace.append(Iterate(there.violation.left, max(there.violation.hold, there.violation.elastic), there.at.measure, step, note))
+        self.trace.append(
+            Iterate(
+                there.violation.left, max(there.violation.hold, there.violation.elastic), there.at.measure, step, note
+            )
+        )
 
 
 JUMP_TOLERANCE = 2e-4  # m: overlap on the way that does not count; finer than any piece is thick

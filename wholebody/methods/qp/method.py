@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
 from wholebody.methods.qp.descent import Descent, Local
 from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.solvers.base import make_solver
-from wholebody.methods.qp.starts import restarts
+from wholebody.methods.qp.starts import bent, restarts
 from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.tracking import Step, Tracker
 from wholebody.problem import Iterate, Problem, Solution, Status
 
-STAGES = (0.25, 0.5, 0.75, 1.0)  # of the way to the goals, when the straight attempt ends in a local minimum
+STAGES = (0.25, 0.5, 0.75)  # of the way to the goals, when the straight attempt ends in a local minimum
 LEAST_TOLERANCE = 1e-10
 
 
@@ -70,6 +71,7 @@ class QP:
         began = time.perf_counter()
         search = _Search(self, problem, began)
         search.run()
+        search.settle()
         best = search.best
         judgement = assess(problem, best.q)
         status = _status(best, judgement, self.tolerance)
@@ -120,41 +122,86 @@ class _Search:
         start = self.problem.scene.figure.clamp(self.problem.start)
         if self._accept(self._descend(start, np.inf, None, ""), "directly"):
             return
-        if self.problem.goals and self._accept(self._in_stages(start), "in stages"):
+        ways = chain(self._bent(start), self._staged(start), self._restarted(start))
+        for local, how in ways:
+            if self._accept(local, how) or time.perf_counter() > self.deadline:
+                return
+
+    def _bent(self, start: Array) -> Iterator[tuple[Local, str]]:
+        """Straight limbs hide what bending them would do: the same descent with joints moved off their limits."""
+        q = bent(self.problem, start)
+        if q is not None:
+            yield self._descend(q, self.deadline, None, "bent"), "from a start with bent joints"
+
+    def _staged(self, start: Array) -> Iterator[tuple[Local, str]]:
+        """Goals approached through intermediate ones: the errors at the start, shrinking to nothing."""
+        if not self.problem.goals:
             return
+        whole, q = self._goal_errors(start), start
+        for share in STAGES:
+            q = self._descend(q, self.deadline, (1.0 - share) * whole, "stage").q
+        yield self._descend(q, self.deadline, None, "stage"), "in stages"
+
+    def _restarted(self, start: Array) -> Iterator[tuple[Local, str]]:
+        """Seeded postures to begin from."""
         rng = np.random.default_rng(self.method.seed)
         for q in restarts(self.problem, start, rng, self.method.restarts):
-            if time.perf_counter() > self.deadline:
-                return
-            if self._accept(self._descend(q, self.deadline, None, "restart"), "from another start"):
-                return
+            yield self._descend(q, self.deadline, None, "restart"), "from another start"
 
-    def _descend(self, start: Array, deadline: float, offset: Array | None, note: str) -> Local:
-        descent = Descent(
-            self.subproblem, self.lineariser, self.method._solver, self.method.tolerance,
-            self.method.iterations, deadline, offset, self.trace, note,
-        )  # fmt: skip
-        local = descent.run(start)
+    def settle(self) -> None:
+        """Where the goals are not reached, come as near as goes, then improve the measures from there."""
+        if self.best.violation.left <= self.method.tolerance:
+            return
+        deadline = time.perf_counter() + self.method.budget
+        self._accept(self._descend(self.best.q, deadline, None, "nearest", measures=False), self.how)
+        best = self.best
+        if best.violation.left > self.method.tolerance and self.problem.measures:
+            local = self._stay(best)
+            if (
+                _held(local, self.method.tolerance)
+                and local.violation.left <= best.violation.left + self.method.tolerance
+            ):
+                self._best = local
+
+    def _stay(self, local: Local) -> Local:
+        """Descend with the goals' errors to stay as they are: what must hold is mended, then the measures improve."""
+        nearest = self._goal_errors(local.q)
+        deadline = time.perf_counter() + self.method.budget
+        stayed = self._descent(deadline, nearest, "nearest").run(local.q)
+        self.spent += stayed.iterations
+        left = float(np.linalg.norm(self._goal_errors(stayed.q)))
+        violation = stayed.violation._replace(goal=left, left=left)
+        return stayed._replace(violation=violation, converged=local.converged)
+
+    def _goal_errors(self, q: Array) -> Array:
+        state = self.lineariser.state.update(q)
+        return np.concatenate([np.zeros(0), *(np.atleast_1d(goal.error(state)) for goal in self.problem.goals)])
+
+    def _descend(
+        self, start: Array, deadline: float, offset: Array | None, note: str, *, measures: bool = True
+    ) -> Local:
+        """Descend from a start; where that ends with something that must hold not holding, mend it."""
+        local = self._descent(deadline, offset, note, measures=measures).run(start)
         self.spent += local.iterations
+        if not _held(local, self.method.tolerance) and offset is None and time.perf_counter() < deadline:
+            local = min(local, self._stay(local), key=lambda one: _rank(one, self.method.tolerance))
         return local
 
-    def _in_stages(self, start: Array) -> Local:
-        """Goals approached through intermediate ones: the errors at the start, shrinking to nothing."""
-        whole = np.concatenate(
-            [np.atleast_1d(goal.error(self.lineariser.state.update(start))) for goal in self.problem.goals]
-        )
-        q = start
-        for share in STAGES:
-            offset = (1.0 - share) * whole
-            local = self._descend(q, self.deadline, offset if share < 1.0 else None, "stage")
-            q = local.q
-        return local
+    def _descent(self, deadline: float, offset: Array | None, note: str, *, measures: bool = True) -> Descent:
+        return Descent(
+            self.subproblem, self.lineariser, self.method._solver, self.method.tolerance,
+            self.method.iterations, deadline, offset, self.trace, note, measures,
+        )  # fmt: skip
 
     def _accept(self, local: Local, how: str) -> bool:
         """Keep the better one; whether what is asked holds now."""
         if self._best is None or _rank(local, self.method.tolerance) < _rank(self._best, self.method.tolerance):
             self._best, self.how = local, how
         return self.best.violation.worst <= self.method.tolerance
+
+
+def _held(local: Local, tolerance: float) -> bool:
+    return max(local.violation.hold, local.violation.elastic) <= tolerance
 
 
 def _rank(local: Local, tolerance: float) -> tuple[float, float, float]:

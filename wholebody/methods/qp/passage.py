@@ -37,13 +37,13 @@ def doubtful_pairs(proximity: Proximity, before: Placed, after: Placed) -> Indic
     motion = _motion(proximity, before.placements, after.placements)
     pairs = proximity.pairs
     room = proximity.widths + (before.within + after.within)
-    room[before.contacts.index] += np.maximum(before.contacts.distance, 0.0) - before.within
-    room[after.contacts.index] += np.maximum(after.contacts.distance, 0.0) - after.within
+    room[before.contacts.number] += np.maximum(before.contacts.distance, 0.0) - before.within
+    room[after.contacts.number] += np.maximum(after.contacts.distance, 0.0) - after.within
     doubtful = np.flatnonzero(motion[pairs[:, 0]] + motion[pairs[:, 1]] > room)
     if not len(doubtful):
         return doubtful
     listed = np.full(len(pairs), -1, dtype=np.intp)
-    listed[before.contacts.index] = np.arange(len(before.contacts.index))
+    listed[before.contacts.number] = np.arange(len(before.contacts.number))
     return np.array([k for k in doubtful if not _parted(proximity, before, after, int(listed[k]))], dtype=np.intp)
 
 

@@ -3,9 +3,10 @@
     minimise    1/2 x' D x + g' x  +  1/2 sum_i w_i (t_i x - e_i)^2  +  1/2 sum_j v_j max(0, l_j - c_j x)^2
     subject to  lower <= x <= upper
 
-D is diagonal and positive. The soft rows t carry goals and equalities, the elastic rows c what must stay apart or within
-bounds. Only the box is hard, so a start in penetration, a goal out of reach or constraints that contradict each other
-are ordinary programs and none is infeasible. Large weights order the rows: what has the larger weight gives way last.
+D is diagonal and positive. The soft rows t carry goals and equalities, the elastic rows c what must stay apart or
+within bounds. Only the box is hard, so a start in penetration, a goal out of reach or constraints that contradict
+each other are ordinary programs and none is infeasible. Large weights order the rows: what has the larger weight
+gives way last.
 """
 
 from __future__ import annotations

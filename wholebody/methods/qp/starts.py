@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -11,17 +10,25 @@ import pinocchio as pin
 from wholebody.methods.qp.quadratic_program import Array
 from wholebody.problem import Problem
 
-if TYPE_CHECKING:
-    from wholebody.figures.figure import Figure
-
 SPREADS = (0.3, 0.6, 1.0)  # share of each joint's range that a start may leave the first one by, in turn
 AT_LIMIT = 0.02  # rad: nearer to its limit than this a joint counts as at it
 BEND = 0.3  # rad: by which it is then moved off
-ROOT_SPREAD = 0.2  # m and rad, likewise, for joints without limits
+ROOT_SPREAD = 0.2  # m and rad, for joints without limits
+
+
+def bent(problem: Problem, start: Array) -> Array | None:
+    """The start, shape (nq,), with every joint that rests at a limit moved off it; None where there is none."""
+    limits = problem.scene.figure.limits
+    value = start[limits.idx_q]
+    move = np.zeros(problem.scene.model.nv)
+    move[limits.idx_v[value < limits.lower + AT_LIMIT]] = BEND
+    move[limits.idx_v[value > limits.upper - AT_LIMIT]] = -BEND
+    moved = _moved(problem, start, move)
+    return None if np.array_equal(moved, start) else moved
 
 
 def restarts(problem: Problem, start: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:
-    """Postures within limits, farther and farther from the start.
+    """Postures within limits, farther and farther from the start, shape (nq,).
 
     Args:
         problem: whose bounds are kept: frozen joints stay where they are.
@@ -29,27 +36,20 @@ def restarts(problem: Problem, start: Array, rng: np.random.Generator, count: in
         rng: where the randomness comes from.
         count: how many.
     """
-    figure, model = problem.scene.figure, problem.scene.model
-    lower, upper = figure.tangent_bounds(start)
+    lower, upper = problem.scene.figure.tangent_bounds(start)
     span = np.where(np.isfinite(upper - lower), upper - lower, ROOT_SPREAD)
+    for number in range(count):
+        spread = SPREADS[number % len(SPREADS)]
+        yield _moved(problem, start, rng.uniform(-0.5, 0.5, len(span)) * spread * span)
+
+
+def _moved(problem: Problem, start: Array, move: Array) -> Array:
+    """The start moved by (nv,) as far as limits and bounds allow."""
+    figure = problem.scene.figure
+    lower, upper = figure.tangent_bounds(start)
     state = problem.lineariser().state.update(start)
     for bound in problem.bounds:
         low, high = bound.bounds(state, None)
         lower, upper = np.maximum(lower, low), np.minimum(upper, high)
-    if count:
-        # straight limbs at their limits hide what bending them would do: begin with all of them a little bent
-        yield figure.clamp(pin.integrate(model, start, np.clip(_inward(start, figure), lower, upper)))
-    for number in range(count - 1):
-        spread = SPREADS[number % len(SPREADS)]
-        move = rng.uniform(-0.5, 0.5, model.nv) * spread * span
-        yield figure.clamp(pin.integrate(model, start, np.clip(move, lower, upper)))
-
-
-def _inward(start: Array, figure: Figure) -> Array:
-    """Displacement (nv,) that moves joints at a limit off it."""
-    move = np.zeros(figure.model.nv)
-    limits = figure.limits
-    value = start[limits.idx_q]
-    move[limits.idx_v[value < limits.lower + AT_LIMIT]] = BEND
-    move[limits.idx_v[value > limits.upper - AT_LIMIT]] = -BEND
-    return move
+    q: Array = figure.clamp(pin.integrate(figure.model, start, np.clip(move, lower, np.maximum(lower, upper))))
+    return q

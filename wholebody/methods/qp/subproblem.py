@@ -15,12 +15,13 @@ from wholebody.linearisation import Linearisation
 from wholebody.methods.qp.quadratic_program import Array, QuadraticProgram
 from wholebody.problem import Problem
 
+ALOOF = 0.01  # share of the curvature left where measures do not count: they still say which joints move
 GOAL_FORCE = 1e4  # 1/m: what a goal pulls with, however far it is; far above what measures pull with
 GOAL_WEIGHTS = (1e4, 1e8)  # 1/m^2, 1/rad^2: least and greatest weight of a goal row
 HOLD_WEIGHT = 1e10  # equalities give way by 1e-6 m to the pull of a goal out of reach
 ELASTIC_WEIGHT = 1e10  # and so do contacts
 PULL = 0.4  # m per rad of radius: of a goal farther away, or a deeper overlap, one step asks for this much
-BOX = 2.0  # radii: the box around a step, which seldom holds it; asking for little at a time keeps programs easy instead
+BOX = 2.0  # radii: the box around a step, which seldom holds it; asking for little keeps programs easy instead
 HOLD_SHARE = 3.0  # what a metre of hold counts against a metre of goal when a step is judged
 ELASTIC_SHARE = 10.0  # and a metre of overlap; above any ratio at which overlap could buy goal
 LEAST_CURVATURE = 1e-3  # share of the largest curvature that a degree of freedom has which no measure speaks for
@@ -135,7 +136,7 @@ class Subproblem:
         floor = float(at.curvature.max(initial=0.0)) * LEAST_CURVATURE or 1.0
         diagonal = np.maximum(at.curvature, floor)
         linear = at.gradient if measures else np.zeros_like(at.gradient)
-        diagonal = np.maximum(diagonal if measures else np.minimum(diagonal, 1.0), np.abs(linear) / radius)
+        diagonal = np.maximum(diagonal if measures else ALOOF * diagonal, np.abs(linear) / radius)
         error = rows.soft_error.copy()
         farthest = float(np.abs(error[: rows.goals]).max(initial=0.0))
         if farthest > PULL * radius:

@@ -14,8 +14,10 @@ from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.working_set import solve_by_rows
 from wholebody.problem import Problem
 
-WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows; at least what moves in one step
-LARGEST_STEP = 0.25  # rad, m: where no velocity bounds a step, this does
+LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
+LARGEST_WITHIN = 0.5
+HEADROOM = 2.5  # pairs within this many times the last step's motion get rows, so that the next may be longer
+RADIUS = 0.25  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
 
 
 class Step(NamedTuple):
@@ -29,6 +31,8 @@ class Step(NamedTuple):
         rows: how many contact rows.
         exact: whether the program was solved to rounding.
         iterations: iterations of the QP solver.
+        by: what closed the program, see `QPSolution`.
+        share: how much of the program's displacement was gone: less than 1 where it was longer than what was looked at.
     """
 
     q: Array
@@ -38,10 +42,16 @@ class Step(NamedTuple):
     rows: int
     exact: bool
     iterations: int
+    by: str
+    share: float
 
 
 class Tracker:
-    """Follows the goals of one problem, step by step."""
+    """Follows the goals of one problem, step by step.
+
+    No step moves any piece farther than half the distance within which pairs were looked at, so nothing is jumped over,
+    however thin, at any dt.
+    """
 
     def __init__(self, problem: Problem, solver: QPSolver, dt: float) -> None:
         """Set up for steps of `dt` seconds.
@@ -56,17 +66,38 @@ class Tracker:
         self._subproblem = Subproblem(problem)
         self._lineariser = problem.lineariser(dt)
         self._guess: ActiveSet | None = None
+        self._within = LEAST_WITHIN
+        proximity = problem.scene.proximity
+        self._moving = np.flatnonzero(proximity.joint > 0)
+        self._support = self._lineariser.state.support[proximity.joint[self._moving]]
+        self._reach = proximity.reach[self._moving]
 
     def step(self, q: Array) -> Step:
-        """One step from q, shape (nq,)."""
-        model = self.problem.scene.model
-        at = self._lineariser.at(q, WITHIN)
+        """One step from q, shape (nq,); a posture out of limits is brought back first."""
+        scene = self.problem.scene
+        at = self._lineariser.at(q, self._within)
         rows = self._subproblem.rows(at)
-        program = self._subproblem.program(at, rows, LARGEST_STEP, 0.0, np.zeros(len(rows.soft_error)), True)
+        program = self._subproblem.program(at, rows, RADIUS, 0.0, np.zeros(len(rows.soft_error)), True)
         answer = solve_by_rows(self._solver, program, self._guess)
         self._guess = answer.active
-        following = pin.integrate(model, at.q, answer.x)
+        motion = self._motion(answer.x)
+        share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
+        self._within = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
+        displacement = answer.x if share == 1.0 else share * answer.x
+        following = pin.integrate(scene.model, at.q, displacement)
         return Step(
-            following, answer.x, answer.x / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
-            answer.iterations,
+            following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
+            answer.iterations, answer.by, share,
         )  # fmt: skip
+
+    def _motion(self, displacement: Array) -> float:
+        """Longest way of any point of any piece, metres, to first order in the displacement (nv,)."""
+        twist = (self._support * displacement) @ self._lineariser.state.jacobian.T
+        center = self.problem.scene.proximity.placements[self._moving, 3]
+        turn = twist[:, 3:]
+        shift = twist[:, :3].copy()
+        shift[:, 0] += turn[:, 1] * center[:, 2] - turn[:, 2] * center[:, 1]
+        shift[:, 1] += turn[:, 2] * center[:, 0] - turn[:, 0] * center[:, 2]
+        shift[:, 2] += turn[:, 0] * center[:, 1] - turn[:, 1] * center[:, 0]
+        way = np.sqrt(np.einsum("ij,ij->i", shift, shift)) + np.sqrt(np.einsum("ij,ij->i", turn, turn)) * self._reach
+        return float(way.max(initial=0.0))

@@ -12,6 +12,9 @@ from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution,
 GUESS_TOLERANCE = 1e-4
 """How near to its bound an approximate answer counts as on it [rad, m]."""
 
+WARM_CORRECTIONS = 3
+"""Corrections of the last active set before the solver is asked."""
+
 CORRECTIONS = 12
 """Corrections of a guessed active set before the solver is asked for a better answer."""
 
@@ -21,9 +24,8 @@ class QPSolver(ABC):
 
     name: str
 
-    @abstractmethod
     def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
-        """Minimise.
+        """Minimise: with the last active set, which most steps of a drag do not change, else by the solver.
 
         Args:
             program: what to solve.
@@ -32,6 +34,15 @@ class QPSolver(ABC):
         Returns:
             The answer; `exact` is False where only an approximation was found. Never NaN, always inside the box.
         """
+        if guess is not None:
+            solution = solve_from(program, guess, WARM_CORRECTIONS)
+            if solution is not None:
+                return solution._replace(by="last active set")
+        return self.solve_cold(program)
+
+    @abstractmethod
+    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
+        """Minimise without a guess; what `solve` falls back on."""
 
 
 def finish(program: QuadraticProgram, x: Array, iterations: int, by: str) -> QPSolution | None:

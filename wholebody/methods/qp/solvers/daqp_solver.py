@@ -6,12 +6,15 @@ from ctypes import c_int
 
 import numpy as np
 
-from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver, approximate, finish
 from wholebody.methods.qp.solvers.split_form import split
 
 FAR = 1e30  # DAQP's infinity
-HEAVIEST = (1e5, 1e10)  # weights are cut to this: milder programs are three times faster, and mostly enough for `finish`
+HEAVIEST = (
+    1e5,
+    1e10,
+)  # weights are cut to this: milder programs are faster, and mostly enough for `finish`
 LIMIT = 500  # iterations
 TOLERANCE = 1e-9  # of rows, m
 EQUALITY = 5  # DAQP's mark for a row that is always active
@@ -22,8 +25,8 @@ class DAQPSolver(QPSolver):
 
     name = "daqp"
 
-    def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
-        """Minimise; see `QPSolver.solve`. DAQP starts cold, so the guess is not used."""
+    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
+        """Minimise; see `QPSolver.solve_cold`."""
         return solve_with_daqp(program)
 
 
@@ -41,7 +44,14 @@ def solve_with_daqp(program: QuadraticProgram) -> QPSolution:
         sense = np.zeros(n + m + k, dtype=c_int)
         sense[n : n + m] = EQUALITY
         x, _, _, info = daqp.solve(
-            np.diag(form.diagonal), form.linear, form.matrix, upper, lower, sense, primal_tol=TOLERANCE, iter_limit=LIMIT
+            np.diag(form.diagonal),
+            form.linear,
+            form.matrix,
+            upper,
+            lower,
+            sense,
+            primal_tol=TOLERANCE,
+            iter_limit=LIMIT,
         )
         x = np.where(np.isfinite(x[:n]), x[:n], 0.0)
         iterations += int(info["iterations"])

@@ -7,14 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.methods.qp.active_set import solve_from
-from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution, QuadraticProgram
+from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver, finish, last_resort
 
 HEAVIEST = 1e5  # weights are cut to this: OSQP needs many times the iterations for larger ones
 SLOTS = 8  # elastic rows come in multiples of this, so that the sparsity seldom changes; more slots = slower iterations
 SCALE = 100.0  # x is in hundredths of a radian inside OSQP: its absolute tolerance then means 1e-7 rad
-WARM_CORRECTIONS = 3  # tries with the last active set before OSQP is asked
 ROUNDS = ((50, 1e-3), (100, 1e-5))  # iterations and tolerance, tried until `finish` succeeds
 FAR = 1e30  # OSQP's infinity
 
@@ -22,9 +20,9 @@ FAR = 1e30  # OSQP's infinity
 class OSQPSolver(QPSolver):
     """OSQP (Stellato et al. 2020) on the split form.
 
-    First the last active set is tried: most steps of a drag do not change it. Else OSQP iterates until an active set
-    read off its answer settles. It is a first-order method, and where many bounds and contacts bind at once thousands
-    of its iterations may not tell the set; such programs, a few in a hundred, are given to DAQP.
+    OSQP iterates until an active set read off its answer settles. It is a first-order method, and where many bounds and
+    contacts bind at once thousands of its iterations may not tell the set; such programs, a few in a hundred, are given
+    to DAQP.
     """
 
     name = "osqp"
@@ -33,12 +31,8 @@ class OSQPSolver(QPSolver):
         """Begin without a workspace."""
         self._workspace: _Workspace | None = None
 
-    def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
-        """Minimise; see `QPSolver.solve`."""
-        if guess is not None:
-            solution = solve_from(program, guess, WARM_CORRECTIONS)
-            if solution is not None:
-                return solution._replace(by="last active set")
+    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
+        """Minimise; see `QPSolver.solve_cold`."""
         if self._workspace is None or not self._workspace.fits(program):
             self._workspace = _Workspace(program, self._workspace)
         self._workspace.load(program)

@@ -6,10 +6,9 @@ import warnings
 
 import numpy as np
 
-from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver, finish, last_resort
 from wholebody.methods.qp.solvers.split_form import split
-
 
 HEAVIEST = 1e5  # weights are cut to this: solvers find the active set of a milder program more reliably
 
@@ -24,8 +23,8 @@ class QpsolversSolver(QPSolver):
         self.name = name
         self._sparse = name in sparse_solvers
 
-    def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
-        """Minimise; see `QPSolver.solve`. The guess is not used."""
+    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
+        """Minimise; see `QPSolver.solve_cold`."""
         from qpsolvers import Problem, solve_problem
         from scipy import sparse
 

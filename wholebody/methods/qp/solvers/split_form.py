@@ -15,6 +15,7 @@ import numpy as np
 
 from wholebody.methods.qp.quadratic_program import Array, QuadraticProgram
 
+
 class SplitForm(NamedTuple):
     """Objective and rows over z = [x, r, s] of size n + m + k.
 
