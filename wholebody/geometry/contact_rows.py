@@ -63,7 +63,7 @@ class ContactRowBuilder:
         self._face_start = np.concatenate([[0], np.cumsum(self._face_count)])[:-1].astype(np.intp)
         self._radius = np.array([core.radius for core in cores])
         self._axis = np.array([core.axis for core in cores]).reshape(-1, 3)
-        self._is_capsule = self._axis.any(axis=1)
+        self._is_capsule: NDArray[np.bool_] = np.asarray(self._axis.any(axis=1))
         flat = (self._point_count >= 2) | np.isinf(proximity.reach)
         self._extended = flat[proximity.pairs].all(axis=1)
 
@@ -142,7 +142,7 @@ class ContactRowBuilder:
             limit = np.where(rising, np.maximum(room, 0.0) / np.where(rising, climb, 1.0), 1.0)
             np.minimum.at(reach, row, limit)
 
-        capsule = np.flatnonzero(self._is_capsule[other])
+        capsule: Indices = np.flatnonzero(self._is_capsule[other])
         if len(capsule):
             axis = self._axis[other[capsule]]
             down = np.einsum("ijk,ik->ij", rotation[capsule], towards[capsule])
