@@ -161,7 +161,7 @@ def test_what_is_no_text_or_no_toml_is_refused(tmp_path: Path, content: bytes) -
 
 def test_a_file_that_is_not_there_is_told_with_its_neighbours(tmp_path: Path) -> None:
     (tmp_path / "shelf.toml").touch()
-    with pytest.raises(WholebodyError, match="did you mean shelf[.]toml"):
+    with pytest.raises(WholebodyError, match=r"did you mean shelf\.toml"):
         read_task(tmp_path / "shef.toml")
     with pytest.raises(WholebodyError):
         read_task(tmp_path)
