@@ -209,6 +209,9 @@ def _material(color: Color, *, flat: bool) -> Three:
         "color": _number(color),
         "opacity": color[3],
         "transparent": color[3] < 1.0,
+        "polygonOffset": color[3] < 1.0,  # a ghost's surface yields to the figure's where the two coincide
+        "polygonOffsetFactor": 2,
+        "polygonOffsetUnits": 8,
         "flatShading": flat,
         "shininess": 18,
         "specular": 0x1E1E1E,
