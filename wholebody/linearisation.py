@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,15 +86,15 @@ class Lineariser:
         self.scene, self.goals, self.constraints = scene, goals, constraints
         self.bounds, self.measures, self.clearances, self.dt = bounds, measures, clearances, dt
         self.state = State(scene.model)
-        self._terms: list[Any] = [*goals, *constraints]
+        self._largest_clearance = float(clearances.max(initial=0.0))
 
     def at(self, q: Array, within: float) -> Linearisation:
         """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance."""
         state, scene = self.state, self.scene
         state.update(q)
-        reach = within + (float(self.clearances.max()) if len(self.clearances) else 0.0)
-        contacts = scene.proximity.near(state.data, reach)
-        rows = scene.row_builder.rows(contacts)
+        contacts = scene.proximity.near(state.data, within + self._largest_clearance)
+        clearance = self.clearances[contacts.number]
+        rows = scene.row_builder.rows(contacts, clearance)
 
         errors = [np.atleast_1d(goal.error(state)) for goal in self.goals]
         values = [np.atleast_1d(constraint.value(state)) for constraint in self.constraints]
@@ -114,7 +113,7 @@ class Lineariser:
             gap=rows.gap,
             gap_jacobian=jacobian[goal_rows + value_rows :],
             gap_contact=rows.contact,
-            clearance=self.clearances[contacts.number][rows.contact],
+            clearance=clearance[rows.contact],
             measure=measure,
             gradient=gradient,
             curvature=curvature,
@@ -129,7 +128,7 @@ class Lineariser:
         against: list[int] = []
         dense: list[tuple[int, Array]] = []
         row = 0
-        for term in self._terms:
+        for term in (*self.goals, *self.constraints):
             part = term.jacobian(state)
             if isinstance(part, Wrench):
                 size = len(part.rows)

@@ -14,6 +14,9 @@ would forbid turning about that edge.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache
+from importlib.util import find_spec
 from typing import NamedTuple
 
 import numpy as np
@@ -25,9 +28,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 BAND = 0.02  # m: core points this much farther than the witness point still make a row; wider = more rows
-LEVER_DISTANCE = 0.04  # m: pairs farther apart than this get their witness row only
+LEVER_DISTANCE = 0.025  # m: pairs that are this much farther apart than they must be get their witness row only
 INSET = 5e-4  # m: how far below the plane a point must find the other piece; larger = larger patches on round pieces
-SHORTEST_LEVER = 2e-3  # m: rows nearer to the witness point than this say what the witness row says
+SHORTEST_LEVER = 8e-3  # m: rows nearer to the witness point than this say what the witness row says
 
 
 class ContactRows(NamedTuple):
@@ -66,18 +69,24 @@ class ContactRowBuilder:
         self._is_capsule: NDArray[np.bool_] = np.asarray(self._axis.any(axis=1))
         flat = (self._point_count >= 2) | np.isinf(proximity.reach)
         self._extended = flat[proximity.pairs].all(axis=1)
+        self._kernel = compiled_kernel()
 
-    def rows(self, contacts: Contacts) -> ContactRows:
-        """Rows of all contacts, at the placements of the last query."""
+    def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
+        """Rows of all contacts, at the placements of the last query.
+
+        Args:
+            contacts: the near pairs.
+            clearance: distance asked of each contact, (k,) or one for all, metres.
+        """
         k = len(contacts.distance)
         joint = self.proximity.joint
         wrench = _wrenches(contacts.normal, contacts.point_a)
         first, second = joint[contacts.pair[:, 0]], joint[contacts.pair[:, 1]]
         index = np.arange(k)
-        wide = np.flatnonzero(self._extended[contacts.number] & (contacts.distance < LEVER_DISTANCE))
+        wide = np.flatnonzero(self._extended[contacts.number] & (contacts.distance < clearance + LEVER_DISTANCE))
         if not len(wide):
             return ContactRows(contacts.distance, wrench, index, first, second)
-        contact, point, gap = self._patch(contacts, wide)
+        contact, point, gap = self._patch_compiled(contacts, wide) if self._kernel else self._patch(contacts, wide)
         return ContactRows(
             np.concatenate([contacts.distance, gap]),
             np.vstack([wrench, _wrenches(contacts.normal[contact], point)]),
@@ -85,6 +94,16 @@ class ContactRowBuilder:
             np.concatenate([first, first[contact]]),
             np.concatenate([second, second[contact]]),
         )
+
+    def _patch_compiled(self, contacts: Contacts, wide: Indices) -> tuple[Indices, Array, Array]:
+        """The same as `_patch` by a compiled loop."""
+        assert self._kernel is not None
+        contact, point, gap = self._kernel(
+            wide, contacts.pair, contacts.distance, contacts.normal, contacts.point_a, contacts.point_b,
+            self.proximity.placements, self._points, self._point_start, self._point_count, self._faces,
+            self._face_start, self._face_count, self._radius, self._axis, self._is_capsule, BAND, INSET, SHORTEST_LEVER,
+        )  # fmt: skip
+        return contact, point, gap
 
     def _patch(self, contacts: Contacts, wide: Indices) -> tuple[Indices, Array, Array]:
         """Ends of the contact patches: contact, point (m, 3) and gap of each."""
@@ -116,7 +135,7 @@ class ContactRowBuilder:
         has[side] = True
         whole: NDArray[np.bool_] = over & has
         partner = np.concatenate([whole[count:], whole[:count]])
-        partner[count:] &= ~whole[count:]  # both whole: keep the first side
+        partner[:count] &= ~whole[:count]  # both whole: keep the first side
         length = np.sqrt(np.einsum("ij,ij->i", lever, lever)) * reach
         keep = np.flatnonzero((length > SHORTEST_LEVER) & ~partner[side])
         side, reach = side[keep], reach[keep]
@@ -155,6 +174,17 @@ class ContactRowBuilder:
             reach[capsule] = np.minimum(reach[capsule], limit)
             sag[capsule] = (reach[capsule] * offset) ** 2 / (2.0 * radius)
         return reach, sag
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Callable[..., tuple[Indices, Array, Array]] | None:
+    """The compiled loop where numba is installed (the extra "fast"), else None."""
+    if find_spec("numba") is None:
+        return None
+    from wholebody.geometry.patch_kernel import patch_ends
+
+    kernel: Callable[..., tuple[Indices, Array, Array]] = patch_ends
+    return kernel
 
 
 def _expand(start: Indices, count: Indices, item: Indices) -> tuple[Indices, Indices]:

@@ -75,6 +75,7 @@ class Tracker:
     def step(self, q: Array) -> Step:
         """One step from q, shape (nq,); a posture out of limits is brought back first."""
         scene = self.problem.scene
+        self._lineariser.goals = self.problem.goals
         at = self._lineariser.at(q, self._within)
         rows = self._subproblem.rows(at)
         program = self._subproblem.program(at, rows, RADIUS, 0.0, np.zeros(len(rows.soft_error)), True)

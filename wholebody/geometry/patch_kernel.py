@@ -1,0 +1,108 @@
+"""The ends of contact patches as one compiled loop: what `ContactRowBuilder` does in array code, 20 times as fast.
+
+Needs numba (the extra "fast"), which compiles it at the first use and keeps the result beside this file. Both ways give
+the same rows to rounding; the array code is the reference.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def patch_ends(
+    wide, pair, distance, normal, point_a, point_b, placement, points, point_start, point_count, faces, face_start,
+    face_count, radius, axis, is_capsule, band, inset, shortest,
+):  # type: ignore[no-untyped-def]  # fmt: skip
+    """Ends of the patches of the contacts `wide`; arguments as in `ContactRowBuilder`.
+
+    Returns:
+        Contact (m,), point (m, 3) and gap (m,) of each row.
+    """
+    most = 0
+    for c in wide:
+        most += point_count[pair[c, 0]] + point_count[pair[c, 1]]
+    contact = np.empty(most, dtype=np.int64)
+    place = np.empty((most, 3))
+    gap = np.empty(most)
+    filled = 0
+    base, along, lever = np.empty(3), np.empty(3), np.empty(3)
+    for c in wide:
+        for side in range(2):
+            own, other = pair[c, side], pair[c, 1 - side]
+            sign = 1.0 if side == 0 else -1.0
+            witness = point_a[c] if side == 0 else point_b[c]
+            facing = point_b[c] if side == 0 else point_a[c]
+            begun = filled
+            whole = True
+            seen = False
+            half_width = np.sqrt(2.0 * radius[other] * inset)
+            for i in range(3):
+                base[i] = 0.0
+                for k in range(3):
+                    base[i] += placement[other, i, k] * (
+                        facing[k] + inset * sign * normal[c, k] - placement[other, 3, k]
+                    )
+            for number in range(point_start[own], point_start[own] + point_count[own]):
+                height = 0.0
+                for k in range(3):
+                    lever[k] = placement[own, 3, k] - witness[k]
+                    for i in range(3):
+                        lever[k] += points[number, i] * placement[own, i, k]
+                    height += lever[k] * sign * normal[c, k]
+                drop = -height - radius[own]
+                if drop >= band:
+                    continue
+                seen = True
+                drop = max(drop, 0.0)
+                length = 0.0
+                for k in range(3):
+                    lever[k] -= height * sign * normal[c, k]
+                    length += lever[k] * lever[k]
+                length = np.sqrt(length)
+                for i in range(3):
+                    along[i] = 0.0
+                    for k in range(3):
+                        along[i] += placement[other, i, k] * lever[k]
+                reach = 1.0
+                for f in range(face_start[other], face_start[other] + face_count[other]):
+                    climb = faces[f, 0] * along[0] + faces[f, 1] * along[1] + faces[f, 2] * along[2]
+                    if climb > 1e-12:
+                        room = faces[f, 3] - (faces[f, 0] * base[0] + faces[f, 1] * base[1] + faces[f, 2] * base[2])
+                        reach = min(reach, max(room, 0.0) / climb)
+                sag = 0.0
+                if is_capsule[other]:
+                    down0, down1, down2 = 0.0, 0.0, 0.0
+                    for k in range(3):
+                        down0 += placement[other, 0, k] * sign * normal[c, k]
+                        down1 += placement[other, 1, k] * sign * normal[c, k]
+                        down2 += placement[other, 2, k] * sign * normal[c, k]
+                    across0 = axis[other, 1] * down2 - axis[other, 2] * down1
+                    across1 = axis[other, 2] * down0 - axis[other, 0] * down2
+                    across2 = axis[other, 0] * down1 - axis[other, 1] * down0
+                    norm = max(np.sqrt(across0 * across0 + across1 * across1 + across2 * across2), 1e-9)
+                    offset = abs(across0 * along[0] + across1 * along[1] + across2 * along[2]) / norm
+                    if offset > half_width:
+                        reach = min(reach, half_width / max(offset, 1e-12))
+                    sag = (reach * offset) ** 2 / (2.0 * radius[other])
+                if reach < 1.0:
+                    whole = False
+                if length * reach > shortest:
+                    contact[filled] = c
+                    for k in range(3):
+                        place[filled, k] = witness[k] + reach * lever[k]
+                    gap[filled] = distance[c] + reach * drop + sag
+                    filled += 1
+            if side == 0:
+                first_begun, first_whole = begun, whole and seen
+                if first_whole:
+                    break  # this side is the patch: the other side's points add nothing
+            elif whole and seen:
+                count = filled - begun
+                for row in range(count):
+                    contact[first_begun + row] = contact[begun + row]
+                    place[first_begun + row] = place[begun + row]
+                    gap[first_begun + row] = gap[begun + row]
+                filled = first_begun + count
+    return contact[:filled], place[:filled], gap[:filled]
