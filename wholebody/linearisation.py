@@ -128,7 +128,8 @@ class Lineariser:
         against: list[int] = []
         dense: list[tuple[int, Array]] = []
         row = 0
-        for term in (*self.goals, *self.constraints):
+        terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
+        for term in terms:
             part = term.jacobian(state)
             if isinstance(part, Wrench):
                 size = len(part.rows)

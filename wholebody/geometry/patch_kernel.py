@@ -8,13 +8,34 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 
 @njit(cache=True)
 def patch_ends(
-    wide, pair, distance, normal, point_a, point_b, placement, points, point_start, point_count, faces, face_start,
-    face_count, radius, axis, is_capsule, band, inset, shortest,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+    wide: Indices,
+    pair: Indices,
+    distance: Array,
+    normal: Array,
+    point_a: Array,
+    point_b: Array,
+    placement: Array,
+    points: Array,
+    point_start: Indices,
+    point_count: Indices,
+    faces: Array,
+    face_start: Indices,
+    face_count: Indices,
+    radius: Array,
+    axis: Array,
+    is_capsule: NDArray[np.bool_],
+    band: float,
+    inset: float,
+    shortest: float,
+) -> tuple[Indices, Array, Array]:
     """Ends of the patches of the contacts `wide`; arguments as in `ContactRowBuilder`.
 
     Returns:
@@ -23,7 +44,7 @@ def patch_ends(
     most = 0
     for c in wide:
         most += point_count[pair[c, 0]] + point_count[pair[c, 1]]
-    contact = np.empty(most, dtype=np.int64)
+    contact = np.empty(most, dtype=np.intp)
     place = np.empty((most, 3))
     gap = np.empty(most)
     filled = 0
