@@ -28,6 +28,8 @@ def run(_: argparse.Namespace) -> int:
     from wholebody.version import __version__
 
     console = Console()
+    if not console.is_terminal:
+        console.width = 140  # a file or a log need not be folded
     with console.status("trying everything once (about ten seconds)"):
         report = examine()
     console.print(f"[bold]wholebody {__version__}[/], {report.python}", highlight=False, soft_wrap=True)

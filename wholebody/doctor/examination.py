@@ -72,7 +72,7 @@ def examine(environ: Mapping[str, str] = os.environ) -> Report:
     Args:
         environ: the environment variables to judge.
     """
-    have = packages.installed(["wholebody", *MODULES, *EXTRAS, "libpinocchio", "libcoal", *_REQUIRED])
+    have = packages.installed(["wholebody", *MODULES, *EXTRAS])
     entries = [*_packages(have), *_solvers(have), *_methods(), *_tools()]
     faults = [*_python(), *_conflicts(have), *_paths(environ)]
     faults += [
@@ -81,10 +81,6 @@ def examine(environ: Mapping[str, str] = os.environ) -> Report:
         if entry.state == "broken" or (entry.needed and entry.state == "absent")
     ]
     return Report(f"Python {sys.version.split()[0]}, {sys.executable}", tuple(entries), tuple(faults))
-
-
-_REQUIRED = ("cmeel-urdfdom", "cmeel-tinyxml2")
-"""What placo asks for by exact version, beside pin."""
 
 
 def _packages(have: Mapping[str, Distribution]) -> Iterator[Entry]:

@@ -83,34 +83,44 @@ def normal(name: str) -> str:
 
 
 def installed(names: Iterable[str]) -> dict[str, Distribution]:
-    """Those of the named distributions that this Python has."""
-    found = {}
-    for name in names:
+    """Those of the named distributions that this Python has, and those that they need in an exact version."""
+    found: dict[str, Distribution] = {}
+    left = [normal(name) for name in names]
+    seen = set(left)
+    while left:
+        name = left.pop()
         try:
             distribution = metadata.distribution(name)
         except metadata.PackageNotFoundError:
             continue
         files = frozenset(os.path.realpath(str(file.locate())) for file in distribution.files or ())
-        found[normal(name)] = Distribution(distribution.version, tuple(distribution.requires or ()), files)
+        found[name] = Distribution(distribution.version, tuple(distribution.requires or ()), files)
+        needed = {other for other, _ in exact_needs(found[name])} - seen
+        seen |= needed
+        left += needed
     return found
+
+
+def exact_needs(distribution: Distribution) -> list[tuple[str, str]]:
+    """Requirements of the form ``name==version`` without a condition: (name, version)."""
+    matches = (_EXACT.match(requirement) for requirement in distribution.requires)
+    return [(normal(match["name"]), match["version"]) for match in matches if match]
 
 
 def conflicts(have: Mapping[str, Distribution]) -> list[Conflict]:
     """Exact versions that an installed package asks for and does not get.
 
-    Only ``name==version`` without a condition is looked at: those are the binary interfaces of Pinocchio, coal and
-    placo, which are built against each other. What is not among `have` at all is not judged here.
+    Those are the binary interfaces of Pinocchio, coal and placo, which are built against each other.
+
+    Args:
+        have: what is installed, with what it needs in an exact version: `installed`.
     """
     found = []
     for who, distribution in sorted(have.items()):
-        for requirement in distribution.requires:
-            match = _EXACT.match(requirement)
-            if match is None:
-                continue
-            other = have.get(normal(match["name"]))
-            if other is None or other.version != match["version"]:
-                needs = f"{match['name']}=={match['version']}"
-                found.append(Conflict(who, needs, other.version if other else None))
+        for name, version in exact_needs(distribution):
+            other = have.get(name)
+            if other is None or other.version != version:
+                found.append(Conflict(who, f"{name}=={version}", other.version if other else None))
     return found
 
 
