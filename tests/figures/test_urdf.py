@@ -195,3 +195,11 @@ def test_options_are_checked():
         load(ARM, root="floating")
     with pytest.raises(UnknownNameError, match="package_dirs"):
         load(ARM, package_dir=".")
+
+
+def test_finer_pieces_can_be_asked_for_and_added_volume_is_said():
+    fine, hulls = load(ARM, concavity=0.05), load(ARM, concavity=1.0)
+    count = [sum(p.name.startswith("tool") for p in arm.geometry.geometryObjects) for arm in (fine, hulls)]
+    assert count[0] > count[1] == 1
+    # The hull of the bracket is a pentagon of 0.00755 m^2, the bracket itself has 0.0051 m^2.
+    assert any("'tool'" in note and "48% more volume" in note for note in hulls.notes), hulls.notes

@@ -19,7 +19,7 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
         spec: "human", "avatar", "hand", or the path of a URDF file.
         **options: for "human" and "avatar": `sex` ("male", "female"), `stature` in metres, `mass` in kilograms and
             `detail` ("spheres", "capsules", "hulls"); for "hand": `side` ("left", "right"), `sex`, `stature`, `mass`;
-            for a URDF: `root` ("fixed", "free") and `package_dirs`, folders for ``package://`` names.
+            for a URDF: `root` ("fixed", "free"), `package_dirs`, folders for ``package://`` names, and `concavity`.
 
     Raises:
         UnknownNameError: an unknown name or option.

@@ -23,6 +23,10 @@ Array = NDArray[np.float64]
 CYLINDER_SIDES = 32
 """A cylinder becomes a prism around it with this many sides; its corners stand out by 0.5 % of the radius."""
 
+CONCAVITY = 0.2
+"""Concavity left in the pieces of a link's mesh, as a share of its size (see `convex_pieces`). Coarser than for
+things in a scene: at the 0.05 used there an industrial arm became 173 pieces in 90 s, at 0.2 it has 23 in 4 s."""
+
 COLOR = (0.62, 0.66, 0.70, 1.0)
 
 
@@ -30,6 +34,7 @@ def urdf_figure(
     path: str | PathLike[str],
     root: str = "fixed",
     package_dirs: Iterable[str | PathLike[str]] = (),
+    concavity: float = CONCAVITY,
     samples: int = 400,
     seed: int = 0,
 ) -> Figure:
@@ -39,6 +44,7 @@ def urdf_figure(
         path: the file.
         root: "fixed" to the world, or "free".
         package_dirs: folders in which ``package://`` names are looked up, beside the file's own parents.
+        concavity: left in the convex pieces of meshes, 0.01 (close) to 1 (hulls), as a share of a mesh's size.
         samples: random postures by which always-overlapping pairs are found.
         seed: of those postures.
 
@@ -55,7 +61,7 @@ def urdf_figure(
         model = pin.buildModelFromXML(urdf.text, *base)
     except Exception as error:  # what passed our checks and still fails in urdfdom
         raise FileFormatError(f"{urdf.path}: Pinocchio cannot read it ({error}); mend the file") from error
-    geometry, notes = _geometry(model, urdf)
+    geometry, notes = _geometry(model, urdf, concavity)
     excluded = choose_pairs(model, geometry, samples, seed)
     carrying = {collision.link for collision in urdf.collisions}
     segments = tuple(name for name in urdf.links if name in carrying) or urdf.links
@@ -90,12 +96,12 @@ def _chains(model: pin.Model, urdf: UrdfFile) -> dict[str, Chain]:
     return chains
 
 
-def _geometry(model: pin.Model, urdf: UrdfFile) -> tuple[pin.GeometryModel, tuple[str, ...]]:
+def _geometry(model: pin.Model, urdf: UrdfFile, concavity: float) -> tuple[pin.GeometryModel, tuple[str, ...]]:
     geometry, notes = pin.GeometryModel(), []
     count: dict[str, int] = {}
     for collision in urdf.collisions:
         try:
-            pieces, remarks = _pieces(collision)
+            pieces, remarks = _pieces(collision, concavity)
         except WholebodyError as error:
             raise FileFormatError(f"{urdf.path}: collision of link {collision.link!r}: {error}") from error
         notes += [f"link {collision.link!r}: {remark}" for remark in remarks]
@@ -115,7 +121,7 @@ def _geometry(model: pin.Model, urdf: UrdfFile) -> tuple[pin.GeometryModel, tupl
     return geometry, tuple(notes)
 
 
-def _pieces(collision: Collision) -> tuple[list[tuple[Any, pin.SE3]], tuple[str, ...]]:
+def _pieces(collision: Collision, concavity: float) -> tuple[list[tuple[Any, pin.SE3]], tuple[str, ...]]:
     """Convex pieces of one collision element, in its frame, and what was changed about them."""
     from wholebody.geometry.convex import convex_pieces, hull_piece
     from wholebody.geometry.meshes import read_mesh
@@ -135,8 +141,12 @@ def _pieces(collision: Collision) -> tuple[list[tuple[Any, pin.SE3]], tuple[str,
     scale = np.array(size)
     if np.prod(scale) < 0.0:
         faces = faces[:, ::-1]
-    split = convex_pieces(vertices * scale, faces, what=f"mesh {collision.file.name}")
-    return [(piece.geometry, piece.placement) for piece in split.pieces], split.notes
+    name = f"mesh {collision.file.name}"
+    split = convex_pieces(vertices * scale, faces, threshold=concavity, what=name)
+    notes = split.notes
+    if split.added_volume > 0.01:
+        notes += (f"{name}: its convex pieces ({len(split.pieces)}) have {split.added_volume:.0%} more volume",)
+    return [(piece.geometry, piece.placement) for piece in split.pieces], notes
 
 
 def _prism(radius: float, length: float) -> Array:
