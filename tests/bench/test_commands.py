@@ -1,0 +1,104 @@
+"""`wholebody bench` from end to end, as short as it can be: files, tables, charts, page."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import pytest
+
+from wholebody.bench import style
+from wholebody.bench.reaches import ReachRow
+from wholebody.bench.solve import MemoryRow, SolveRow
+from wholebody.bench.step import StepRow, StepTime
+from wholebody.bench.tables import read_rows
+from wholebody.bench.tools import NEEDS
+from wholebody.bench.track import VARIANTS
+from wholebody.cli.bench import add_to
+
+MARKERS = "\n".join(f"<!-- bench:{name} -->\n<!-- /bench:{name} -->" for name in ("step", "reaches", "solve"))
+
+
+def bench(*words: str) -> int:
+    parser = argparse.ArgumentParser()
+    add_to(parser.add_subparsers())
+    arguments = parser.parse_args(["bench", *words])
+    return int(arguments.run(arguments))
+
+
+@pytest.fixture
+def docs(tmp_path: Path) -> Path:
+    folder = tmp_path / "docs"
+    folder.mkdir()
+    (folder / "results.md").write_text(MARKERS)
+    return folder
+
+
+def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("matplotlib")
+    words = ("--repeats", "2", "--steps", "6", "--tools", "wholebody/daqp", "placo", "--out", str(tmp_path / "out"))
+    assert bench("step", *words, "--update-docs", str(docs)) == 0
+    facts, rows = read_rows(tmp_path / "out" / "step.csv", StepRow)
+    assert facts["steps"] == "6"
+    assert [(row.reach, row.tool) for row in rows] == [
+        (reach, tool) for reach in VARIANTS for tool in ("wholebody/daqp", "placo")
+    ]
+    for row in rows:
+        assert 0.0 < row.median_us <= row.p95_us
+        assert row.pairs >= 700
+        assert row.limit_violation < 1e-9
+        assert row.tool != "placo" or row.ratio == row.ratio_p95 == 1.0
+    _, times = read_rows(tmp_path / "out" / "step-times.csv", StepTime)
+    assert len(times) == len(VARIANTS) * 2 * 2 * 6
+    page = (docs / "results.md").read_text()
+    assert "| placo |" in page
+    assert "assets/bench/step-times.svg" in page
+    assert (docs / "assets" / "bench" / "step-times.svg").read_text().startswith("<?xml")
+    assert (tmp_path / "out" / "step-distances.png").read_bytes().startswith(b"\x89PNG")
+    assert "994 pairs" in capsys.readouterr().out
+
+
+def test_reaches(tmp_path: Path, docs: Path) -> None:
+    pytest.importorskip("matplotlib")
+    words = ("--count", "2", "--first", "5", "--solver", "daqp", "--out", str(tmp_path / "out"))
+    assert bench("reaches", *words, "--update-docs", str(docs)) == 0
+    _, rows = read_rows(tmp_path / "out" / "reaches.csv", ReachRow)
+    assert [row.seed for row in rows] == [5, 6]
+    assert "seeds 5 to 6" in (docs / "results.md").read_text()
+
+
+def test_solve(tmp_path: Path, docs: Path) -> None:
+    words = ("--count", "1", "--solver", "daqp", "--out", str(tmp_path / "out"), "--update-docs", str(docs))
+    assert bench("solve", *words) == 0
+    _, rows = read_rows(tmp_path / "out" / "solve.csv", SolveRow)
+    assert [row.way for row in rows] == ["cold", "warm"]
+    assert all(row.median_ms > 0.0 and row.pairs > 0 for row in rows)
+    _, (memory,) = read_rows(tmp_path / "out" / "memory.csv", MemoryRow)
+    assert 50.0 < memory.peak_mb < 2000.0  # an interpreter with Pinocchio, not a machine full
+    assert "shelf" in (docs / "results.md").read_text()
+
+
+def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    from wholebody.bench import charts
+
+    times = [
+        StepTime(reach, tool, 1, step, 100.0 + 13.0 * step, 90.0, 20.0 - step)
+        for reach in VARIANTS
+        for tool in ("placo", "wholebody/osqp")
+        for step in range(1, 30)
+    ]
+    for draw in (charts.step_times, charts.least_distances):
+        once, again = (draw(times, tmp_path / name) for name in ("a", "b"))
+        assert [path.read_bytes() for path in once] == [path.read_bytes() for path in again]
+
+
+def test_every_tool_has_a_colour_of_its_own() -> None:
+    assert set(style.COLORS) == set(NEEDS)
+    assert len(set(style.COLORS.values())) == len(NEEDS)
+
+
+@pytest.mark.parametrize("words", [("step", "--repeats", "0"), ("reaches", "--count", "0"), ("solve", "--count", "-1")])
+def test_counts_below_one_are_refused(words: tuple[str, ...]) -> None:
+    with pytest.raises(ValueError, match="give 1 or more"):
+        bench(*words)

@@ -1,0 +1,101 @@
+"""Files of results: what is written is read back, tables keep their shape, pages change only between their markers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wholebody.bench.machine import machine, sentence
+from wholebody.bench.step import StepRow, goal_lines
+from wholebody.bench.tables import markdown, read_rows, replace_section, write_rows
+from wholebody.errors import FileFormatError
+
+PAGE = "# Results\n\nbefore\n\n<!-- bench:step -->\nold\n<!-- /bench:step -->\n\nafter\n"
+
+
+@dataclass(frozen=True)
+class Row:
+    name: str
+    count: int
+    value: float
+    good: bool
+
+
+text = st.text(st.characters(blacklist_categories=("Cs", "Cc"), blacklist_characters="\u2028\u2029\x85"))
+
+
+@given(st.lists(st.builds(Row, text, st.integers(), st.floats(allow_nan=False), st.booleans()), min_size=1))
+def test_rows_come_back_exactly(tmp_path_factory: pytest.TempPathFactory, rows: list[Row]) -> None:
+    path = tmp_path_factory.mktemp("rows") / "rows.csv"
+    write_rows(path, {"processor": "a: b", "cores": "2"}, rows)
+    facts, back = read_rows(path, Row)
+    assert facts == {"processor": "a: b", "cores": "2"}
+    assert back == rows
+    assert list(path.parent.iterdir()) == [path], "nothing else is left beside it"
+
+
+def test_nan_comes_back(tmp_path: Path) -> None:
+    write_rows(tmp_path / "rows.csv", {}, [Row("a", 1, math.nan, True)])
+    assert math.isnan(read_rows(tmp_path / "rows.csv", Row)[1][0].value)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [("a,b\n1,2\n", "columns"), ("name,count,value,good\nx,one,1.0,True\n", "row 1"), ("", "columns")],
+)
+def test_files_of_another_kind_are_refused(tmp_path: Path, content: str, said: str) -> None:
+    path = tmp_path / "rows.csv"
+    path.write_text(content)
+    with pytest.raises(FileFormatError, match=said):
+        read_rows(path, Row)
+
+
+def test_a_section_is_replaced_and_the_rest_of_the_page_stays(tmp_path: Path) -> None:
+    page = tmp_path / "results.md"
+    page.write_text(PAGE)
+    replace_section(page, "step", "new\n")
+    once = page.read_text()
+    assert once == PAGE.replace("\nold\n", "\n\nnew\n\n")
+    replace_section(page, "step", "new\n")
+    assert page.read_text() == once, "twice is as good as once"
+    with pytest.raises(FileFormatError, match="bench:solve"):
+        replace_section(page, "solve", "new")
+    assert page.read_text() == once
+    with pytest.raises(FileFormatError, match="no such page"):
+        replace_section(tmp_path / "none.md", "step", "new")
+
+
+def test_a_table_has_a_cell_for_every_column() -> None:
+    table = markdown(["tool", "a", "b"], [("x", "1", "2"), ("y", "3", "")])
+    assert table.splitlines()[1] == "| --- | ---: | ---: |"
+    assert {line.count("|") for line in table.splitlines()} == {4}
+
+
+def test_the_machine_is_described() -> None:
+    facts = machine()
+    assert {"wholebody", "processor", "cores", "python", "OMP_NUM_THREADS", "pin", "coal", "numpy"} <= set(facts)
+    assert all(value and "\n" not in value for value in facts.values())
+    assert facts["processor"] in sentence(facts)
+
+
+def step_row(**changes: object) -> StepRow:
+    blank: dict[str, object] = {"str": "free", "int": 1, "float": 1.0}
+    values = {field.name: blank[str(field.type)] for field in fields(StepRow)}
+    return StepRow(**{**values, **changes})  # type: ignore[arg-type]
+
+
+def test_what_fell_short_is_said() -> None:
+    rows = [
+        step_row(tool="wholebody/osqp", reach="contact", ratio=0.4, ratio_p95=1.2, least_mm=8.5),
+        step_row(tool="placo", reach="contact"),
+    ]
+    (line,) = goal_lines(rows)
+    assert "median 0.40 of placo's (at most 0.5: reached)" in line
+    assert "p95 1.20 of placo's (at most 1: missed)" in line
+    assert "least distance 0.85 of the clearance (at least 0.9: missed)" in line
+    assert "nothing" in goal_lines([step_row(tool="wholebody/osqp", ratio=math.nan, ratio_p95=math.nan)])[0]

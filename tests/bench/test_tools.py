@@ -1,0 +1,99 @@
+"""Every installed tool makes the first steps of the reach within limits, from the posture and model that we mean."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.util import find_spec
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.bench.judge import judge
+from wholebody.bench.tools import chosen_tools, differences, installed_tools, make_tool
+from wholebody.bench.tools.mjcf import mjcf
+from wholebody.bench.track import Track
+from wholebody.errors import InputError, MissingPackageError, UnknownNameError
+
+LIMIT = {"pink": 1e-4}
+"""Radians by which a tool may exceed a limit here: pink leaves DAQP at its own tolerance."""
+
+
+@pytest.mark.parametrize("name", installed_tools())
+def test_two_steps_keep_limits_and_feet(name: str, short_contact: Track) -> None:
+    two = replace(short_contact, targets=short_contact.targets[[2, 4]])
+    tool = make_tool(name, two)
+    assert np.allclose(tool.posture(), two.start, atol=1e-12)
+    postures = []
+    for target in two.targets:
+        tool.step(target)
+        postures.append(tool.posture())
+    verdict = judge(two, np.array(postures))
+    assert tool.failures == 0
+    assert verdict.limit_violation <= LIMIT.get(name, 1e-9)
+    assert verdict.fastest_joint <= 1.0 + 1e-6
+    assert verdict.foot_drift < 1e-3
+    assert verdict.least_distance.min() > 0.0
+    standing = judge(two, np.tile(two.start, (2, 1)))
+    assert verdict.error[-1] < 0.6 * standing.error[-1], "it did not move towards the target"
+    tool.reset(two.start)
+    assert np.allclose(tool.posture(), two.start, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", [name for name in installed_tools() if name.startswith("wholebody/")])
+def test_our_step_keeps_the_speed_of_the_root_too(name: str, short_contact: Track) -> None:
+    tool = make_tool(name, short_contact)
+    postures = []
+    for target in short_contact.targets[:12]:
+        tool.step(target)
+        postures.append(tool.posture())
+    verdict = judge(replace(short_contact, targets=short_contact.targets[:12]), np.array(postures))
+    assert verdict.fastest_root <= 1.0 + 1e-9
+    assert 0.0 <= tool.remarks()["exact"] <= 1.0
+
+
+def test_unknown_and_missing_tools_are_named() -> None:
+    with pytest.raises(UnknownNameError, match="placo"):
+        chosen_tools(["plako"])
+    assert all(differences(name) is not None for name in installed_tools())
+    if find_spec("mink") is None:
+        with pytest.raises(MissingPackageError, match="compare"):
+            chosen_tools(["mink"])
+
+
+def test_mujoco_has_the_same_human(short_free: Track) -> None:
+    """Places of all frames, joint limits and distances of pairs in random postures, by another engine."""
+    mujoco = pytest.importorskip("mujoco")
+    scene, figure = short_free.scene, short_free.scene.figure
+    frames = ("right_index_tip", "left_foot", "head_top")
+    model = mujoco.MjModel.from_xml_string(mjcf(scene, frames))
+    data = mujoco.MjData(model)
+    for name in figure.joints:
+        index = figure.model.joints[figure.joint_id(name)].idx_q
+        ours = figure.model.lowerPositionLimit[index], figure.model.upperPositionLimit[index]
+        assert np.allclose(model.joint(name).range, ours)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        q = figure.clamp(pin.integrate(figure.model, short_free.start, 0.4 * rng.normal(size=figure.model.nv)))
+        data.qpos[:3], data.qpos[3], data.qpos[4:7] = q[:3], q[6], q[3:6]
+        for name in figure.joints:
+            data.qpos[model.joint(name).qposadr[0]] = q[figure.model.joints[figure.joint_id(name)].idx_q]
+        mujoco.mj_forward(model, data)
+        state = scene.state(q)
+        for name in frames:
+            assert np.allclose(data.site(name).xpos, state.frame(figure.frame_id(name)).translation, atol=1e-9)
+        near = scene.contacts(q, within=0.05)
+        apart = near.distance > 1e-3
+        names = scene.piece_names
+        for (first, second), distance in zip(near.pair[apart], near.distance[apart], strict=True):
+            theirs = mujoco.mj_geomDistance(
+                model, data, model.geom(names[first]).id, model.geom(names[second]).id, 0.1, None
+            )
+            assert theirs == pytest.approx(distance, abs=2e-5)
+
+
+def test_mjcf_refuses_what_it_does_not_know() -> None:
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    with pytest.raises(InputError, match="floor"):
+        mjcf(scene)

@@ -1,0 +1,1 @@
+"""Measurements: what a step, a solve and many random reaches cost and achieve, beside other tools where installed."""

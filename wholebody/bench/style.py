@@ -1,0 +1,62 @@
+"""One look for all charts: a tool has the same colour everywhere, and the same data give the same file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from wholebody.errors import MissingPackageError
+
+COLORS = {
+    "wholebody/osqp": "#0072b2",
+    "wholebody/daqp": "#56b4e9",
+    "placo": "#d55e00",
+    "mink": "#009e73",
+    "pink": "#cc79a7",
+}
+"""Okabe and Ito's colours, which people with any colour vision tell apart."""
+
+_SETTINGS = {
+    "svg.hashsalt": "wholebody",  # names inside the file do not depend on chance
+    "svg.fonttype": "none",
+    "font.family": "DejaVu Sans",
+    "font.size": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "figure.facecolor": "white",
+}
+PNG_DPI = 150
+
+
+def figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:
+    """Return an empty figure, inches, and its axes (rows, columns).
+
+    Raises:
+        MissingPackageError: matplotlib is not installed.
+    """
+    try:
+        import matplotlib
+    except ImportError:
+        raise MissingPackageError("charts need matplotlib; install it with: pip install 'wholebody[charts]'") from None
+    matplotlib.use("agg")
+    from matplotlib import pyplot
+
+    matplotlib.rcParams.update(_SETTINGS)
+    chart, axes = pyplot.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
+    return chart, axes
+
+
+def save(chart: Any, path: Path) -> tuple[Path, Path]:
+    """Write a chart as SVG and PNG beside each other; return both paths (the suffix of `path` is replaced)."""
+    from matplotlib import pyplot
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    svg, png = path.with_suffix(".svg"), path.with_suffix(".png")
+    chart.savefig(svg, metadata={"Date": None})
+    chart.savefig(png, dpi=PNG_DPI, metadata={"Software": None})
+    pyplot.close(chart)
+    return svg, png

@@ -1,0 +1,98 @@
+"""Results as files: CSV with the machine at its head, and Markdown tables in the documentation between two markers."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+from wholebody.errors import FileFormatError
+
+_R = TypeVar("_R")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(path.name + ".part")
+    beside.write_text(text, encoding="utf-8")
+    os.replace(beside, path)
+
+
+def write_rows(path: Path, facts: Mapping[str, str], rows: Sequence[Any]) -> None:
+    """Write dataclass instances of one kind, one a line, under their field names; the facts stand above as comments."""
+    names = [field.name for field in dataclasses.fields(rows[0])]
+    text = io.StringIO()
+    for name, value in facts.items():
+        text.write(f"# {name}: {value}\n")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    for row in rows:
+        writer.writerow([_cell(getattr(row, name)) for name in names])
+    write_text(path, text.getvalue())
+
+
+def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
+    """Read back what `write_rows` wrote.
+
+    Raises:
+        FileFormatError: another kind of file, or a value that is none.
+    """
+    facts: dict[str, str] = {}
+    lines = path.read_text(encoding="utf-8").splitlines()
+    while lines and lines[0].startswith("# "):
+        name, _, value = lines.pop(0)[2:].partition(": ")
+        facts[name] = value
+    types = get_type_hints(kind)
+    names = [field.name for field in dataclasses.fields(kind)]  # type: ignore[arg-type]
+    reader = csv.DictReader(lines)
+    if reader.fieldnames is None or list(reader.fieldnames) != names:
+        raise FileFormatError(f"{path}: the columns are {reader.fieldnames}, not {names}; measure again")
+    rows = []
+    for number, row in enumerate(reader, start=1):
+        try:
+            rows.append(kind(**{name: _value(types[name], row[name]) for name in names}))
+        except ValueError as error:
+            raise FileFormatError(f"{path}: row {number} cannot be read ({error}); measure again") from None
+    return facts, rows
+
+
+def markdown(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table; the first column is text, the others are numbers."""
+    lines = [columns, ["---", *["---:"] * (len(columns) - 1)], *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def replace_section(path: Path, name: str, text: str) -> None:
+    """Put text between the markers ``<!-- bench:NAME -->`` and ``<!-- /bench:NAME -->`` of a page.
+
+    Raises:
+        FileFormatError: the page does not exist or does not have the markers.
+    """
+    first, last = f"<!-- bench:{name} -->", f"<!-- /bench:{name} -->"
+    if not path.is_file():
+        raise FileFormatError(f"{path}: there is no such page; give the folder that holds results.md")
+    page = path.read_text(encoding="utf-8")
+    head, opened, rest = page.partition(first)
+    _, closed, tail = rest.partition(last)
+    if not opened or not closed:
+        raise FileFormatError(
+            f"{path}: the markers {first} and {last} are not in it; put them where the result belongs"
+        )
+    write_text(path, f"{head}{first}\n\n{text.strip()}\n\n{last}{tail}")
+
+
+def _cell(value: Any) -> str:
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def _value(kind: Any, text: str) -> Any:
+    if kind is bool:
+        if text not in ("True", "False"):
+            raise ValueError(f"{text!r} is neither True nor False")
+        return text == "True"
+    return kind(text)

@@ -1,0 +1,163 @@
+"""The reach that every tool makes: 200 steps of a fingertip, both feet held, among twenty convex objects.
+
+Two ways for the fingertip: "free" passes the body and the objects and comes near many without having to touch any;
+"contact" asks for a place inside a box, which nobody can reach, and then for one before the chest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+import wholebody as wb
+from wholebody.errors import InputError, UnknownNameError
+
+Array = NDArray[np.float64]
+
+VARIANTS = ("free", "contact")
+DT = 0.01  # s
+CLEARANCE = 0.010  # m
+WITHIN = 0.070  # m: pairs nearer than this count for every tool that has such a setting
+JOINT_SPEED = 4.0  # rad/s
+ROOT_SPEED, ROOT_TURN = 1.0, 2.0  # m/s, rad/s
+SEED = 7
+BOXES, SPHERES, HULLS, HULL_POINTS = 7, 6, 7, 100
+BLOCK = ((0.20, 0.24, 0.20), (0.44, -0.44, 1.05))  # edges and place of the box that the contact reach is asked into
+INSIDE = ((0.38, -0.48, 1.02), (0.42, -0.38, 1.08))  # m: the targets go from one of these to the other, inside the box
+INTO, ALONG = 0.35, 0.25  # shares of the time for the ways into the box and within it
+FREE = ((0.32, -0.20, 0.92), (0.38, 0.18, 1.12), (0.30, -0.22, 1.42))  # m: by way of these places
+CHEST = 0.16  # m: before the origin of the thorax' frame, level with it
+ROOM_START, ROOM_WAY = 0.025, 0.075  # m: what objects leave free around the standing body and around the free way
+SPACE = ((0.05, -0.90, 0.25), (0.85, 0.65, 1.85))  # m: where objects are put
+
+
+@dataclass(frozen=True)
+class Track:
+    """One reach, the same for every tool.
+
+    Attributes:
+        name: "free" or "contact".
+        scene: the human and the objects.
+        start: (nq,) standing.
+        targets: (steps, 3) where the fingertip is asked to be [m].
+        tip: name of the frame that reaches.
+        feet: names of the frames that stay where they are.
+    """
+
+    name: str
+    scene: wb.Scene
+    start: Array
+    targets: Array
+    tip: str = "right_index_tip"
+    feet: tuple[str, ...] = ("left_foot", "right_foot")
+
+    @property
+    def pairs(self) -> int:
+        """How many pairs of pieces can touch."""
+        return len(self.scene.geometry.collisionPairs)
+
+
+def track(name: str, steps: int = 200, seed: int = SEED) -> Track:
+    """Build a reach.
+
+    Args:
+        name: "free" or "contact".
+        steps: of the way.
+        seed: of the objects.
+
+    Raises:
+        UnknownNameError: another name.
+        InputError: fewer than two steps.
+    """
+    if name not in VARIANTS:
+        raise UnknownNameError("reach", name, VARIANTS)
+    if steps < 2:
+        raise InputError(f"a reach of {steps} steps has no way; give --steps 2 or more")
+    figure = wb.load("human")
+    start = figure.posture("standing")
+    data = figure.model.createData()
+    pin.framesForwardKinematics(figure.model, data, start)
+    tip = np.array(data.oMf[figure.frame_id("right_index_tip")].translation)
+    thorax = np.array(data.oMf[figure.frame_id("thorax")].translation)
+    free = smooth_way(np.vstack([tip, FREE]), 400)
+    scene = wb.Scene(figure)
+    add_objects(scene, start, free, np.random.default_rng(seed))
+    if name == "free":
+        return Track(name, scene, start, smooth_way(np.vstack([tip, FREE]), steps))
+    chest = thorax + (CHEST, 0.0, 0.0)
+    first, second = round(INTO * steps), round((INTO + ALONG) * steps)
+    ways = [
+        smooth_way(np.array([start_place, end_place]), count)
+        for start_place, end_place, count in (
+            (tip, INSIDE[0], first),
+            (INSIDE[0], INSIDE[1], second - first),
+            (INSIDE[1], chest, steps - second),
+        )
+    ]
+    return Track(name, scene, start, np.vstack(ways))
+
+
+def smooth_way(places: Array, steps: int) -> Array:
+    """Way (steps, 3) through places (k, 3), at rest at both ends (minimum jerk), with a tenth of the time at the end.
+
+    The share of the way done at the time t of 0 to 1 is 10 t^3 - 15 t^4 + 6 t^5: Flash and Hogan 1985, "The
+    coordination of arm movements".
+    """
+    from scipy.interpolate import CubicSpline
+
+    chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+    t = np.minimum(np.arange(1, steps + 1) / (0.9 * steps), 1.0)
+    share = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+    return np.asarray(CubicSpline(chord / chord[-1], places, bc_type="natural")(share), dtype=float)
+
+
+def add_objects(scene: wb.Scene, start: Array, way: Array, rng: np.random.Generator) -> None:
+    """Put boxes, spheres and hulls around a body, clear of how it stands and of a way (k, 3) for its fingertip."""
+    scene.add(wb.Box(BLOCK[0]), name="block", at=BLOCK[1])
+    kinds = ["box"] * (BOXES - 1) + ["sphere"] * SPHERES + ["hull"] * HULLS
+    for number, kind in enumerate(kinds):
+        while True:
+            shape = _shape(kind, rng)
+            turn = rng.normal(size=4)
+            at = (*rng.uniform(*SPACE), *(turn / np.linalg.norm(turn)))
+            if clear(scene.figure, shape, at, start, ROOM_START) and _clear_of_way(shape, at, way):
+                break
+        scene.add(shape, name=f"{kind} {number}", at=at)
+
+
+def clear(figure: wb.Figure, shape: wb.Shape, at: tuple[float, ...], q: Array, room: float) -> bool:
+    """Whether an object leaves this much room, metres, around the body in the posture q, shape (nq,)."""
+    alone = wb.Scene(figure).add(shape, name="it", at=at)
+    owners = alone.piece_owner
+    near = alone.contacts(q, within=room).pair
+    return not any("it" in (owners[a], owners[b]) for a, b in near)
+
+
+def _clear_of_way(shape: wb.Shape, at: tuple[float, ...], way: Array) -> bool:
+    import coal
+
+    place = pin.XYZQUATToSE3(np.array(at))
+    ball = coal.Sphere(ROOM_WAY)
+    for piece in shape.pieces():
+        there = place * piece.placement
+        put = coal.Transform3s(there.rotation, there.translation)
+        for point in way[::8]:
+            found = coal.DistanceResult()
+            request = coal.DistanceRequest()
+            if coal.distance(piece.geometry, put, ball, coal.Transform3s(np.eye(3), point), request, found) <= 0.0:
+                return False
+    return True
+
+
+def _shape(kind: str, rng: np.random.Generator) -> wb.Shape:
+    if kind == "box":
+        edges = rng.uniform(0.06, 0.28, 3)
+        return wb.Box((float(edges[0]), float(edges[1]), float(edges[2])))
+    if kind == "sphere":
+        return wb.Sphere(float(rng.uniform(0.04, 0.12)))
+    points = rng.normal(size=(HULL_POINTS, 3))
+    points *= rng.uniform(0.05, 0.12, 3) / np.linalg.norm(points, axis=1, keepdims=True)
+    return wb.Hull(points)
