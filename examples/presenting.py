@@ -1,0 +1,90 @@
+"""What the examples share: a short report, a picture, a page, and the options of the command line."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import Any
+
+import wholebody as wb
+
+Place = tuple[float, float, float]
+Color = tuple[float, float, float, float]
+
+OAK: Color = (0.60, 0.48, 0.36, 1.0)
+STEEL: Color = (0.58, 0.64, 0.70, 1.0)
+CARDBOARD: Color = (0.72, 0.55, 0.34, 1.0)
+DARK: Color = (0.25, 0.28, 0.32, 1.0)
+LEATHER: Color = (0.35, 0.24, 0.18, 1.0)
+LIGHT: Color = (0.98, 0.93, 0.70, 1.0)
+
+
+def report(title: str, problem: wb.Problem, solution: wb.Solution) -> None:
+    """Print what became of a problem: status, errors, least distance and time, as `wb.assess` finds them."""
+    judged = wb.assess(problem, solution.q)
+    print(f"{title}: {solution.status} in {solution.seconds:.2f} s, {solution.iterations} iterations")
+    print(f"  {solution.message}")
+    for goal, error in zip(problem.goals, judged.goal_errors, strict=True):
+        print(f"  {name_of(goal):<40} off by {error:.1e} m or rad")
+    held = max(judged.limit_violation, judged.constraint_violation, judged.clearance_lack)
+    print(f"  limits, constraints and clearances hold to {held:.1e}, deepest penetration {judged.penetration:.1e} m")
+    print(f"  nearest: {nearest(problem.scene, solution)}")
+
+
+def nearest(scene: wb.Scene, solution: wb.Solution, within: float = 0.03, count: int = 4) -> str:
+    """The pairs that are nearest to each other, one line; what stands on the floor is left out."""
+    contacts, owner = scene.contacts(solution.q, within), scene.piece_owner
+    found: dict[tuple[str, str], float] = {}
+    for (first, second), distance in zip(contacts.pair, contacts.distance, strict=True):
+        names = owner[first], owner[second]
+        if "floor" not in names:
+            found.setdefault(names, distance)
+    listed = [f"{a} and {b} {1e3 * distance:.1f} mm" for (a, b), distance in list(found.items())[:count]]
+    return ", ".join(listed) or f"nothing within {1e3 * within:.0f} mm"
+
+
+def name_of(goal: wb.Goal) -> str:
+    """Kind of a goal and the frame it moves."""
+    return f"{type(goal).__name__} {getattr(goal, 'frame', '')}".strip()
+
+
+def picture(
+    name: str,
+    problem: wb.Problem,
+    solution: wb.Solution,
+    out: Path,
+    *,
+    eye: Place,
+    target: Place,
+    see_through: Collection[str] = (),
+) -> None:
+    """Write NAME.html, and NAME.png where there is a Chromium to draw it.
+
+    Args:
+        name: of the two files.
+        problem: whose scene and goals are shown.
+        solution: whose posture is shown.
+        out: folder, made if it is not there.
+        eye: where the camera is, metres.
+        target: the middle of the picture, metres.
+        see_through: things that would hide the figure.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    with wb.Viewer(problem.scene, see_through=see_through, title=name) as viewer:
+        viewer.show(solution.q, problem=problem)
+        viewer.look(eye=eye, target=target)
+        print(f"  {viewer.save(out / f'{name}.html')}")
+        try:
+            print(f"  {viewer.picture(out / f'{name}.png')}")
+        except wb.MissingPackageError as error:
+            print(f"  no picture: {error}")
+
+
+def command_line(main: Callable[..., Any], about: str | None) -> None:
+    """Run an example with the options --out and --no-pictures."""
+    parser = argparse.ArgumentParser(description=about)
+    parser.add_argument("--out", type=Path, default=Path("pictures"), help="folder for the pictures (./pictures)")
+    parser.add_argument("--no-pictures", action="store_true", help="only solve and report")
+    options = parser.parse_args()
+    main(out=options.out, pictures=not options.no_pictures)

@@ -1,0 +1,213 @@
+"""The examples solve what they say, judged by Pinocchio and coal alone, and their task files say the same."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+
+Example = Callable[[str], ModuleType]
+
+SINGLE = ("shelf", "carry_box_past_table", "behind_the_back", "look_and_touch_overhead", "robot_arm_among_obstacles")
+OTHERS = ("chair", "console_two_people")
+REST_ON = {("pelvis", "pouch"), ("lower_lumbar", "pouch")}  # what the figure wears lies on it
+
+
+def places(problem: wb.Problem, q: Any) -> Callable[[str], Any]:
+    """Placement of a frame by name, by Pinocchio alone."""
+    model = problem.scene.model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return lambda name: data.oMf[model.getFrameId(name)]
+
+
+def deepest(problem: wb.Problem, q: Any) -> tuple[float, str]:
+    """Least signed distance of the figure to things and of what it carries to all others, pair by pair in coal."""
+    scene = problem.scene
+    model, pieces, owners = scene.model, scene.geometry.geometryObjects, scene.piece_owner
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    least, where = np.inf, ""
+    for second, thing in enumerate(pieces):
+        if owners[second] in scene.figure.segments:
+            continue
+        for first, other in enumerate(pieces[:second]):
+            pair = owners[first], owners[second]
+            if thing.parentJoint == other.parentJoint == 0 or pair in REST_ON or pair[0] == pair[1]:
+                continue
+            placed = [data.oMi[piece.parentJoint] * piece.placement for piece in (other, thing)]
+            turned = [coal.Transform3s(place.rotation, place.translation) for place in placed]
+            distance = coal.distance(
+                other.geometry, turned[0], thing.geometry, turned[1], coal.DistanceRequest(), coal.DistanceResult()
+            )
+            if distance < least:
+                least, where = distance, f"{pair[0]} and {pair[1]}"
+    return least, where
+
+
+@pytest.mark.parametrize("name", SINGLE)
+def test_solved_and_nothing_inside_anything(name: str, example: Example, tmp_path: Path, capsys: Any) -> None:
+    module = example(name)
+    solution = module.main(out=tmp_path, pictures=False)
+    problem = module.build()
+    judged = wb.assess(problem, solution.q)
+    assert solution.status == "solved"
+    assert judged.met(1e-5)
+    assert judged.holds(1e-5)
+    assert judged.penetration < 1e-6
+    least, where = deepest(problem, solution.q)
+    assert least > -1e-6, where
+    assert "solved" in capsys.readouterr().out
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", SINGLE)
+def test_task_file_says_the_same(name: str, example: Example, root: Path) -> None:
+    problem = example(name).build()
+    task = wb.read_task(root / "examples" / "tasks" / f"{name}.toml")
+    assert np.array_equal(task.problem.start, problem.start)
+    assert task.problem.scene.piece_names == problem.scene.piece_names
+    np.testing.assert_allclose(wb.solve(task.problem).q, wb.solve(problem).q, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", SINGLE[:4])
+def test_people_stand_on_their_feet(name: str, example: Example) -> None:
+    problem = example(name).build()
+    q = wb.solve(problem).q
+    before, after = places(problem, problem.start), places(problem, q)
+    for side in ("left", "right"):
+        assert before(f"{side}_sole").isApprox(after(f"{side}_sole"), 1e-5)
+    model = problem.scene.model
+    x, y, _ = pin.centerOfMass(model, model.createData(), q)
+    assert after("left_heel").translation[0] < x < after("left_toe_tip").translation[0]
+    assert after("right_sole").translation[1] - 0.06 < y < after("left_sole").translation[1] + 0.06
+
+
+def test_shelf_hand_is_between_the_boards(example: Example) -> None:
+    module = example("shelf")
+    problem = module.build()
+    place = places(problem, wb.solve(problem).q)
+    np.testing.assert_allclose(place("right_index_tip").translation, module.PLACE, atol=1e-5)
+    assert 1.06 < place("right_wrist").translation[2] < 1.34
+    gaze = place("gaze")
+    towards = np.array(module.PLACE) - gaze.translation
+    assert gaze.rotation[:, 0] @ towards / np.linalg.norm(towards) > 1.0 - 1e-9
+
+
+def test_box_is_level_between_both_palms(example: Example) -> None:
+    module = example("carry_box_past_table")
+    problem = module.build()
+    place = places(problem, wb.solve(problem).q)
+    right, left = place("right_palm"), place("left_palm")
+    np.testing.assert_allclose(right.act(np.array(module.MIDDLE)), module.PLACE, atol=1e-5)
+    assert -right.rotation[2, 1] > 1.0 - 1e-9
+    assert right.rotation[:, 2] @ left.rotation[:, 2] < -1.0 + 1e-9
+    assert np.linalg.norm(right.translation - left.translation) == pytest.approx(module.SIZE[2] + 2e-3, abs=1e-5)
+
+
+def test_the_arm_goes_round_the_body(example: Example) -> None:
+    module = example("behind_the_back")
+    problem = module.build()
+    place = places(problem, wb.solve(problem).q)
+    pelvis = place("pelvis")
+    np.testing.assert_allclose(pelvis.actInv(place("right_index_tip")).translation, module.BUCKLE, atol=1e-5)
+    assert pelvis.actInv(place("right_wrist")).translation[0] < -0.1
+    assert pelvis.actInv(place("right_elbow")).translation[1] < -0.1
+
+
+def test_gripper_straddles_the_part(example: Example) -> None:
+    module = example("robot_arm_among_obstacles")
+    problem = module.build()
+    place = places(problem, wb.solve(problem).q)
+    sides = [place(f"{side}_finger").translation[1] for side in ("left", "right")]
+    assert max(sides) > 0.14 + 0.025
+    assert min(sides) < 0.14 - 0.025
+    assert place("left_finger").translation[0] > 0.5
+
+
+def test_the_console_is_in_reach_of_the_large_man_only(example: Example, tmp_path: Path) -> None:
+    solutions = example("console_two_people").main(out=tmp_path, pictures=False)
+    assert len(solutions) == 6
+    missed = {who_what for who_what, solution in solutions.items() if solution.status != "solved"}
+    assert missed == {("small woman", "breaker")}
+    assert solutions["small woman", "breaker"].status == "unreachable"
+    assert 0.02 < solutions["small woman", "breaker"].assessment.goal_error < 0.2
+    for solution in solutions.values():
+        assert solution.assessment.holds(1e-5)
+
+
+def sits(problem: wb.Problem, solution: wb.Solution) -> None:
+    """Assert that a person sits on the chair with the hands on the thighs."""
+    assert solution.status == "solved"
+    assert solution.assessment.holds(1e-5)
+    least, where = deepest(problem, solution.q)
+    assert least > -1e-6, where
+    touched = {problem.scene.piece_owner[a] for a, _ in problem.scene.contacts(solution.q, within=0.002).pair}
+    assert {"pelvis", "left_foot", "right_foot"} <= touched
+    place = places(problem, solution.q)
+    for side in ("left", "right"):
+        thigh = place(f"{side}_thigh").actInv(place(f"{side}_palm")).translation
+        np.testing.assert_allclose(thigh, [0.067, 0.0, -0.32], atol=1e-5)
+
+
+def test_chair_of_boxes(example: Example, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    monkeypatch.setenv("WHOLEBODY_DATA", str(tmp_path))
+    module = example("chair")
+    solution = module.main(out=tmp_path, pictures=False)
+    assert "made of boxes" in capsys.readouterr().out
+    sits(module.build(), solution)
+
+
+def test_chair_from_a_mesh(example: Example, tmp_path: Path, shared_data: Path, capsys: Any) -> None:
+    module = example("chair")
+    if module.mesh() is None:
+        pytest.skip(f"there is no props/chair.obj in {shared_data}")
+    solution = module.main(out=tmp_path, pictures=False)
+    assert "made of boxes" not in capsys.readouterr().out
+    sits(module.build(), solution)
+
+
+def test_every_example_is_tested_and_listed(root: Path) -> None:
+    folder = root / "examples"
+    scripts = {path.stem for path in folder.glob("*.py")} - {"presenting"}
+    assert scripts == {*SINGLE, *OTHERS}
+    assert {path.stem for path in (folder / "tasks").glob("*.toml")} == set(SINGLE)
+    table = (folder / "README.md").read_text(encoding="utf-8")
+    assert all(f"]({name}.py)" in table for name in scripts)
+
+
+def test_runs_as_a_script_from_anywhere(root: Path, tmp_path: Path) -> None:
+    script = root / "examples" / "robot_arm_among_obstacles.py"
+    done = subprocess.run(
+        [sys.executable, str(script), "--no-pictures"], cwd=tmp_path, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    assert "solved" in done.stdout
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.browser
+def test_ends_in_a_picture_and_a_page(example: Example, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from PIL import Image
+
+    module = example("robot_arm_among_obstacles")
+    module.main(out=tmp_path / "made", pictures=True)
+    page = (tmp_path / "made" / "robot_arm_among_obstacles.html").read_text(encoding="utf-8")
+    assert "wholebody" in page
+    picture = tmp_path / "made" / "robot_arm_among_obstacles.png"
+    if not picture.exists() and os.environ.get("WHOLEBODY_REQUIRE_BROWSER") != "1":
+        pytest.skip("no Chromium here")
+    pixels = np.asarray(Image.open(picture).convert("RGB"), dtype=float)
+    assert pixels.shape == (720, 960, 3)
+    assert pixels.std() > 10.0
