@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import coal
 import numpy as np
@@ -79,8 +80,11 @@ def assess(problem: Problem, q: Array) -> Assessment:
     if q.shape != (problem.scene.model.nq,) or not np.isfinite(q).all():
         raise InputError(f"a posture is ({problem.scene.model.nq},) finite numbers; got shape {q.shape}")
     problem.check_fresh()
-    state = State(problem.scene.model).update(q)
-    pairs = _Pairs(problem, q)
+    if problem not in _PAIRS:
+        _PAIRS[problem] = _Pairs(problem)
+    pairs = _PAIRS[problem]
+    pairs.move(q)
+    state = pairs.state
     distance, angle, each = _goal_errors(problem, state)
     return Assessment(
         goal_error=distance,
@@ -97,21 +101,26 @@ def assess(problem: Problem, q: Array) -> Assessment:
 
 
 class _Pairs:
-    """All pairs of the scene at one posture."""
+    """All pairs of a problem's scene, at one posture after the other; on data of its own."""
 
-    def __init__(self, problem: Problem, q: Array) -> None:
-        scene = problem.scene
-        self.geometry = scene.geometry
-        data = scene.model.createData()
+    def __init__(self, problem: Problem) -> None:
+        """Allocate."""
+        self.model, self.geometry = problem.scene.model, problem.scene.geometry
+        self.clearances = problem.clearances
+        self.state = State(self.model)
         self.results = pin.GeometryData(self.geometry)
-        pin.updateGeometryPlacements(scene.model, data, self.geometry, self.results, q)
+
+    def move(self, q: Array) -> None:
+        """Measure all pairs at the posture q."""
+        self.state.update(q)
+        pin.updateGeometryPlacements(self.model, self.state.data, self.geometry, self.results)
         pin.computeDistances(self.geometry, self.results)
         count = len(self.geometry.collisionPairs)
         self.distance = np.array([self.results.distanceResults[k].min_distance for k in range(count)])
         if np.isnan(self.distance).any():
             raise InputError("a distance is not a number; an object's placement or shape is broken")
         self.least = float(self.distance.min()) if count else float("inf")
-        self.lack = float(max(0.0, (problem.clearances - self.distance).max())) if count else 0.0
+        self.lack = float(max(0.0, (self.clearances - self.distance).max())) if count else 0.0
 
     def gradients(self, problem: Problem, state: State) -> Array:
         """Derivatives (k, nv) of the gaps of all pairs that push: at every corner of their contact patch."""
@@ -161,6 +170,9 @@ class _Pairs:
             if joint:
                 row += sign * wrench @ pin.getJointJacobian(state.model, state.data, joint, pin.WORLD)
         return row
+
+
+_PAIRS: WeakKeyDictionary[Problem, _Pairs] = WeakKeyDictionary()
 
 
 def _goal_errors(problem: Problem, state: State) -> tuple[float, float, tuple[float, ...]]:

@@ -11,9 +11,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures.state import State
 from wholebody.linearisation import Lineariser
 from wholebody.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+from wholebody.tasks.checks import check_measure, check_rows
 
 if TYPE_CHECKING:
     from wholebody.assessment import Assessment
@@ -81,6 +83,7 @@ class Problem:
             term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
         )
         self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
+        self._check_terms()
         self.touching = tuple(_owner_pair(scene, pair) for pair in touching)
         self.clearances = self._clearances()
         self._revision = scene.revision
@@ -108,6 +111,16 @@ class Problem:
         """Raise InputError if objects came to or left the scene after the problem was stated (moving them is fine)."""
         if self.scene.revision != self._revision:
             raise InputError("objects came to or left the scene after the problem was stated; state the problem anew")
+
+    def _check_terms(self) -> None:
+        """Evaluate every term once at the start, so that one written wrongly is named before anything is computed."""
+        state = State(self.scene.model).update(self.start)
+        for number, goal in enumerate(self.goals):
+            check_rows(f"goals[{number}]", goal, goal.error(state), goal.jacobian(state), state)
+        for number, constraint in enumerate(self.constraints):
+            check_rows(f"constraints[{number}]", constraint, constraint.value(state), constraint.jacobian(state), state)
+        for number, measure in enumerate(self.measures):
+            check_measure(f"measures[{number}]", measure, state)
 
     def _clearances(self) -> Array:
         scene = self.scene

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import chain
 
 import numpy as np
 
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
-from wholebody.methods.qp.descent import Descent, Local
+from wholebody.methods.qp.descent import Local
 from wholebody.methods.qp.quadratic_program import Array
+from wholebody.methods.qp.search import Search, Settings
 from wholebody.methods.qp.solvers.base import make_solver
-from wholebody.methods.qp.starts import bent, restarts
-from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.tracking import Step, Tracker
-from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.problem import Problem, Solution, Status
 
-STAGES = (0.25, 0.5, 0.75)  # of the way to the goals, when the straight attempt ends in a local minimum
 LEAST_TOLERANCE = 1e-10
 
 
@@ -42,7 +38,7 @@ class QP:
     budget: float = 1.0
     restarts: int = 6
     seed: int = 0
-    _trackers: dict[int, Tracker] = field(default_factory=dict, init=False, repr=False)
+    _tracker: Tracker | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -69,10 +65,9 @@ class QP:
         raises for a goal out of reach or a start in penetration: the status says so.
         """
         began = time.perf_counter()
-        search = _Search(self, problem, began)
-        search.run()
-        search.settle()
-        best = search.best
+        settings = Settings(self.tolerance, self.iterations, self.budget, self.restarts, self.seed)
+        search = Search(problem, self._solver, settings)
+        best = search.run()
         judgement = assess(problem, best.q)
         status = _status(best, judgement, self.tolerance)
         return Solution(
@@ -91,127 +86,10 @@ class QP:
 
         The workspace lives on between calls with the same problem. See `Tracker`.
         """
-        tracker = self._trackers.get(id(problem))
+        tracker = self._tracker
         if tracker is None or tracker.problem is not problem or tracker.dt != dt:
-            tracker = Tracker(problem, self._solver, dt)
-            self._trackers = {id(problem): tracker}
+            tracker = self._tracker = Tracker(problem, self._solver, dt)
         return tracker.step(q)
-
-
-class _Search:
-    """Descent, continuation and restarts for one problem, remembering the best posture."""
-
-    def __init__(self, method: QP, problem: Problem, began: float) -> None:
-        self.method, self.problem = method, problem
-        self.deadline = began + method.budget
-        self.subproblem = Subproblem(problem)
-        self.lineariser = problem.lineariser()
-        self.trace: list[Iterate] = []
-        self.spent = 0
-        self.how = "directly"
-        self._best: Local | None = None
-
-    @property
-    def best(self) -> Local:
-        """The best posture so far."""
-        assert self._best is not None
-        return self._best
-
-    def run(self) -> None:
-        """Try one way after the other until the goals are met."""
-        start = self.problem.scene.figure.clamp(self.problem.start)
-        if self._accept(self._descend(start, np.inf, None, ""), "directly"):
-            return
-        ways = chain(self._bent(start), self._staged(start), self._restarted(start))
-        for local, how in ways:
-            if self._accept(local, how) or time.perf_counter() > self.deadline:
-                return
-
-    def _bent(self, start: Array) -> Iterator[tuple[Local, str]]:
-        """Straight limbs hide what bending them would do: the same descent with joints moved off their limits."""
-        q = bent(self.problem, start)
-        if q is not None:
-            yield self._descend(q, self.deadline, None, "bent"), "from a start with bent joints"
-
-    def _staged(self, start: Array) -> Iterator[tuple[Local, str]]:
-        """Goals approached through intermediate ones: the errors at the start, shrinking to nothing."""
-        if not self.problem.goals:
-            return
-        whole, q = self._goal_errors(start), start
-        for share in STAGES:
-            q = self._descend(q, self.deadline, (1.0 - share) * whole, "stage").q
-        yield self._descend(q, self.deadline, None, "stage"), "in stages"
-
-    def _restarted(self, start: Array) -> Iterator[tuple[Local, str]]:
-        """Seeded postures to begin from."""
-        rng = np.random.default_rng(self.method.seed)
-        for q in restarts(self.problem, start, rng, self.method.restarts):
-            yield self._descend(q, self.deadline, None, "restart"), "from another start"
-
-    def settle(self) -> None:
-        """Where the goals are not reached, come as near as goes, then improve the measures from there."""
-        if self.best.violation.left <= self.method.tolerance:
-            return
-        deadline = time.perf_counter() + self.method.budget
-        self._accept(self._descend(self.best.q, deadline, None, "nearest", measures=False), self.how)
-        best = self.best
-        if best.violation.left > self.method.tolerance and self.problem.measures:
-            local = self._stay(best)
-            if (
-                _held(local, self.method.tolerance)
-                and local.violation.left <= best.violation.left + self.method.tolerance
-            ):
-                self._best = local
-
-    def _stay(self, local: Local) -> Local:
-        """Descend with the goals' errors to stay as they are: what must hold is mended, then the measures improve."""
-        nearest = self._goal_errors(local.q)
-        deadline = time.perf_counter() + self.method.budget
-        stayed = self._descent(deadline, nearest, "nearest").run(local.q)
-        self.spent += stayed.iterations
-        left = float(np.linalg.norm(self._goal_errors(stayed.q)))
-        violation = stayed.violation._replace(goal=left, left=left)
-        return stayed._replace(violation=violation, converged=local.converged)
-
-    def _goal_errors(self, q: Array) -> Array:
-        state = self.lineariser.state.update(q)
-        return np.concatenate([np.zeros(0), *(np.atleast_1d(goal.error(state)) for goal in self.problem.goals)])
-
-    def _descend(
-        self, start: Array, deadline: float, offset: Array | None, note: str, *, measures: bool = True
-    ) -> Local:
-        """Descend from a start; where that ends with something that must hold not holding, mend it."""
-        local = self._descent(deadline, offset, note, measures=measures).run(start)
-        self.spent += local.iterations
-        if not _held(local, self.method.tolerance) and offset is None and time.perf_counter() < deadline:
-            local = min(local, self._stay(local), key=lambda one: _rank(one, self.method.tolerance))
-        return local
-
-    def _descent(self, deadline: float, offset: Array | None, note: str, *, measures: bool = True) -> Descent:
-        return Descent(
-            self.subproblem, self.lineariser, self.method._solver, self.method.tolerance,
-            self.method.iterations, deadline, offset, self.trace, note, measures,
-        )  # fmt: skip
-
-    def _accept(self, local: Local, how: str) -> bool:
-        """Keep the better one; whether what is asked holds now."""
-        if self._best is None or _rank(local, self.method.tolerance) < _rank(self._best, self.method.tolerance):
-            self._best, self.how = local, how
-        return self.best.violation.worst <= self.method.tolerance
-
-
-def _held(local: Local, tolerance: float) -> bool:
-    return max(local.violation.hold, local.violation.elastic) <= tolerance
-
-
-def _rank(local: Local, tolerance: float) -> tuple[float, float, float]:
-    """Smaller is better: what must hold, then goals, then measures."""
-    held = max(local.violation.hold, local.violation.elastic)
-    return (
-        held if held > tolerance else 0.0,
-        local.violation.goal if local.violation.left > tolerance else 0.0,
-        local.measure,
-    )
 
 
 def _status(local: Local, judgement: Assessment, tolerance: float) -> Status:

@@ -14,8 +14,10 @@ import numpy as np
 
 from wholebody.geometry.proximity import Contacts, Indices, Proximity
 from wholebody.methods.qp.quadratic_program import Array
+from wholebody.scene import Scene
 
 DIP = 5e-4  # m: between two postures a piece may dip in by this much; half of the thinnest plate that counts
+OVERLAP = 2e-4  # m: overlap on the way that does not count; finer than any piece is thick
 ARC = 1.1  # length of an arc over its chord, at the most, for the turns that one step makes
 
 
@@ -32,19 +34,64 @@ def snapshot(proximity: Proximity, contacts: Contacts, within: float) -> Placed:
     return Placed(proximity.placements.copy(), contacts, within)
 
 
+def jumps(scene: Scene, before: Placed, after: Placed, q0: Array, q1: Array) -> bool:
+    """Whether some pair is on other sides of each other after a step than before it.
+
+    A pair that touches on the way and still does at the end was bumped into, which its distance tells; one that is
+    apart again was jumped over.
+
+    Args:
+        scene: figure and things.
+        before: where the pieces are before the step.
+        after: where they are after it.
+        q0: (nq,) posture before the step.
+        q1: (nq,) posture after it.
+    """
+    proximity = scene.proximity
+    doubtful = doubtful_pairs(proximity, before, after)
+    apart = _apart(after, len(proximity.pairs))
+    apart[after.contacts.number] = after.contacts.distance
+    while len(doubtful):
+        hit = scene.sweeper.first_contact(q0, q1, proximity.pairs[doubtful], OVERLAP)
+        if hit is None:
+            return False
+        if apart[hit.index] > -OVERLAP:
+            return True
+        doubtful = doubtful[doubtful != hit.index]
+    return False
+
+
 def doubtful_pairs(proximity: Proximity, before: Placed, after: Placed) -> Indices:
     """Pairs (indices into the collision pairs) that may have changed sides between two postures."""
     motion = _motion(proximity, before.placements, after.placements)
     pairs = proximity.pairs
-    room = proximity.widths + (before.within + after.within)
-    room[before.contacts.number] += np.maximum(before.contacts.distance, 0.0) - before.within
-    room[after.contacts.number] += np.maximum(after.contacts.distance, 0.0) - after.within
-    doubtful = np.flatnonzero(motion[pairs[:, 0]] + motion[pairs[:, 1]] > room)
+    way = motion[pairs[:, 0]] + motion[pairs[:, 1]]
+    room = proximity.widths + _apart(before, len(pairs)) + _apart(after, len(pairs))
+    doubtful = np.flatnonzero(way > room)
     if not len(doubtful):
         return doubtful
+    # pairs that were not measured are at least as far apart as their bounding spheres
+    spheres = _spheres_apart(proximity, before, doubtful) + _spheres_apart(proximity, after, doubtful)
+    doubtful = doubtful[way[doubtful] > proximity.widths[doubtful] + spheres]
     listed = np.full(len(pairs), -1, dtype=np.intp)
     listed[before.contacts.number] = np.arange(len(before.contacts.number))
     return np.array([k for k in doubtful if not _parted(proximity, before, after, int(listed[k]))], dtype=np.intp)
+
+
+def _apart(placed: Placed, count: int) -> Array:
+    """Least distance (pairs,) of every pair: measured where it is near, else what it was looked for within."""
+    distance = np.full(count, placed.within)
+    distance[placed.contacts.number] = np.maximum(placed.contacts.distance, 0.0)
+    return distance
+
+
+def _spheres_apart(proximity: Proximity, placed: Placed, pairs: Indices) -> Array:
+    """Distance of the bounding spheres of these pairs, or the distance above where it is larger."""
+    first, second = proximity.pairs[pairs, 0], proximity.pairs[pairs, 1]
+    between = placed.placements[first, 3] - placed.placements[second, 3]
+    gap = np.sqrt(np.einsum("ij,ij->i", between, between)) - proximity.reach[first] - proximity.reach[second]
+    apart: Array = np.maximum(gap, _apart(placed, len(proximity.pairs))[pairs])
+    return apart
 
 
 def _motion(proximity: Proximity, before: Array, after: Array) -> Array:

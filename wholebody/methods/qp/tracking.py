@@ -75,7 +75,9 @@ class Tracker:
     def step(self, q: Array) -> Step:
         """One step from q, shape (nq,); a posture out of limits is brought back first."""
         scene = self.problem.scene
-        self._lineariser.goals = self.problem.goals
+        self.problem.check_fresh()
+        if self.problem.goals is not self._lineariser.goals:
+            self._retarget()
         at = self._lineariser.at(q, self._within)
         rows = self._subproblem.rows(at)
         program = self._subproblem.program(at, rows, RADIUS, 0.0, np.zeros(len(rows.soft_error)), True)
@@ -90,6 +92,14 @@ class Tracker:
             following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
             answer.iterations, answer.by, share,
         )  # fmt: skip
+
+    def _retarget(self) -> None:
+        """Take the problem's new goals; what was set up stays where they have the same kinds and weights."""
+        before, now = self._lineariser.goals, self.problem.goals
+        self._lineariser.goals = now
+        if [(type(goal), goal.weight) for goal in before] != [(type(goal), goal.weight) for goal in now]:
+            self._subproblem = Subproblem(self.problem)
+            self._guess = None
 
     def _motion(self, displacement: Array) -> float:
         """Longest way of any point of any piece, metres, to first order in the displacement (nv,)."""

@@ -1,0 +1,70 @@
+"""Whether a step is worth going: judged by the violation and by the measures, inside a funnel that narrows."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+WIDTH = 0.02  # violation that is allowed while the measures improve, at first
+SWITCH = 10.0  # the measures lead once they gain more than this times the squared violation
+WORTH = 0.05  # share of what was foreseen that a step must bring
+GOOD, POOR = 0.5, 0.25  # shares above which the next step may be longer, and below which it must be shorter
+
+
+class Verdict(NamedTuple):
+    """How a step did.
+
+    Attributes:
+        accepted: whether it is taken.
+        good: whether it brought about what was foreseen.
+        poor: whether it brought much less.
+        by: "measure" or "goal", by which it was judged; "rejected", or "rejected measure" where the measures led.
+    """
+
+    accepted: bool
+    good: bool
+    poor: bool
+    by: str
+
+
+class Outlook(NamedTuple):
+    """What a program foresees of its step: how much less violation, and how much less of the measures."""
+
+    gain: float
+    saving: float
+
+
+class Funnel:
+    """The violation that is allowed: a trust funnel (Gould and Toint 2010).
+
+    While what is asked is far, a step must lessen the violation. Near, it must lessen the measures and stay inside the
+    funnel, which each step of the first kind narrows.
+    """
+
+    def __init__(self, violation: float) -> None:
+        """Begin wide enough for the violation at hand."""
+        self.width = max(WIDTH, violation)
+
+    def judge(
+        self, before: tuple[float, float], after: tuple[float, float], outlook: Outlook, measures: bool
+    ) -> Verdict:
+        """Judge a step.
+
+        Args:
+            before: violation and measures before it.
+            after: and after it.
+            outlook: what was foreseen.
+            measures: whether the measures count.
+        """
+        lead = measures and outlook.saving > SWITCH * before[0] ** 2 and before[0] <= self.width
+        saved = before[1] - after[1]
+        if lead and after[0] <= self.width and saved >= WORTH * outlook.saving:
+            return Verdict(True, saved >= GOOD * outlook.saving, saved < POOR * outlook.saving, "measure")
+        gained = before[0] - after[0]
+        if outlook.gain > 0.0 and gained >= WORTH * outlook.gain:
+            return Verdict(True, gained >= GOOD * outlook.gain, gained < POOR * outlook.gain, "goal")
+        return Verdict(False, False, False, "rejected measure" if lead else "rejected")
+
+    def narrow(self, before: float, after: float) -> None:
+        """After a step that lessened the violation from `before` to `after`."""
+        narrower = max(0.9 * self.width, after + 0.5 * (before - after))
+        self.width = max(min(narrower, WIDTH), after)
