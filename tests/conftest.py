@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import coal
+import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, settings
+
+from wholebody.figures.description import Description
+from wholebody.figures.figure import Figure
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -36,3 +44,61 @@ def shared_data() -> Path:
             pytest.fail(f"WHOLEBODY_DATA names {folder}, which is not a folder")
         pytest.skip("no real input data here; WHOLEBODY_DATA names its folder")
     return folder
+
+
+def _figure(model: pin.Model, geometry: pin.GeometryModel, segments: tuple[str, ...]) -> Figure:
+    joints = tuple(name for name in list(model.names)[1:] if name != "root_joint")
+    description = Description(
+        groups={"all": joints},
+        chains={},
+        frames=segments,
+        segments=segments,
+        postures={"neutral": lambda figure: pin.neutral(figure.model)},
+    )
+    return Figure("test", model, geometry, "own", description)
+
+
+def _free_bodies(*shapes: Any) -> Figure:
+    model, geometry = pin.Model(), pin.GeometryModel()
+    for k, shape in enumerate(shapes):
+        joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root_joint" if k == 0 else f"free{k}")
+        model.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())
+        frame = model.addFrame(pin.Frame(f"body{k}", joint, 0, pin.SE3.Identity(), pin.FrameType.BODY))
+        for n, piece in enumerate(shape.pieces()):
+            made = pin.GeometryObject(f"body{k}:{n}", joint, frame, piece.placement, piece.geometry)
+            index = geometry.addGeometryObject(made)
+            for other in range(index):
+                if geometry.geometryObjects[other].parentJoint != joint:
+                    geometry.addCollisionPair(pin.CollisionPair(other, index))
+    return _figure(model, geometry, tuple(f"body{k}" for k in range(len(shapes))))
+
+
+def _planar_arm(lengths: Any, radius: float = 0.02, limit: float = 3.0) -> Figure:
+    model, geometry = pin.Model(), pin.GeometryModel()
+    joint, at = 0, pin.SE3.Identity()
+    for k, length in enumerate(lengths):
+        bound = [np.array([value]) for value in (100.0, 10.0, -limit, limit)]
+        joint = model.addJoint(joint, pin.JointModelRZ(), at, f"turn{k}", *bound)
+        model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+        frame = model.addFrame(pin.Frame(f"link{k}", joint, 0, pin.SE3.Identity(), pin.FrameType.BODY))
+        along = pin.SE3(pin.utils.rotate("y", np.pi / 2), np.array([length / 2, 0.0, 0.0]))
+        geometry.addGeometryObject(pin.GeometryObject(f"link{k}", joint, frame, along, coal.Capsule(radius, length)))
+        at = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
+    model.addFrame(pin.Frame("tip", joint, frame, at, pin.FrameType.OP_FRAME))
+    for second in range(2, len(lengths)):
+        for first in range(second - 1):
+            geometry.addCollisionPair(pin.CollisionPair(first, second))
+    figure = _figure(model, geometry, tuple(f"link{k}" for k in range(len(lengths))))
+    return figure
+
+
+@pytest.fixture(scope="session")
+def free_bodies() -> Callable[..., Figure]:
+    """Return a function: shapes -> a figure of as many free-flying bodies, "body0", "body1", ..., in all pairs."""
+    return _free_bodies
+
+
+@pytest.fixture(scope="session")
+def planar_arm() -> Callable[..., Figure]:
+    """Return a function: lengths -> a fixed arm in the plane z = 0, joints "turn0", ..., frame "tip"."""
+    return _planar_arm
