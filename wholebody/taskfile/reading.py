@@ -109,7 +109,8 @@ def _parse(path: Path, text: str) -> dict[str, Any]:
     else:
         import tomli as tomllib
     try:
-        return tomllib.loads(text)
+        data: dict[str, Any] = tomllib.loads(text)
+        return data
     except tomllib.TOMLDecodeError as error:
         raise FileFormatError(f"{path.name}: is not TOML: {error}") from None
 
