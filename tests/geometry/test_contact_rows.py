@@ -1,0 +1,358 @@
+"""Contact rows: derivatives against differences of coal's distance, places against geometry, arrays against loops."""
+
+from __future__ import annotations
+
+import itertools
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.spatial import ConvexHull
+
+import wholebody as wb
+from wholebody.geometry import contact_rows as module
+
+SHAPES = {
+    "sphere": wb.Sphere(0.15),
+    "capsule": wb.Capsule(0.09, 0.25),
+    "box": wb.Box((0.4, 0.3, 0.24)),
+    "hull": wb.Hull(np.random.default_rng(5).normal(size=(30, 3)) * 0.15),
+    "ellipsoid": wb.Ellipsoid((0.25, 0.2, 0.16)),
+    "half-space": wb.HalfSpace(),
+}
+GAPS = {
+    "apart": 0.03,
+    "near": 0.002,
+    "touching": 2e-5,
+    "touching inside": -2e-5,
+    "1 mm in": -0.001,
+    "1 cm in": -0.01,
+    "5 cm in": -0.05,
+}
+
+
+def turned(rng):
+    return pin.Quaternion(pin.exp3(rng.normal(size=3))).coeffs()
+
+
+def distance_of(scene, q):
+    """Signed distance of the only pair, from coal."""
+    piece = scene.geometry.geometryObjects
+    data, placed = scene.model.createData(), pin.GeometryData(scene.geometry)
+    pin.updateGeometryPlacements(scene.model, data, scene.geometry, placed, q)
+    pair = scene.geometry.collisionPairs[0]
+    at = [coal.Transform3s(placed.oMg[i].rotation, placed.oMg[i].translation) for i in (pair.first, pair.second)]
+    result = coal.DistanceResult()
+    coal.distance(piece[pair.first].geometry, at[0], piece[pair.second].geometry, at[1], coal.DistanceRequest(), result)
+    return result.min_distance, np.array(result.normal)
+
+
+def rows_of(scene, q, within=0.1):
+    """Contacts, rows and their Jacobian at a posture."""
+    state = scene.state(q)
+    contacts = scene.proximity.near(state.data, within)
+    rows = scene.row_builder.rows(contacts)
+    return contacts, rows, state.rows(rows.wrench, rows.second, rows.first)
+
+
+def posed(scene, gap, rng):
+    """A posture with random turns in which the only pair has this signed distance.
+
+    The pieces are drawn out of each other along the shortest way, so that they do not meet corner to corner, where the
+    distance has a kink.
+    """
+    q = scene.figure.neutral
+    pieces, pair = scene.geometry.geometryObjects, scene.geometry.collisionPairs[0]
+    for k in range(0, scene.model.nq, 7):
+        q[k + 3 : k + 7] = turned(rng)
+    if scene.model.nq == 7 and scene.objects["thing"].shape is not SHAPES["half-space"]:
+        q[:3] = scene.objects["thing"].placement.translation
+    q[:3] += 0.02 * rng.normal(size=3)
+    sign = 1.0 if pieces[pair.second].parentJoint == 1 else -1.0
+    for _ in range(80):
+        distance, normal = distance_of(scene, q)
+        if abs(distance - gap) < 1e-9:
+            break
+        q[:3] += sign * normal * (gap - distance)
+    return q
+
+
+@pytest.mark.parametrize("gap", GAPS.values(), ids=GAPS.keys())
+@pytest.mark.parametrize(
+    ("moving", "other"),
+    [pair for pair in itertools.product(SHAPES, SHAPES) if pair[0] != "half-space"],
+)
+def test_witness_row_is_the_derivative_of_the_distance(free_bodies, moving, other, gap):
+    """Central differences of coal's distance, root against a fixed object and two moving bodies."""
+    rng = np.random.default_rng([*map(len, (moving, other)), int(1e5 * (gap + 1))])
+    fixed = wb.Scene(free_bodies(SHAPES[moving])).add(SHAPES[other], name="thing", at=(0.1, -0.2, 0.05))
+    scenes = [fixed] if other == "half-space" else [fixed, wb.Scene(free_bodies(SHAPES[moving], SHAPES[other]))]
+    round_off = "ellipsoid" in (moving, other)
+    step, tolerance = (1e-3, 1e-2) if round_off else (1e-5, 2e-4)
+    for scene in scenes:
+        q = posed(scene, gap, rng)
+        contacts, rows, jacobian = rows_of(scene, q)
+        assert contacts.distance == pytest.approx([gap], abs=1e-5 if round_off else 2e-6)
+        assert rows.gap[0] == contacts.distance[0]
+        for k, direction in enumerate(np.eye(scene.model.nv)):
+            ahead = distance_of(scene, pin.integrate(scene.model, q, step * direction))[0]
+            behind = distance_of(scene, pin.integrate(scene.model, q, -step * direction))[0]
+            assert jacobian[0, k] == pytest.approx((ahead - behind) / (2 * step), abs=tolerance)
+
+
+def planes(piece):
+    """Faces (f, 4) of a box or hull as [n, b] with n . x <= b inside, from qhull."""
+    if isinstance(piece, coal.Box):
+        points = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * piece.halfSide
+    else:
+        points = np.array(piece.points())
+    equations = ConvexHull(points).equations
+    return np.column_stack([equations[:, :3], -equations[:, 3]])
+
+
+def chord(scene, placed, index, point, direction):
+    """Where the line point + t direction is inside a piece, to a micrometre: (from, to), or None."""
+    piece, at = scene.geometry.geometryObjects[index].geometry, placed.oMg[index]
+    x, d = at.actInv(point), at.rotation.T @ direction
+    if isinstance(piece, coal.Halfspace):
+        rate, room = piece.n @ d, piece.d - piece.n @ x
+        return (-np.inf, room / rate) if rate > 0 else (room / rate, np.inf)
+    if isinstance(piece, coal.Capsule):
+        ends = [np.array([0.0, 0.0, side * piece.halfLength]) for side in (-1.0, 1.0)]
+        times = [t for end in ends for t in ball_times(x - end, d, piece.radius)]
+        across, flat = d[:2], x[:2]
+        roots = np.roots([across @ across, 2 * across @ flat, flat @ flat - piece.radius**2])
+        times += [t.real for t in roots if abs(t.imag) < 1e-12 and abs(x[2] + t.real * d[2]) <= piece.halfLength]
+        return (min(times), max(times)) if times else None
+    low, high = -np.inf, np.inf
+    for *normal, offset in planes(piece):
+        rate, room = np.dot(normal, d), offset + 1e-6 - np.dot(normal, x)
+        if abs(rate) > 1e-12:
+            low, high = (low, min(high, room / rate)) if rate > 0 else (max(low, room / rate), high)
+        elif room < 0:
+            return None
+    return (low, high) if low < high else None
+
+
+def ball_times(x, d, radius):
+    roots = np.roots([1.0, 2 * d @ x, x @ x - radius**2])
+    return [t.real for t in roots if abs(t.imag) < 1e-12]
+
+
+def pairs_with_levers():
+    flat = ("capsule", "box", "prism")
+    return [*itertools.product(flat, flat), *((name, "half-space") for name in flat)]
+
+
+SHAPES["prism"] = wb.Hull([(0.2 * np.cos(a), 0.15 * np.sin(a), z) for a in range(6) for z in (-0.1, 0.1)])
+
+
+def nearly_flat(scene, kind, gap, rng):
+    """A posture in which the first body lies over the second, tilted by little, so that faces look at each other."""
+    q = scene.figure.neutral
+    for k in range(0, scene.model.nq, 7):
+        lying = pin.exp3(np.array([0.0, np.pi / 2, 0.0])) if kind[k // 7] == "capsule" else np.eye(3)
+        turn = pin.exp3(rng.normal(size=3) * [0.02, 0.02, 1.0]) @ lying
+        q[k + 3 : k + 7] = pin.Quaternion(turn).coeffs()
+    q[:3] = *rng.uniform(-0.15, 0.15, 2), 0.5
+    for _ in range(80):
+        distance, normal = distance_of(scene, q)
+        if abs(distance - gap) < 1e-9:
+            break
+        q[2] += distance_step(distance - gap, normal)
+    return q
+
+
+def distance_step(too_far, normal):
+    return -too_far / max(abs(normal[2]), 0.3)
+
+
+def two_bodies(free_bodies, kind):
+    if kind[1] == "half-space":
+        return wb.Scene(free_bodies(SHAPES[kind[0]])).add(SHAPES["half-space"], name="floor")
+    return wb.Scene(free_bodies(*(SHAPES[name] for name in kind)))
+
+
+@pytest.mark.parametrize("gap", [0.02, 0.001, -0.004])
+@pytest.mark.parametrize("kind", pairs_with_levers(), ids="-".join)
+def test_lever_rows_tell_the_gap_where_they_stand(free_bodies, kind, gap):
+    """Not less than the distance, nor more than what is really between the pieces there, along the normal.
+
+    Less than that is allowed: it only keeps round flanks a little farther apart.
+    """
+    rng = np.random.default_rng(8)
+    scene = two_bodies(free_bodies, kind)
+    levers = 0
+    for _ in range(12):
+        q = nearly_flat(scene, kind, gap, rng)
+        contacts, rows, _ = rows_of(scene, q)
+        placed, normal = scene.proximity.results, contacts.normal[0]
+        assert (rows.gap >= contacts.distance[0] - 1e-12).all()
+        assert np.array_equal(rows.contact, np.zeros(len(rows.gap)))
+        first, second = contacts.pair[0]
+        for gap_there, wrench in zip(rows.gap[1:], rows.wrench[1:], strict=True):
+            assert wrench[:3] == pytest.approx(normal)
+            point = np.cross(normal, wrench[3:])  # of the line along the normal that the row's point is on
+            spans = [chord(scene, placed, index, point, normal) for index in (int(first), int(second))]
+            assert None not in spans, "a row hangs over an edge"
+            between = spans[1][0] - spans[0][1]
+            assert gap_there <= between + module.INSET
+            levers += 1
+    assert levers >= 12
+
+
+def places(scene, q):
+    """Where the rows stand, (m, 3), in the plane through the origin along the normal."""
+    contacts, rows, _ = rows_of(scene, q)
+    return np.cross(contacts.normal[rows.contact], rows.wrench[:, 3:]), rows
+
+
+def on_table(free_bodies, size, table):
+    scene = wb.Scene(free_bodies(wb.Box(size))).add(wb.Box(table), name="table", at=(0.0, 0.0, -table[2] / 2))
+    q = scene.figure.neutral
+    q[2] = size[2] / 2 + 0.004
+    return scene, q
+
+
+@pytest.mark.parametrize(("size", "table"), [((0.4, 0.2, 0.1), (1.0, 1.0, 0.05)), ((1.0, 1.0, 0.1), (0.4, 0.2, 0.05))])
+def test_box_on_a_table_has_a_row_at_every_corner_of_the_patch(free_bodies, size, table):
+    scene, q = on_table(free_bodies, size, table)
+    found, rows = places(scene, q)
+    assert rows.gap == pytest.approx(0.004, abs=1e-6)
+    for corner in itertools.product((-0.2, 0.2), (-0.1, 0.1)):
+        assert np.linalg.norm(found[:, :2] - corner, axis=1).min() < 2e-3
+    assert (np.abs(found[:, :2]) <= np.array([0.2, 0.1]) + 2e-3).all()
+
+
+def test_plank_over_an_edge_may_tip(free_bodies):
+    scene, q = on_table(free_bodies, (1.0, 0.1, 0.02), (0.4, 1.0, 0.05))
+    q[0] = 0.3  # from -0.2 to 0.8, over a table that ends at 0.2
+    found, rows = places(scene, q)
+    assert found[:, 0].max() == pytest.approx(0.2, abs=2e-3)
+    assert found[:, 0].min() == pytest.approx(-0.2, abs=2e-3)
+    contacts, _, jacobian = rows_of(scene, q)
+    tip = np.zeros(6)
+    tip[4] = 0.1  # about y: the far end goes down, the near one up
+    tip[2] = 0.1 * (q[0] - 0.2)  # so that it turns about the edge
+    lifted = rows.gap + jacobian @ tip
+    assert (lifted >= contacts.distance[0] - 1e-3 * 0.1 * 2).all()
+
+
+def test_crossed_capsules_have_no_rows_far_from_the_crossing(free_bodies):
+    long = wb.Capsule(0.04, 0.6)
+    scene = wb.Scene(free_bodies(long, long))
+    q = scene.figure.neutral
+    q[3:7] = pin.Quaternion(pin.exp3(np.array([0.0, np.pi / 2, 0.0]))).coeffs()
+    q[10:14] = pin.Quaternion(pin.exp3(np.array([np.pi / 2, 0.0, 0.0]))).coeffs()
+    q[9] = 0.085
+    found, _ = places(scene, q)
+    assert np.linalg.norm(found[:, :2], axis=1).max(initial=0.0) < 0.02
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.2])
+def test_parallel_capsules_have_a_row_at_either_end_of_what_they_share(free_bodies, shift):
+    long = wb.Capsule(0.04, 0.6)
+    scene = wb.Scene(free_bodies(long, long))
+    q = scene.figure.neutral
+    q[7:10] = 0.085, 0.0, shift
+    found, rows = places(scene, q)
+    assert rows.gap == pytest.approx(0.005, abs=1e-5)
+    assert found[:, 2].min() == pytest.approx(-0.3 + shift, abs=5e-3)
+    assert found[:, 2].max() == pytest.approx(0.3, abs=5e-3)
+
+
+def test_round_shapes_and_far_ones_need_no_more_than_the_witness(free_bodies):
+    for shape, height in ((SHAPES["sphere"], 0.16), (SHAPES["ellipsoid"], 0.17), (SHAPES["box"], 0.2)):
+        scene = wb.Scene(free_bodies(shape)).add(SHAPES["half-space"], name="floor")
+        q = scene.figure.neutral
+        q[2] = height
+        contacts, rows, _ = rows_of(scene, q)
+        assert len(contacts.distance) == len(rows.gap) == 1
+
+
+def slowly(scene, contacts):
+    """The rows of every pair in plain loops over core points and faces, for boxes and hulls: (gap, point) by pair."""
+    placed = scene.proximity.results
+    piece = scene.geometry.geometryObjects
+    found = []
+    for number in range(len(contacts.distance)):
+        pair = [int(i) for i in contacts.pair[number]]
+        distance, normal = contacts.distance[number], contacts.normal[number]
+        found.append([(distance, contacts.point_a[number])])
+        if distance >= module.LEVER_DISTANCE:
+            continue
+        sides = []
+        for own, other, towards, at, facing in (
+            (pair[0], pair[1], normal, contacts.point_a[number], contacts.point_b[number]),
+            (pair[1], pair[0], -normal, contacts.point_b[number], contacts.point_a[number]),
+        ):
+            corners, over = [], True
+            for corner in corner_points(piece[own].geometry):
+                lever = placed.oMg[own].act(corner) - at
+                drop = max(-lever @ towards, 0.0)
+                if drop >= module.BAND:
+                    continue
+                lever = lever - (lever @ towards) * towards
+                share = 1.0
+                base = placed.oMg[other].actInv(facing + module.INSET * towards)
+                for *outward, offset in planes(piece[other].geometry):
+                    rate = np.dot(outward, placed.oMg[other].rotation.T @ lever)
+                    if rate > 1e-12:
+                        share = min(share, max(offset - np.dot(outward, base), 0.0) / rate)
+                over = over and share >= 1.0
+                corners.append((distance + share * drop, at + share * lever, share * np.linalg.norm(lever)))
+            sides.append((corners, over and bool(corners)))
+        (first, first_over), (second, second_over) = sides
+        kept = first if first_over else second if second_over else first + second
+        found[-1] += [(gap, point) for gap, point, length in kept if length > module.SHORTEST_LEVER]
+    return found
+
+
+def corner_points(piece):
+    if isinstance(piece, coal.Box):
+        return np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * piece.halfSide
+    return np.array(piece.points())
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_array_code_says_what_plain_loops_say(free_bodies, monkeypatch, compiled):
+    rng = np.random.default_rng(4)
+    flat = [SHAPES["box"], SHAPES["prism"], wb.Box((1.0, 0.3, 0.05)), wb.Hull(rng.normal(size=(12, 3)) * 0.2)]
+    scene = wb.Scene(free_bodies(*flat[:3]))
+    for k, shape in enumerate(flat):
+        scene.add(shape, name=f"thing{k}", at=(0.3 * k - 0.5, 0.1 * k, -0.2))
+    if not compiled:
+        monkeypatch.setattr(scene.row_builder, "_kernel", None)
+    elif scene.row_builder._kernel is None:
+        pytest.skip("numba is not installed")
+    levers = 0
+    for _ in range(40):
+        q = scene.figure.neutral
+        for k in range(0, scene.model.nq, 7):
+            q[k : k + 3] = rng.uniform(-0.5, 0.5, 3)
+            q[k + 3 : k + 7] = pin.Quaternion(pin.exp3(rng.normal(size=3) * rng.choice([1e-3, 0.02, 1.0]))).coeffs()
+        contacts, rows, _ = rows_of(scene, q)
+        expected = slowly(scene, contacts)
+        assert len(rows.gap) == sum(map(len, expected))
+        normal = rows.wrench[:, :3]
+        place = np.cross(normal, rows.wrench[:, 3:])
+        for number, wanted in enumerate(expected):
+            mine = np.flatnonzero(rows.contact == number)
+            across = [point - (point @ normal[mine[0]]) * normal[mine[0]] for _, point in wanted]
+            for gap, point in zip([gap for gap, _ in wanted], across, strict=True):
+                away = np.abs(rows.gap[mine] - gap) + np.abs(place[mine] - point).max(axis=1)
+                assert away.min() < 1e-8
+            levers += len(mine) - 1
+    assert levers > 100
+
+
+def test_rows_are_between_the_joints_of_the_pieces(free_bodies):
+    scene = wb.Scene(free_bodies(SHAPES["box"], SHAPES["prism"])).add(SHAPES["half-space"], name="floor")
+    q = scene.figure.neutral
+    q[2], q[9] = 0.12, 0.33
+    contacts, rows, _ = rows_of(scene, q)
+    joint = np.array([piece.parentJoint for piece in scene.geometry.geometryObjects])
+    assert np.array_equal(rows.first, joint[contacts.pair[rows.contact, 0]])
+    assert np.array_equal(rows.second, joint[contacts.pair[rows.contact, 1]])
+    assert np.array_equal(rows.contact[: len(contacts.distance)], np.arange(len(contacts.distance)))
