@@ -34,7 +34,7 @@ SHORTEST_LEVER = 8e-3  # m: rows nearer to the witness point than this say what 
 
 
 class ContactRows(NamedTuple):
-    """Rows ``gap + jacobian @ dq >= clearance``; the first k belong to the k contacts, in their order.
+    """Rows ``gap + jacobian @ dq >= clearance``: one for each of the k contacts, then more, sorted by contact.
 
     Attributes:
         gap: (m,) metres.
@@ -141,7 +141,9 @@ class ContactRowBuilder:
         side, reach = side[keep], reach[keep]
         gap = distance[side] + reach * drop[keep] + sag[keep]
         point = witness[side] + reach[:, None] * lever[keep]
-        return wide[side % count], point, gap
+        contact = wide[side % count]
+        order = np.argsort(contact, kind="stable")
+        return contact[order], point[order], gap[order]
 
     def _over_other(self, other: Indices, facing: Array, towards: Array, lever: Array) -> tuple[Array, Array]:
         """How far along each lever the other piece is still below: share of the lever in [0, 1], and its sag there."""

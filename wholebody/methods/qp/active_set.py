@@ -22,6 +22,7 @@ from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution,
 
 BOUND_TOLERANCE = 1e-11  # rad, m: an x this far outside its box counts as inside
 ROW_TOLERANCE = 1e-11  # m: likewise for elastic rows
+FULL_CORRECTIONS = 4  # corrections of everything at once, before only the worst entry is corrected at a time
 
 
 def guess_active_set(program: QuadraticProgram, x: Array, tolerance: float) -> ActiveSet:
@@ -32,8 +33,11 @@ def guess_active_set(program: QuadraticProgram, x: Array, tolerance: float) -> A
     return ActiveSet(lower, upper, program.elastic @ x <= program.least + tolerance)
 
 
-def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int = 12) -> QPSolution | None:
+def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) -> QPSolution | None:
     """Exact answer by correcting a guess of the active set.
+
+    The first few corrections put right everything that is wrong. That may go round in circles; then only the worst entry
+    is put right at a time, which is slower and surer.
 
     Args:
         program: what to solve.
@@ -44,14 +48,14 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int = 1
         The answer, or None when the sets did not settle.
     """
     active = guess
-    for _ in range(corrections):
+    for attempt in range(corrections):
         point = minimise_on_face(program, active)
         if point is None:
             return None
         following = _corrected(program, active, point)
         if following.same(active):
             return QPSolution(np.clip(point.x, program.lower, program.upper), active, True, 0)
-        active = following
+        active = following if attempt < FULL_CORRECTIONS else _worst_corrected(program, active, following, point)
     return None
 
 
@@ -98,3 +102,18 @@ def _corrected(program: QuadraticProgram, active: ActiveSet, point: FacePoint) -
     lower = np.where(active.lower, gradient >= 0.0, x < program.lower - BOUND_TOLERANCE)
     upper = np.where(active.upper, gradient <= 0.0, x > program.upper + BOUND_TOLERANCE)
     return ActiveSet(lower, upper, elastic)
+
+
+def _worst_corrected(program: QuadraticProgram, active: ActiveSet, following: ActiveSet, point: FacePoint) -> ActiveSet:
+    """The active set with the one entry changed that is most wrong, in units of x."""
+    pull = np.abs(point.gradient) / program.diagonal
+    wrong_low = np.where(active.lower, pull, program.lower - point.x) * (following.lower != active.lower)
+    wrong_high = np.where(active.upper, pull, point.x - program.upper) * (following.upper != active.upper)
+    lack = program.least - program.elastic @ point.x
+    lack[active.elastic] = -point.push * (program.elastic[active.elastic] ** 2 @ (1.0 / program.diagonal))
+    wrong = np.concatenate([wrong_low, wrong_high, lack * (following.elastic != active.elastic)])
+    worst = int(np.argmax(wrong))
+    flat = np.concatenate([active.lower, active.upper, active.elastic])
+    flat[worst] = not flat[worst]
+    size = program.size
+    return ActiveSet(flat[:size], flat[size : 2 * size], flat[2 * size :])

@@ -20,10 +20,10 @@ from wholebody.linearisation import Linearisation, Lineariser
 from wholebody.methods.qp.acceleration import Anderson
 from wholebody.methods.qp.funnel import Funnel, Outlook, Verdict
 from wholebody.methods.qp.passage import Placed, jumps, snapshot
-from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution, QuadraticProgram
+from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem, Violation
-from wholebody.methods.qp.working_set import solve_by_rows
+from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Iterate
 
 FIRST_RADIUS = 0.3  # rad, m: of the trust region; larger = fewer iterations in the open, more rejected ones in clutter
@@ -104,7 +104,7 @@ class Descent:
         here = self._visit(start)
         self._funnel = Funnel(here.violation.total)
         self._shift = np.zeros(len(here.rows.soft_error))
-        guess: ActiveSet | None = None
+        working_set = WorkingSet(self.solver)
         history: list[float] = []
         count, converged, renewals = 0, False, RENEWALS
         while count < self.iterations and time.perf_counter() < self.deadline:
@@ -112,8 +112,7 @@ class Descent:
             program = self.subproblem.program(
                 here.at, here.rows, self._radius, self._damping, self._shift, self._measures
             )
-            answer = solve_by_rows(self.solver, program, guess)
-            guess = answer.active
+            answer = working_set.solve(program, here.rows.key)
             outlook = Outlook(
                 here.violation.total - self.subproblem.violation(here.rows, answer.x).total,
                 -float(program.linear @ answer.x + 0.5 * (program.diagonal * answer.x) @ answer.x),

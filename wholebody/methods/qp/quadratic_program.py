@@ -53,6 +53,13 @@ class QuadraticProgram:
         """Number of variables n."""
         return len(self.diagonal)
 
+    def with_elastic(self, chosen: Mask) -> QuadraticProgram:
+        """The program with the chosen ones of its elastic rows, (k,) of bool."""
+        return QuadraticProgram(
+            self.diagonal, self.linear, self.rows, self.target, self.weight, self.elastic[chosen],
+            self.least[chosen], self.elastic_weight[chosen], self.lower, self.upper,
+        )  # fmt: skip
+
     def value(self, x: Array) -> float:
         """Objective at x, shape (n,)."""
         residual = self.rows @ x - self.target

@@ -24,6 +24,7 @@ PULL = 0.4  # m per rad of radius: of a goal farther away, or a deeper overlap, 
 BOX = 2.0  # radii: the box around a step, which seldom holds it; asking for little keeps programs easy instead
 HOLD_SHARE = 3.0  # what a metre of hold counts against a metre of goal when a step is judged
 ELASTIC_SHARE = 10.0  # and a metre of overlap; above any ratio at which overlap could buy goal
+MOST_ROWS = 4096  # more than one contact ever has
 LEAST_CURVATURE = 1e-3  # share of the largest curvature that a degree of freedom has which no measure speaks for
 
 
@@ -54,7 +55,19 @@ class Violation(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """A linearisation sorted into soft rows (goals, then equalities) and elastic ones (inequalities, then gaps)."""
+    """A linearisation sorted into soft rows (goals, then equalities) and elastic ones (inequalities, then gaps).
+
+    Attributes:
+        soft: (m, nv) goals' and equalities' rows.
+        soft_error: (m,) their errors.
+        soft_weight: (m,) their weights.
+        goals: how many of them are goals'.
+        elastic: (k, nv) rows of inequalities and gaps.
+        lack: (k,) what they lack; negative where they have more than enough.
+        group: (k,) rows of one contact share a number; the worst of them counts.
+        groups: how many numbers there are.
+        key: (k,) names a row from one linearisation to the next.
+    """
 
     soft: Array
     soft_error: Array
@@ -64,6 +77,7 @@ class Rows(NamedTuple):
     lack: Array
     group: NDArray[np.intp]
     groups: int
+    key: NDArray[np.intp]
 
 
 class Subproblem:
@@ -102,7 +116,11 @@ class Subproblem:
         )
         one_sided = len(low) + len(high)
         group = np.concatenate([np.arange(one_sided), one_sided + at.gap_contact])
-        return Rows(soft, error, weight, goals, elastic, lack, group, one_sided + len(at.contacts.distance))
+        contacts = len(at.contacts.distance)
+        more = at.gap_contact[contacts:]
+        place = np.concatenate([np.zeros(contacts, np.intp), 1 + np.arange(len(more)) - np.searchsorted(more, more)])
+        key = np.concatenate([-1 - np.arange(one_sided), at.contacts.number[at.gap_contact] * MOST_ROWS + place])
+        return Rows(soft, error, weight, goals, elastic, lack, group, one_sided + contacts, key)
 
     def violation(self, rows: Rows, displacement: Array | None = None) -> Violation:
         """Violation at the linearised posture, or what the linearisation predicts after a displacement (nv,)."""

@@ -8,16 +8,19 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.errors import InputError
-from wholebody.methods.qp.quadratic_program import ActiveSet, Array
+from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.qp.working_set import solve_by_rows
+from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 
 LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
 LARGEST_WITHIN = 0.5
 HEADROOM = 2.5  # pairs within this many times the last step's motion get rows, so that the next may be longer
-RADIUS = 0.25  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
+RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
+DAMPING = (
+    0.3  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at what is in the way
+)
 
 
 class Step(NamedTuple):
@@ -62,10 +65,9 @@ class Tracker:
         if not (np.isfinite(dt) and dt > 0.0):
             raise InputError(f"dt is {dt}; give a step in seconds, such as 0.01")
         self.problem, self.dt = problem, dt
-        self._solver = solver
         self._subproblem = Subproblem(problem)
         self._lineariser = problem.lineariser(dt)
-        self._guess: ActiveSet | None = None
+        self._working_set = WorkingSet(solver)
         self._within = LEAST_WITHIN
         proximity = problem.scene.proximity
         self._moving = np.flatnonzero(proximity.joint > 0)
@@ -80,9 +82,8 @@ class Tracker:
             self._retarget()
         at = self._lineariser.at(q, self._within)
         rows = self._subproblem.rows(at)
-        program = self._subproblem.program(at, rows, RADIUS, 0.0, np.zeros(len(rows.soft_error)), True)
-        answer = solve_by_rows(self._solver, program, self._guess)
-        self._guess = answer.active
+        program = self._subproblem.program(at, rows, RADIUS, DAMPING, np.zeros(len(rows.soft_error)), True)
+        answer = self._working_set.solve(program, rows.key)
         motion = self._motion(answer.x)
         share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
         self._within = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
@@ -99,7 +100,7 @@ class Tracker:
         self._lineariser.goals = now
         if [(type(goal), goal.weight) for goal in before] != [(type(goal), goal.weight) for goal in now]:
             self._subproblem = Subproblem(self.problem)
-            self._guess = None
+            self._working_set.forget()
 
     def _motion(self, displacement: Array) -> float:
         """Longest way of any point of any piece, metres, to first order in the displacement (nv,)."""
