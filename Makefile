@@ -55,7 +55,7 @@ lock: $(VENV)/.lock ## choose the newest versions that work together and write t
 	$(CHOOSE) --output-file requirements/run.txt
 	$(CHOOSE) --constraint requirements/run.txt --extra test --extra build --output-file requirements/test.txt
 	$(CHOOSE) --constraint requirements/run.txt --extra docs --output-file requirements/docs.txt
-	$(CHOOSE) --constraint requirements/test.txt --extra solvers --extra compare --output-file requirements/compare.txt
+	$(CHOOSE) --constraint requirements/test.txt --extra solvers --extra compare --extra charts --extra fast --output-file requirements/compare.txt
 
 clean: ## remove the environment and everything that was built
 	rm -rf $(VENV) build dist site demo .pytest_cache .mypy_cache .ruff_cache .hypothesis

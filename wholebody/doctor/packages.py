@@ -27,6 +27,7 @@ MODULES = {
 
 EXTRAS = {
     "matplotlib": "charts",
+    "numba": "fast",
     "quadprog": "solvers",
     "proxsuite": "solvers",
     "piqp": "solvers",
