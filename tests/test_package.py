@@ -20,6 +20,7 @@ ROOMS = (
         "version",
         "geometry",
         "figures",
+        "scene_geometry",
         "scene",
         "tasks",
         "linearisation",

@@ -14,6 +14,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
@@ -206,8 +207,6 @@ def _dense(part: Wrench | Array, state: State) -> Array:
 
 def _optimality(problem: Problem, state: State, pairs: _Pairs) -> float:
     """What is left of the objective's gradient after the best nonnegative combination of all active gradients."""
-    from scipy.optimize import nnls
-
     nv = state.model.nv
     goals = [(np.atleast_1d(goal.error(state)), _dense(goal.jacobian(state), state), goal) for goal in problem.goals]
     met = all(np.abs(error).max(initial=0.0) <= MET for error, _, _ in goals)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import Contacts, Proximity
+from wholebody.scene_geometry import SceneGeometry, SceneObject, assemble
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
@@ -24,26 +25,6 @@ if TYPE_CHECKING:
     from wholebody.geometry.sweep import FirstContact, Sweep
 
 Array = NDArray[np.float64]
-RESTING = 1e-3  # m: equipment nearer than this to a segment at rest is taken to lean on it
-
-
-@dataclass(frozen=True)
-class SceneObject:
-    """One thing in a scene.
-
-    Attributes:
-        name: its name, unique among the objects and segments of the scene.
-        shape: what it is.
-        placement: in the world, or in the segment's frame where it is carried.
-        segment: the segment that carries it; None for a thing that stands around.
-        color: red, green, blue, alpha from 0 to 1, or None for the viewer's choice.
-    """
-
-    name: str
-    shape: Shape
-    placement: pin.SE3
-    segment: str | None = None
-    color: tuple[float, float, float, float] | None = None
 
 
 class Scene:
@@ -57,7 +38,7 @@ class Scene:
         self.figure = figure
         self._objects: dict[str, SceneObject] = {}
         self._excluded: dict[tuple[str, str], str] = {}
-        self._built: _Built | None = None
+        self._built: SceneGeometry | None = None
         self._state: State | None = None
         self.revision = 0
 
@@ -155,18 +136,33 @@ class Scene:
         to: str,
         name: str,
         at: Any = (0.0, 0.0, 0.0),
+        rests_on: Iterable[str] = (),
         color: tuple[float, float, float, float] | None = None,
     ) -> Scene:
         """Give the figure a thing to carry: it moves with a segment, at `at` in the segment's frame.
 
-        It is not tested against its own segment, nor against segments it leans on in the posture the figure rests in.
+        It is not tested against its own segment, nor against neighbours of it (segments that the figure itself does not
+        test against each other) that it leans on in the figure's first posture; `excluded_pairs` lists those. All
+        others are tested: a box in the hand does not pass through the thighs.
+
+        Args:
+            shape: a `wholebody.geometry.shapes.Shape`.
+            to: the segment or frame that carries it.
+            name: a name that nothing else in the scene has.
+            at: where, in that frame; as for `add`.
+            rests_on: more segments that it is not tested against.
+            color: red, green, blue, alpha.
 
         Raises:
             InputError: the name is taken, or the placement cannot be read.
-            UnknownNameError: there is no such frame.
+            UnknownNameError: there is no such frame or segment.
         """
         self.frame_id(to)
-        return self._put(SceneObject(self._new_name(name), shape, to_placement(at), to, color))
+        rests = tuple(rests_on)
+        for segment in rests:
+            if segment not in self.figure.segments:
+                raise UnknownNameError("segment", segment, self.figure.segments, f"attach {name!r}: rests_on")
+        return self._put(SceneObject(self._new_name(name), shape, to_placement(at), to, color, rests))
 
     def move(self, name: str, *, at: Any) -> Scene:
         """Place a thing anew: in the world, or in its segment's frame.
@@ -176,7 +172,7 @@ class Scene:
             InputError: the placement cannot be read.
         """
         old = self._object(name)
-        moved = SceneObject(name, old.shape, to_placement(at), old.segment, old.color)
+        moved = replace(old, placement=to_placement(at))
         self._objects[name] = moved
         if self._built is not None:
             base = moved.placement
@@ -265,88 +261,8 @@ class Scene:
 
     # ---- building
 
-    def _build(self) -> _Built:
+    def _build(self) -> SceneGeometry:
         if self._built is None:
             self._excluded.clear()
-            self._built = _assemble(self.figure, self._objects.values(), self._excluded)
+            self._built = assemble(self.figure, self._objects.values(), self._excluded)
         return self._built
-
-
-class _Built:
-    """What is made from the list of objects: the geometry model and the indices into it."""
-
-    def __init__(
-        self,
-        model: pin.Model,
-        geometry: pin.GeometryModel,
-        owners: tuple[str, ...],
-        pieces_of: dict[str, list[tuple[int, pin.SE3]]],
-    ) -> None:
-        self.geometry, self.owners, self.pieces_of = geometry, owners, pieces_of
-        self.proximity = Proximity(model, geometry)
-        self.rows = ContactRowBuilder(self.proximity)
-        self.sweep: Sweep | None = None
-
-
-def _assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tuple[str, str], str]) -> _Built:
-    """Geometry model of a figure with things: the figure's pieces first, then carried ones, then the world's."""
-    model = figure.model
-    geometry = pin.GeometryModel()
-    owners: list[str] = []
-    pieces_of: dict[str, list[tuple[int, pin.SE3]]] = {}
-    for piece in figure.geometry.geometryObjects:
-        geometry.addGeometryObject(pin.GeometryObject(piece))
-        owners.append(model.frames[piece.parentFrame].name)
-    body = geometry.ngeoms
-    for pair in figure.geometry.collisionPairs:
-        geometry.addCollisionPair(pin.CollisionPair(pair.first, pair.second))
-
-    for thing in sorted(objects, key=lambda item: item.segment is None):
-        frame = model.frames[figure.frame_id(thing.segment)] if thing.segment is not None else None
-        base = frame.placement * thing.placement if frame is not None else thing.placement
-        joint = frame.parentJoint if frame is not None else 0
-        parent = figure.frame_id(thing.segment) if thing.segment is not None else 0
-        pieces_of[thing.name] = []
-        for number, part in enumerate(thing.shape.pieces()):
-            name = f"{thing.name}:{number}"
-            made = pin.GeometryObject(name, joint, parent, base * part.placement, part.geometry)
-            index = geometry.addGeometryObject(made)
-            owners.append(thing.name)
-            pieces_of[thing.name].append((index, part.placement))
-
-    joints = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=int)
-    resting = _resting(figure, geometry, body, joints, owners, excluded)
-    for second in range(body, geometry.ngeoms):
-        for first in range(second):
-            if joints[first] != joints[second] and (owners[first], owners[second]) not in resting:
-                geometry.addCollisionPair(pin.CollisionPair(first, second))
-    return _Built(model, geometry, tuple(owners), pieces_of)
-
-
-def _resting(
-    figure: Figure,
-    geometry: pin.GeometryModel,
-    body: int,
-    joints: NDArray[np.int_],
-    owners: list[str],
-    excluded: dict[tuple[str, str], str],
-) -> set[tuple[str, str]]:
-    """Pairs of owners, a carried thing being one, that touch in the posture the figure rests in."""
-    carried = [i for i in range(body, geometry.ngeoms) if joints[i] != 0]
-    if not carried:
-        return set()
-    probe = geometry.copy()
-    probe.removeAllCollisionPairs()
-    for second in carried:
-        for first in range(second):
-            if joints[first] not in (0, joints[second]):
-                probe.addCollisionPair(pin.CollisionPair(first, second))
-    rest = figure.posture(figure.postures[0])
-    data = figure.model.createData()
-    pin.forwardKinematics(figure.model, data, rest)
-    proximity = Proximity(figure.model, probe)
-    found = proximity.near(data, RESTING)
-    pairs = {(owners[a], owners[b]) for a, b in found.pair}
-    for pair in pairs:
-        excluded[pair] = f"they touch in the posture {figure.postures[0]!r}"
-    return pairs

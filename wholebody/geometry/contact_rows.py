@@ -186,6 +186,12 @@ def compiled_kernel() -> Callable[..., tuple[Indices, Array, Array]] | None:
     from wholebody.geometry.patch_kernel import patch_ends
 
     kernel: Callable[..., tuple[Indices, Array, Array]] = patch_ends
+    none, points, table = np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros((2, 10))
+    kernel(  # compiled, or read back, for columns of a table: here, and not in the middle of a solve
+        none, np.zeros((2, 2), dtype=np.intp), table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10],
+        np.zeros((2, 4, 3)), points, none, none, np.zeros((0, 4)), none, none, np.zeros(0), points,
+        np.zeros(0, dtype=bool), BAND, INSET, SHORTEST_LEVER,
+    )  # fmt: skip
     return kernel
 
 

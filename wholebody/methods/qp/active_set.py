@@ -36,8 +36,8 @@ def guess_active_set(program: QuadraticProgram, x: Array, tolerance: float) -> A
 def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) -> QPSolution | None:
     """Exact answer by correcting a guess of the active set.
 
-    The first few corrections put right everything that is wrong. That may go round in circles; then only the worst entry
-    is put right at a time, which is slower and surer.
+    The first few corrections put right everything that is wrong. That may go round in circles; then only the worst
+    entry is put right at a time, which is slower and surer.
 
     Args:
         program: what to solve.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ctypes import c_int
 
+import daqp
 import numpy as np
 
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
@@ -32,8 +33,6 @@ class DAQPSolver(QPSolver):
 
 def solve_with_daqp(program: QuadraticProgram) -> QPSolution:
     """Minimise with mild weights, and where that does not lead to the exact answer, with the true ones."""
-    import daqp
-
     n, m, k = program.size, len(program.target), len(program.least)
     iterations = 0
     x = np.zeros(n)

@@ -1,0 +1,133 @@
+"""The geometry model of a scene: pieces of a figure, of what it carries and what stands around, and their pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.geometry.proximity import Proximity
+
+if TYPE_CHECKING:
+    from wholebody.figures.figure import Figure
+    from wholebody.geometry.shapes import Shape
+    from wholebody.geometry.sweep import Sweep
+
+RESTING = 1e-3  # m: equipment nearer than this to a segment at rest is taken to lean on it
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """One thing in a scene.
+
+    Attributes:
+        name: its name, unique among the objects and segments of the scene.
+        shape: what it is.
+        placement: in the world, or in the segment's frame where it is carried.
+        segment: the segment that carries it; None for a thing that stands around.
+        color: red, green, blue, alpha from 0 to 1, or None for the viewer's choice.
+        rests_on: segments that a carried thing is not tested against.
+    """
+
+    name: str
+    shape: Shape
+    placement: pin.SE3
+    segment: str | None = None
+    color: tuple[float, float, float, float] | None = None
+    rests_on: tuple[str, ...] = ()
+
+
+class SceneGeometry:
+    """What is made from the list of objects: the geometry model and the indices into it."""
+
+    def __init__(
+        self,
+        model: pin.Model,
+        geometry: pin.GeometryModel,
+        owners: tuple[str, ...],
+        pieces_of: dict[str, list[tuple[int, pin.SE3]]],
+    ) -> None:
+        self.geometry, self.owners, self.pieces_of = geometry, owners, pieces_of
+        self.proximity = Proximity(model, geometry)
+        self.rows = ContactRowBuilder(self.proximity)
+        self.sweep: Sweep | None = None
+
+
+def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tuple[str, str], str]) -> SceneGeometry:
+    """Geometry model of a figure with things: the figure's pieces first, then carried ones, then the world's."""
+    model = figure.model
+    geometry = pin.GeometryModel()
+    owners: list[str] = []
+    pieces_of: dict[str, list[tuple[int, pin.SE3]]] = {}
+    for piece in figure.geometry.geometryObjects:
+        geometry.addGeometryObject(pin.GeometryObject(piece))
+        owners.append(model.frames[piece.parentFrame].name)
+    body = geometry.ngeoms
+    for pair in figure.geometry.collisionPairs:
+        geometry.addCollisionPair(pin.CollisionPair(pair.first, pair.second))
+
+    things = sorted(objects, key=lambda item: item.segment is None)
+    for thing in things:
+        frame = model.frames[figure.frame_id(thing.segment)] if thing.segment is not None else None
+        base = frame.placement * thing.placement if frame is not None else thing.placement
+        joint = frame.parentJoint if frame is not None else 0
+        parent = figure.frame_id(thing.segment) if thing.segment is not None else 0
+        pieces_of[thing.name] = []
+        for number, part in enumerate(thing.shape.pieces()):
+            name = f"{thing.name}:{number}"
+            made = pin.GeometryObject(name, joint, parent, base * part.placement, part.geometry)
+            index = geometry.addGeometryObject(made)
+            owners.append(thing.name)
+            pieces_of[thing.name].append((index, part.placement))
+
+    joints = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=int)
+    carried = {thing.name: thing for thing in things if thing.segment is not None}
+    excluded.update(_leaning(figure, geometry, body, joints, owners, carried))
+    for second in range(body, geometry.ngeoms):
+        for first in range(second):
+            if joints[first] != joints[second] and (owners[first], owners[second]) not in excluded:
+                geometry.addCollisionPair(pin.CollisionPair(first, second))
+    return SceneGeometry(model, geometry, tuple(owners), pieces_of)
+
+
+def _leaning(
+    figure: Figure,
+    geometry: pin.GeometryModel,
+    body: int,
+    joints: NDArray[np.int_],
+    owners: list[str],
+    carried: Mapping[str, SceneObject],
+) -> dict[tuple[str, str], str]:
+    """Pairs (segment, carried thing) that are not tested, with the reason."""
+    if not carried:
+        return {}
+    names = [piece.name for piece in figure.geometry.geometryObjects]
+    segments = [figure.model.frames[piece.parentFrame].name for piece in figure.geometry.geometryObjects]
+    tested = {frozenset((segments[pair.first], segments[pair.second])) for pair in figure.geometry.collisionPairs}
+    joint_of = dict(zip(segments, joints[: len(names)], strict=True))
+    probe = geometry.copy()
+    probe.removeAllCollisionPairs()
+    for second in range(body, geometry.ngeoms):
+        for first in range(body):
+            if owners[second] in carried and joints[first] != joints[second]:
+                probe.addCollisionPair(pin.CollisionPair(first, second))
+    rest = figure.posture(figure.postures[0])
+    data = figure.model.createData()
+    pin.forwardKinematics(figure.model, data, rest)
+    touching = {(owners[a], owners[b]) for a, b in Proximity(figure.model, probe).near(data, RESTING).pair}
+
+    found: dict[tuple[str, str], str] = {}
+    for name, thing in carried.items():
+        carrier = figure.model.frames[figure.frame_id(str(thing.segment))].parentJoint
+        for segment in dict.fromkeys(segments):
+            near = [other for other, joint in joint_of.items() if joint == carrier]
+            if segment in thing.rests_on:
+                found[segment, name] = "said to rest on it"
+            elif (segment, name) in touching and not any(frozenset((segment, other)) in tested for other in near):
+                found[segment, name] = f"a neighbour of {thing.segment} that it leans on in {figure.postures[0]!r}"
+    return found
