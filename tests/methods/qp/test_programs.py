@@ -1,0 +1,171 @@
+"""Quadratic programs: every solver against quadprog on the textbook form, and against enumeration."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wholebody import UnknownNameError
+from wholebody.methods.qp.active_set import guess_active_set, minimise_on_face, solve_from
+from wholebody.methods.qp.quadratic_program import ActiveSet
+from wholebody.methods.qp.solvers.base import make_solver, solver_names
+from wholebody.methods.qp.solvers.split_form import split
+
+
+def by_quadprog(program):
+    """The minimiser from quadprog, with residuals and slacks as variables, scaled by the roots of their weights."""
+    quadprog = pytest.importorskip("quadprog")
+    n, m, k = program.size, len(program.target), len(program.least)
+    root, elastic = np.sqrt(program.weight), np.sqrt(program.elastic_weight)
+    hessian = np.diag(np.concatenate([program.diagonal, np.ones(m + k)]))
+    linear = -np.concatenate([program.linear, np.zeros(m + k)])
+    soft = np.hstack([program.rows * root[:, None], -np.eye(m), np.zeros((m, k))])
+    rows = np.hstack([program.elastic * elastic[:, None], np.zeros((k, m)), np.eye(k)])
+    box = np.hstack([np.eye(n), np.zeros((n, m + k))])
+    matrix = np.vstack([soft, rows, box, -box])
+    bound = np.concatenate([program.target * root, program.least * elastic, program.lower, -program.upper])
+    return quadprog.solve_qp(hessian, linear, matrix.T, bound, m)[0][:n]
+
+
+def by_enumeration(program):
+    """The least value over all faces of the box and all sets of pushing rows."""
+    n, k = program.size, len(program.least)
+    best, x = np.inf, None
+    for state in itertools.product((0, 1, 2), repeat=n):
+        lower, upper = np.array(state) == 1, np.array(state) == 2
+        for pushing in itertools.product((False, True), repeat=k):
+            point = minimise_on_face(program, ActiveSet(lower, upper, np.array(pushing, dtype=bool)))
+            candidate = np.clip(point.x, program.lower, program.upper)
+            if program.value(candidate) < best:
+                best, x = program.value(candidate), candidate
+    return x
+
+
+def test_enumeration_and_quadprog_agree(random_program):
+    for seed in range(4):
+        program = random_program(np.random.default_rng(seed), n=3, m=2, k=3)
+        mild = replace(program, weight=np.minimum(program.weight, 1e4), elastic_weight=np.full(3, 1e4))
+        assert by_quadprog(mild) == pytest.approx(by_enumeration(mild), abs=1e-7)
+
+
+@pytest.mark.parametrize("name", solver_names())
+def test_every_solver_gives_the_same_answer(random_program, name):
+    rng = np.random.default_rng(3)
+    solver = make_solver(name)
+    for case in range(25):
+        size = (int(rng.integers(2, 40)), int(rng.integers(0, 9)), int(rng.integers(0, 30)))
+        program = random_program(rng, *size)
+        answer = solver.solve(program, None)
+        assert answer.exact, (case, size)
+        assert ((answer.x >= program.lower) & (answer.x <= program.upper)).all()
+        mild = replace(
+            program, weight=np.minimum(program.weight, 1e5), elastic_weight=np.minimum(program.elastic_weight, 1e5)
+        )
+        assert solver.solve(mild, None).x == pytest.approx(by_quadprog(mild), abs=1e-7)
+        assert program.optimality(answer.x) < 1e-7  # weights of 1e10 leave so much rounding
+
+
+def test_osqp_workspace_lives_through_changing_sizes(random_program):
+    """One solver for programs that grow and shrink says what a new one says."""
+    rng = np.random.default_rng(8)
+    solver = make_solver("osqp")
+    for rows in (0, 3, 8, 9, 30, 2, 0, 17):
+        for n, m in ((12, 4), (12, 4), (7, 4), (12, 2)):
+            program = random_program(rng, n, m, rows)
+            expected = make_solver("osqp").solve(program, None).x
+            assert solver.solve(program, None).x == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", solver_names())
+def test_a_guess_changes_nothing_but_the_work(random_program, name):
+    rng = np.random.default_rng(9)
+    solver = make_solver(name)
+    for _ in range(20):
+        program = random_program(rng)
+        answer = solver.solve(program, None)
+        again = solver.solve(program, answer.active)
+        assert (again.iterations, again.by) == (0, "last active set")
+        assert again.x == pytest.approx(answer.x, abs=1e-11)
+        wrong = ActiveSet(~answer.active.lower & ~answer.active.upper, answer.active.lower, ~answer.active.elastic)
+        assert solver.solve(program, wrong).x == pytest.approx(answer.x, abs=1e-9)
+
+
+def test_active_set_method_needs_only_a_guess_that_is_near(random_program):
+    rng = np.random.default_rng(10)
+    settled = 0
+    for _ in range(40):
+        program = random_program(rng)
+        right = make_solver("daqp").solve(program, None).active
+        elastic = right.elastic.copy()
+        elastic[rng.integers(len(elastic))] ^= True
+        answer = solve_from(program, ActiveSet(right.lower, right.upper, elastic), 12)
+        if answer is not None:  # sets may go round in circles; then nothing is claimed
+            settled += 1
+            assert program.optimality(answer.x) < 1e-7
+    assert settled > 25
+
+
+def test_active_set_is_read_off_a_near_answer(random_program):
+    rng = np.random.default_rng(12)
+    for _ in range(10):
+        program = replace(random_program(rng), weight=np.full(4, 10.0), elastic_weight=np.full(9, 10.0))
+        answer = make_solver("osqp").solve(program, None)
+        read = guess_active_set(program, by_quadprog(program), 1e-7)
+        assert read.same(answer.active)
+
+
+def test_gradient_is_the_derivative_of_the_value(random_program):
+    rng = np.random.default_rng(1)
+    program = random_program(rng)
+    program = replace(program, weight=np.minimum(program.weight, 10.0), elastic_weight=np.full(9, 10.0))
+    x = 0.2 * rng.normal(size=program.size)
+    for k, direction in enumerate(np.eye(program.size)):
+        slope = (program.value(x + 1e-6 * direction) - program.value(x - 1e-6 * direction)) / 2e-6
+        assert program.gradient(x)[k] == pytest.approx(slope, abs=1e-6)
+
+
+def test_split_form_has_the_same_value(random_program):
+    """At residuals r = T x - e and slacks s = max(0, l - C x), up to the constant."""
+    rng = np.random.default_rng(2)
+    program = random_program(rng)
+    form = split(program, np.inf)
+    for _ in range(5):
+        x = rng.uniform(program.lower, program.upper)
+        z = np.concatenate([x, program.rows @ x - program.target, np.maximum(program.least - program.elastic @ x, 0.0)])
+        rows = form.matrix @ z
+        assert (rows >= form.lower - 1e-12).all()
+        assert (rows <= form.upper + 1e-12).all()
+        assert 0.5 * (form.diagonal * z) @ z + form.linear @ z == pytest.approx(program.value(x), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", solver_names())
+def test_programs_at_the_edge_of_sense(random_program, name):
+    solver = make_solver(name)
+    program = random_program(np.random.default_rng(5))
+    fixed = replace(program, lower=np.zeros(12), upper=np.zeros(12))
+    assert np.array_equal(solver.solve(fixed, None).x, np.zeros(12))
+    twice = replace(  # rows that repeat each other, and rows that are zero
+        program,
+        rows=np.vstack([program.rows, program.rows, np.zeros((2, 12))]),
+        target=np.concatenate([program.target, program.target, [1.0, -1.0]]),
+        weight=np.concatenate([program.weight, program.weight, [1e8, 1e8]]),
+    )
+    single = replace(program, weight=2.0 * program.weight)
+    assert solver.solve(twice, None).x == pytest.approx(solver.solve(single, None).x, abs=1e-7)
+    against = replace(  # rows that contradict each other share what is left
+        program,
+        elastic=np.vstack([np.eye(12)[:1], -np.eye(12)[:1]]),
+        least=np.array([1.0, 1.0]),
+        elastic_weight=np.full(2, 1e10),
+        lower=np.full(12, -0.3),
+        upper=np.full(12, 0.3),
+    )
+    assert solver.solve(against, None).x[0] == pytest.approx(0.0, abs=1e-2)
+
+
+def test_unknown_solver_is_answered_with_the_names():
+    with pytest.raises(UnknownNameError, match="osqp"):
+        make_solver("oskp")
