@@ -75,7 +75,7 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         # a wrong number
         ("clearance = 0.01", "clearance = 10", ["task.toml:1", "key clearance", "from 0 to 0.5 m"]),
         ("clearance = 0.01", "clearance = nan", ["task.toml:1", "key clearance", "nan"]),
-        ("clearance = 0.01", "clearance = true", ["key clearance", "True is not a number"]),
+        ("radius = 0.01", "radius = true", ["attach 1, key radius", "True is not a number"]),
         ('detail = "spheres"', "stature = 175", ["task.toml:5", "key stature", "centimetres, write 1.75"]),
         ('detail = "spheres"', "mass = 70000", ["key mass", "grams, write 70"]),
         (
