@@ -13,6 +13,7 @@ import wholebody as wb
 from wholebody.bench.judge import judge
 from wholebody.bench.tools import chosen_tools, differences, installed_tools, make_tool
 from wholebody.bench.tools.mjcf import mjcf
+from wholebody.bench.tools.wholebody_tool import MovingPoint
 from wholebody.bench.track import Track
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
@@ -39,6 +40,30 @@ def test_two_steps_keep_limits_and_feet(name: str, short_contact: Track) -> None
     assert verdict.error[-1] < 0.6 * standing.error[-1], "it did not move towards the target"
     tool.reset(two.start)
     assert np.allclose(tool.posture(), two.start, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", installed_tools())
+def test_a_far_target_is_approached_no_faster_than_joints_may(name: str, short_free: Track) -> None:
+    one = replace(short_free, targets=short_free.targets[[-1]])
+    tool = make_tool(name, one)
+    tool.step(one.targets[0])
+    fastest = judge(one, tool.posture()[None]).fastest_joint
+    assert 0.05 < fastest <= 1.0 + 1e-6
+
+
+def test_the_moving_goal_has_the_derivative_that_differences_have(short_free: Track) -> None:
+    scene = short_free.scene
+    goal = MovingPoint(short_free.tip, np.array([0.3, 0.1, 0.9])).resolve(scene, short_free.start)
+    rng = np.random.default_rng(1)
+    q = pin.integrate(scene.model, short_free.start, 0.3 * rng.normal(size=scene.model.nv))
+    way = rng.normal(size=scene.model.nv)
+    ahead, behind = (
+        goal.error(scene.state(pin.integrate(scene.model, q, sign * 1e-6 * way))).copy() for sign in (1, -1)
+    )
+    state = scene.state(q)
+    assert np.allclose(state.wrench_jacobian(goal.jacobian(state)) @ way, (ahead - behind) / 2e-6, atol=1e-7)
+    goal.target[:] = state.frame(scene.frame_id(short_free.tip)).translation
+    assert np.allclose(goal.error(state), 0.0)
 
 
 @pytest.mark.parametrize("name", [name for name in installed_tools() if name.startswith("wholebody/")])

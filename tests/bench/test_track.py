@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wholebody.bench.track import BLOCK, DT, Track, smooth_way, track
+from wholebody.bench.track import BLOCK, DT, VARIANTS, Track, smooth_way, track
 from wholebody.errors import InputError, UnknownNameError
 
 
@@ -30,7 +30,7 @@ def test_the_same_reach_is_made_at_every_call(short_free: Track) -> None:
     assert first == second
 
 
-@pytest.mark.parametrize("name", ["free", "contact"])
+@pytest.mark.parametrize("name", VARIANTS)
 def test_the_way_begins_at_the_fingertip_and_has_no_jumps(name: str) -> None:
     made = track(name, 200)
     assert made.targets.shape == (200, 3)

@@ -28,6 +28,7 @@ def machine() -> dict[str, str]:
         "python": platform.python_version(),
         THREADS: os.environ.get(THREADS, "not set"),
     }
+    facts["numba"] = _version("numba") or "not installed"  # our own linearisation is faster with it
     installed = {name: _version(name) for name in PACKAGES}
     return facts | {name: version for name, version in installed.items() if version}
 

@@ -31,7 +31,8 @@ def step_report(
     """
     parts = [
         f"{rows[0].steps} steps of {1e3 * DT:g} ms by the standing human (55 degrees of freedom) among 20 convex "
-        f"objects, {max(row.pairs for row in rows)} pairs of pieces; both feet held, joints drawn back to standing, "
+        f"objects (none in the reach alone), {max(row.pairs for row in rows)} pairs of pieces; both feet held, "
+        "joints drawn back to standing, "
         f"clearance {1e3 * CLEARANCE:g} mm, pairs nearer than {1e3 * WITHIN:g} mm looked at, joints up to "
         f"{JOINT_SPEED:g} rad/s, root up to {ROOT_SPEED:g} m/s and {ROOT_TURN:g} rad/s. {rows[0].repeats} repeats, "
         "every tool once in each, in turning order, in one process; a first round and the first step of each set-up "
@@ -39,7 +40,8 @@ def step_report(
     ]
     for reach in dict.fromkeys(row.reach for row in rows):
         mine = [row for row in rows if row.reach == reach]
-        parts += [f"### {reach.capitalize()} reach: time", _times(mine), f"### {reach.capitalize()} reach: result"]
+        title = f"{reach.capitalize()} reach, {max(row.pairs for row in mine)} pairs"
+        parts += [f"### {title}: time", _times(mine), f"### {title}: result"]
         parts += [_results(mine)]
         if reach in stages:
             whole, part = stages[reach]
@@ -118,7 +120,7 @@ def reaches_report(rows: Sequence[ReachRow], facts: Mapping[str, str], jobs: int
                 f"{np.median([row.iterations for row in mine]):.0f}", f"{max(row.penetration for row in mine):.1e}",
                 f"{max(row.limit_violation for row in mine):.1e}",
                 f"{max(row.constraint_violation for row in mine):.1e}",
-                f"{np.median([row.measure / row.witness_measure for row in solved] or [np.nan]):.2f}",
+                f"{np.median([row.measure / row.witness_measure for row in solved] or [np.nan]):.2g}",
             )
         )  # fmt: skip
         missed += [f"- seed {row.seed}, {solver}: {row.status}; {row.how}" for row in mine if row.status != "solved"]

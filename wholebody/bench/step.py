@@ -17,6 +17,7 @@ from wholebody.bench.tools.base import Tool
 from wholebody.bench.track import CLEARANCE, Array, Track
 
 REFERENCE = "placo"
+JUDGED = ("free", "contact")  # reaches for which a figure was asked
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class StepRow:
     """What one tool did on one reach, over all repeats.
 
     Attributes:
-        reach: "free" or "contact".
+        reach: "free", "contact" or "alone".
         tool: its name.
         repeats: timed runs.
         steps: of each.
@@ -222,7 +223,7 @@ def goal_lines(rows: Sequence[StepRow]) -> list[str]:
     """What was to be reached and what was: one line for each of our solvers on each reach."""
     lines = []
     for row in rows:
-        if not row.tool.startswith("wholebody/"):
+        if not row.tool.startswith("wholebody/") or row.reach not in JUDGED:
             continue
         asked = [
             ("median", row.ratio, 0.5, row.ratio <= 0.5),

@@ -1,7 +1,8 @@
 """The reach that every tool makes: 200 steps of a fingertip, both feet held, among twenty convex objects.
 
 Two ways for the fingertip: "free" passes the body and the objects and comes near many without having to touch any;
-"contact" asks for a place inside a box, which nobody can reach, and then for one before the chest.
+"contact" asks for a place inside a box, which nobody can reach, and then for one before the chest. "alone" is the free
+way without the objects: far fewer pairs, which tells what a tool's time is made of.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from wholebody.errors import InputError, UnknownNameError
 
 Array = NDArray[np.float64]
 
-VARIANTS = ("free", "contact")
+VARIANTS = ("free", "contact", "alone")
 DT = 0.01  # s
 CLEARANCE = 0.010  # m
 WITHIN = 0.070  # m: pairs nearer than this count for every tool that has such a setting
@@ -39,7 +40,7 @@ class Track:
     """One reach, the same for every tool.
 
     Attributes:
-        name: "free" or "contact".
+        name: "free", "contact" or "alone".
         scene: the human and the objects.
         start: (nq,) standing.
         targets: (steps, 3) where the fingertip is asked to be [m].
@@ -64,7 +65,7 @@ def track(name: str, steps: int = 200, seed: int = SEED) -> Track:
     """Build a reach.
 
     Args:
-        name: "free" or "contact".
+        name: "free", "contact" or "alone".
         steps: of the way.
         seed: of the objects.
 
@@ -84,8 +85,9 @@ def track(name: str, steps: int = 200, seed: int = SEED) -> Track:
     thorax = np.array(data.oMf[figure.frame_id("thorax")].translation)
     free = smooth_way(np.vstack([tip, FREE]), 400)
     scene = wb.Scene(figure)
-    add_objects(scene, start, free, np.random.default_rng(seed))
-    if name == "free":
+    if name != "alone":
+        add_objects(scene, start, free, np.random.default_rng(seed))
+    if name != "contact":
         return Track(name, scene, start, smooth_way(np.vstack([tip, FREE]), steps))
     chest = thorax + (CHEST, 0.0, 0.0)
     first, second = round(INTO * steps), round((INTO + ALONG) * steps)

@@ -56,7 +56,9 @@ def add_bench_parsers(commands: argparse._SubParsersAction[argparse.ArgumentPars
     solve.set_defaults(run=run_solve)
     for parser in (step, reaches, solve):
         parser.add_argument("--quick", action="store_true", help="a short run that shows whether all works")
-        parser.add_argument("--out", type=Path, default=Path("bench"), metavar="DIR", help="folder (default: bench)")
+        parser.add_argument(
+            "--out", type=Path, default=Path("out/bench"), metavar="DIR", help="folder (default: out/bench)"
+        )
         parser.add_argument(
             "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
             help="write tables and charts into the documentation too (default folder: docs)",

@@ -10,7 +10,7 @@ from wholebody.bench.tools.base import POSTURE_COST, REACH_COST, Tool
 from wholebody.bench.tools.mjcf import ROOT, mjcf
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Array, Track
 
-COLLISION_GAIN = 0.5  # share of a gap that may be used up in one step
+COLLISION_GAIN = 0.5 * DT  # half of what is free of a gap may be used up in one step; see `differences`
 
 
 class MinkTool(Tool):
@@ -18,6 +18,8 @@ class MinkTool(Tool):
 
     name = "mink"
     differences: ClassVar[tuple[str, ...]] = (
+        "mink bounds a displacement by gain × gap ÷ dt, which is a velocity; its gain is given here times dt, so that "
+        "half of a gap may be used up in a step, as its documentation means it (as written, it stops only inside)",
         "mink drops pairs of a body and its parent body, and the root against all that is fixed to the world",
     )
 
