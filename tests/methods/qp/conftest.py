@@ -58,7 +58,7 @@ def _honest(problem: wb.Problem, solution: wb.Solution, tolerance: float = 1e-5)
     assert judged.goal_error == pytest.approx(solution.assessment.goal_error, abs=1e-12)
     slack = 1.1 * tolerance + 2e-6
     if solution.status in ("solved", "unreachable"):
-        assert _least_distance(problem.scene, q) >= min(0.0, *problem.clearances) - slack
+        assert _least_distance(problem.scene, q) >= problem.clearances.min(initial=0.0) - slack
         assert judged.holds(slack)
     if solution.status == "solved":
         assert judged.met(slack)
