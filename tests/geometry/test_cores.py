@@ -49,7 +49,7 @@ def test_core_and_shape_have_the_same_support(shape):
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
 def test_width_is_the_least_distance_of_parallel_planes_around_it(shape):
     core = core_of(shape.pieces()[0].geometry)
-    both = supports(shape) + np.array([support for support in supports_of_opposite(shape)])
+    both = supports(shape) + supports_of_opposite(shape)
     assert core.width <= both.min() + 1e-12
     assert core.width >= 0.75 * both.min()
 
