@@ -25,6 +25,7 @@ BOX = 2.0  # radii: the box around a step, which seldom holds it; asking for lit
 HOLD_SHARE = 3.0  # what a metre of hold counts against a metre of goal when a step is judged
 ELASTIC_SHARE = 10.0  # and a metre of overlap; above any ratio at which overlap could buy goal
 MOST_ROWS = 4096  # more than one contact ever has
+LEVER = 1.0  # m: of a limb; larger = more damping of every joint while a goal is out of reach
 LEAST_CURVATURE = 1e-3  # share of the largest curvature that a degree of freedom has which no measure speaks for
 
 
@@ -147,7 +148,7 @@ class Subproblem:
             at: where.
             rows: its rows.
             radius: about the largest entry that the displacement should have, radians and metres.
-            damping: how much of the goals' neglected second derivative to add, bounded by |error| times lever.
+            damping: how much of the goals' neglected second derivative to add, bounded by |pull| times lever.
             shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
             measures: whether the measures count; without them the nearest posture to the goals is sought.
         """
@@ -159,9 +160,9 @@ class Subproblem:
         farthest = float(np.abs(error[: rows.goals]).max(initial=0.0))
         if farthest > PULL * radius:
             error[: rows.goals] *= PULL * radius / farthest
-        if damping > 0.0 and rows.goals:
+        if damping > 0.0:
             pull = rows.soft_weight[: rows.goals] * np.abs(error[: rows.goals])
-            diagonal = diagonal + damping * (pull @ np.abs(rows.soft[: rows.goals]))
+            diagonal = diagonal + damping * LEVER * float(pull.max(initial=0.0))
         box = BOX * radius
         lower = np.minimum(np.maximum(at.lower, -box), box)
         upper = np.maximum(np.minimum(at.upper, box), -box)
