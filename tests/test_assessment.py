@@ -1,0 +1,148 @@
+"""The judgement, on postures whose faults are known by construction."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.geometry.proximity import Proximity
+
+LENGTHS = (0.5, 0.4)
+
+
+def test_depth_and_lack_of_clearance(free_bodies):
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.2), name="ball").add(wb.HalfSpace(), name="floor")
+    start = scene.figure.neutral
+    start[:3] = 3.0, 0.0, 3.0
+    problem = wb.Problem(scene, start, clearance=0.01)
+    for distance in (0.02, 0.004, -0.03, -0.299):
+        q = start.copy()
+        q[:3] = 0.0, 0.3 + distance, 1.0
+        scene.move("ball", at=(0.0, 0.0, 1.0))
+        found = wb.assess(problem, q)
+        assert found.least_distance == pytest.approx(distance, abs=1e-9)
+        assert found.penetration == pytest.approx(max(-distance, 0.0), abs=1e-9)
+        assert found.clearance_lack == pytest.approx(max(0.01 - distance, 0.0), abs=1e-9)
+        assert found.holds(1e-6) is (distance >= 0.01)
+
+
+def test_it_does_not_use_what_methods_use(free_bodies, monkeypatch):
+    """With the culled distances broken it still sees everything."""
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.2), name="ball", at=(0.25, 0.0, 0.0))
+    problem = wb.Problem(scene)
+
+    def nothing(self, data, within):
+        raise AssertionError("the assessment asked the culled distances")
+
+    monkeypatch.setattr(Proximity, "near", nothing)
+    assert wb.assess(problem, problem.start).penetration == pytest.approx(0.05)
+
+
+def test_limits(planar_arm):
+    problem = wb.Problem(wb.Scene(planar_arm(LENGTHS, limit=1.0)))
+    assert wb.assess(problem, np.array([1.0, -1.0])).limit_violation == 0.0
+    assert wb.assess(problem, np.array([0.5, -1.3])).limit_violation == pytest.approx(0.3)
+    assert wb.assess(problem, np.array([1.7, -1.3])).limit_violation == pytest.approx(0.7)
+
+
+def test_goal_errors_in_metres_and_radians(free_bodies):
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1)))
+    turn = pin.exp3(np.array([0.0, 0.0, 0.3]))
+    frame = wb.Frame("body0", pin.SE3(turn, np.array([0.03, 0.04, 0.0])))
+    problem = wb.Problem(scene, goals=[wb.Point("body0", (0.0, 0.0, 0.02)), frame])
+    found = wb.assess(problem, problem.start)
+    assert found.goal_error == pytest.approx(0.05)
+    assert found.goal_angle == pytest.approx(0.3)
+    assert found.goal_errors == pytest.approx((0.02, 0.3))
+    assert not found.met(0.29)
+    assert found.met(0.31)
+
+
+def test_constraints_and_measures(free_bodies):
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1), wb.Sphere(0.1)))
+    q = scene.figure.neutral
+    q[7] = 1.0
+    problem = wb.Problem(
+        scene, q,
+        constraints=[wb.Hold("body0"), wb.Plane("body1", (0.0, 0.0, 1.0), side="above")],
+        measures=[wb.Displacement(2.0), wb.Effort(3.0)],
+    )  # fmt: skip
+    moved = q.copy()
+    moved[7:10] = 1.0, 0.2, 0.1
+    found = wb.assess(problem, moved)
+    assert found.constraint_violation == pytest.approx(0.0, abs=1e-12)  # above its plane, which is allowed
+    assert found.measure == pytest.approx(2.0 * 1.05 + 3.0 * 0.05)
+    moved[9] = -0.07
+    assert wb.assess(problem, moved).constraint_violation == pytest.approx(0.07)
+    moved[0] = 0.3
+    assert wb.assess(problem, moved).constraint_violation == pytest.approx(0.3)
+
+
+def arm_reaching(planar_arm, target, start, **options):
+    return wb.Problem(wb.Scene(planar_arm(LENGTHS)), np.array(start), goals=[wb.Point("tip", target)], **options)
+
+
+def test_optimality_is_zero_where_no_motion_would_help(planar_arm):
+    """Straight towards a goal out of reach is the nearest an arm can be; anything else is not."""
+    problem = arm_reaching(planar_arm, (2.0 * np.cos(0.7), 2.0 * np.sin(0.7), 0.0), (0.1, 0.4))
+    assert wb.assess(problem, np.array([0.7, 0.0])).optimality < 1e-9
+    for off in ((0.1, 0.0), (0.0, 0.1), (0.05, -0.1)):
+        assert wb.assess(problem, np.array([0.7, 0.0]) + off).optimality > 0.01
+
+
+def test_optimality_counts_limits_that_push_back(planar_arm):
+    figure = planar_arm(LENGTHS, limit=0.5)
+    problem = wb.Problem(wb.Scene(figure), np.array([0.1, 0.2]), goals=[wb.Point("tip", (0.0, 2.0, 0.0))])
+    assert wb.assess(problem, np.array([0.5, 0.5])).optimality < 1e-9
+    assert wb.assess(problem, np.array([0.5, 0.3])).optimality > 0.01
+    assert wb.assess(problem, np.array([-0.5, -0.5])).optimality > 0.01  # the limits push the other way
+
+
+def test_optimality_of_measures_where_goals_are_met(planar_arm):
+    """An arm with a joint to spare, at the least effort along its self-motion and beside it."""
+    figure = planar_arm((0.5, 0.4, 0.3))
+    start = np.array([0.1, 0.4, 0.3])
+    problem = wb.Problem(wb.Scene(figure), start, goals=[wb.Point("tip", (0.4, 0.6, 0.0))])
+    best, others = None, []
+    for last in np.linspace(0.0, 3.0, 3001):
+        wrist = np.array([0.4, 0.6]) - 0.3 * np.array([np.cos(last), np.sin(last)])
+        reach = (wrist @ wrist - 0.5**2 - 0.4**2) / (2 * 0.5 * 0.4)
+        if abs(reach) >= 1.0:
+            continue
+        bend = np.arccos(reach)
+        turn = np.arctan2(wrist[1], wrist[0]) - np.arctan2(0.4 * np.sin(bend), 0.5 + 0.4 * np.cos(bend))
+        q = np.array([turn, bend, last - turn - bend])
+        others.append(q)
+        if best is None or ((q - start) ** 2).sum() < ((best - start) ** 2).sum():
+            best = q
+    assert wb.assess(problem, best).goal_error < 1e-9
+    assert wb.assess(problem, best).optimality < 2e-3  # of a search in steps of 1e-3
+    far = max(others, key=lambda q: ((q - best) ** 2).sum())
+    assert wb.assess(problem, far).optimality > 0.1
+
+
+@pytest.mark.parametrize("shape", [wb.Box((0.2, 0.2, 0.2)), wb.Sphere(0.1)], ids=["box", "sphere"])
+def test_optimality_counts_contacts_that_push_back(free_bodies, shape):
+    """A body pressed onto a table by a goal below it can do no better; beside or above the goal it can."""
+    scene = wb.Scene(free_bodies(shape)).add(wb.Box((2.0, 2.0, 0.1)), name="table", at=(0.0, 0.0, -0.05))
+    start = scene.figure.neutral
+    start[2] = 0.5
+    problem = wb.Problem(scene, start, goals=[wb.Point("body0", (0.0, 0.0, -0.3))])
+
+    def at(x, z):
+        q = start.copy()
+        q[0], q[2] = x, z
+        return wb.assess(problem, q).optimality
+
+    assert at(0.0, 0.1) < 1e-4
+    assert at(0.1, 0.1) > 0.01
+    assert at(0.0, 0.2) > 0.01
+
+
+@pytest.mark.parametrize("q", [np.zeros(3), np.array([0.0, np.nan]), np.array([[0.0, 0.0]])])
+def test_what_is_no_posture_is_refused(planar_arm, q):
+    problem = wb.Problem(wb.Scene(planar_arm(LENGTHS)))
+    with pytest.raises(wb.InputError, match="posture is"):
+        wb.assess(problem, q)

@@ -1,0 +1,146 @@
+"""Everything a method is told at a posture, against finite differences of the values themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.tasks.base import Goal
+
+
+class Squared(Goal):
+    """A goal with a dense Jacobian: the square of one entry of the tangent place, to mix with wrenches."""
+
+    def error(self, state):
+        return np.array([state.q[10] ** 2])
+
+    def jacobian(self, state):
+        row = np.zeros((1, state.model.nv))
+        row[0, 9] = 2.0 * state.q[10]
+        return row
+
+
+@pytest.fixture(scope="module")
+def problem():
+    scene = wb.Scene(wb.load("human"))
+    scene.add(wb.Box((1.2, 0.7, 0.04)), name="table", at=(0.6, 0.0, 0.85))
+    scene.add(wb.Sphere(0.2), name="ball", at=(0.1, 0.6, 1.2))
+    scene.add(wb.HalfSpace(), name="floor")
+    scene.attach(wb.Box((0.2, 0.1, 0.15)), to="right_hand", name="tool", at=(0.0, 0.0, -0.2))
+    return wb.Problem(
+        scene,
+        goals=[
+            wb.Point("right_index_tip", (0.5, -0.2, 1.0)),
+            Squared(),
+            wb.Frame("left_palm", (0.4, 0.3, 1.0, 0.0, 0.0, 0.0, 1.0)),
+            wb.CenterOfMass((0.0, 0.0, 1.0)),
+            wb.Relative("left_palm", "right_palm", (0.3, 0.0, 0.0)),
+            wb.Posture("sitting"),
+        ],
+        constraints=[
+            wb.Hold("left_foot"),
+            wb.Balance(),
+            wb.Plane("right_elbow", (0.0, 1.0, 0.2)),
+            wb.Freeze("neck"),
+            wb.StepLimit(2.0),
+        ],
+        measures=[wb.Effort(2.0), wb.Displacement(), wb.PotentialEnergy(0.01), wb.Discomfort(0.1)],
+        clearance=0.004,
+    )
+
+
+def posture(problem, seed):
+    rng = np.random.default_rng(seed)
+    figure = problem.scene.figure
+    q = figure.clamp(pin.integrate(figure.model, problem.start, 0.25 * rng.normal(size=figure.model.nv)))
+    limits = figure.limits
+    q[limits.idx_q] = np.clip(q[limits.idx_q], limits.lower + 0.02, limits.upper - 0.02)
+    return q
+
+
+def moved(problem, q, k, step):
+    return pin.integrate(problem.scene.model, q, step * np.eye(problem.scene.model.nv)[k])
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_goals_constraints_and_measures(problem, seed):
+    lineariser, q, step = problem.lineariser(), posture(problem, seed), 1e-6
+    at = lineariser.at(q, 0.1)
+    assert at.goal_jacobian.shape == (len(at.goal_error), 55)
+    assert at.value_jacobian.shape == (len(at.value), 55)
+    assert (at.curvature >= 0.0).all()
+    for k in range(problem.scene.model.nv):
+        ahead, behind = (lineariser.at(moved(problem, q, k, side * step), 0.1) for side in (1, -1))
+        slope = (ahead.goal_error - behind.goal_error) / (2 * step)
+        assert at.goal_jacobian[:, k] == pytest.approx(slope, abs=2e-6)
+        slope = (ahead.value - behind.value) / (2 * step)
+        assert at.value_jacobian[:, k] == pytest.approx(slope, abs=2e-6)
+        slope = (ahead.measure - behind.measure) / (2 * step)
+        assert at.gradient[k] == pytest.approx(slope, rel=1e-5, abs=1e-5)
+
+
+def test_gaps_of_the_contacts(problem):
+    """The first rows are the distances; pairs whose nearest places jump within the step are left out."""
+    lineariser, step = problem.lineariser(), 1e-5
+    checked = 0
+    for seed in (2, 3):
+        q = posture(problem, seed)
+        at = lineariser.at(q, 0.15)
+        count = len(at.contacts.distance)
+        assert np.array_equal(at.gap[:count], at.contacts.distance)
+        assert np.array_equal(at.gap_contact[:count], np.arange(count))
+        slopes = np.zeros((2, count, problem.scene.model.nv))
+        for k in range(problem.scene.model.nv):
+            for row, size in enumerate((step, 3 * step)):
+                ends = [lineariser.at(moved(problem, q, k, side * size), 0.4).contacts for side in (1, -1)]
+                tables = [dict(zip(end.number.tolist(), end.distance.tolist(), strict=True)) for end in ends]
+                change = [tables[0][n] - tables[1][n] for n in at.contacts.number.tolist()]
+                slopes[row, :, k] = np.array(change) / (2 * size)
+        smooth = np.abs(slopes[0] - slopes[1]).max(axis=1) < 1e-3
+        assert smooth.sum() > 0.5 * count
+        assert at.gap_jacobian[:count][smooth] == pytest.approx(slopes[0][smooth], abs=2e-3)
+        checked += smooth.sum()
+    assert checked > 20
+
+
+def test_pairs_are_those_near_enough_for_their_clearance(problem):
+    at = problem.lineariser().at(problem.start, 0.1)
+    expected = problem.scene.contacts(problem.start, 0.1 + problem.clearances.max())
+    assert sorted(at.contacts.number) == sorted(expected.number)
+    assert np.array_equal(at.clearance, problem.clearances[at.contacts.number][at.gap_contact])
+
+
+def test_bounds_are_limits_frozen_joints_and_speed(problem):
+    figure, q = problem.scene.figure, posture(problem, 4)
+    lower, upper = figure.tangent_bounds(q)
+    free = problem.lineariser().at(q, 0.1)
+    frozen = figure.dofs(["neck"])
+    others = np.setdiff1d(np.arange(6, 55), frozen)
+    assert not free.lower[frozen].any()
+    assert not free.upper[frozen].any()
+    assert np.array_equal(free.lower[others], lower[others])
+    assert np.array_equal(free.upper[others], upper[others])
+    timed = problem.lineariser(0.01).at(q, 0.1)
+    assert np.array_equal(timed.upper[others], np.minimum(upper[others], 0.02))
+    assert np.array_equal(timed.lower[others], np.maximum(lower[others], -0.02))
+
+
+def test_a_problem_without_anything():
+    scene = wb.Scene(wb.load("hand"))
+    at = wb.Problem(scene, measures=[]).lineariser().at(scene.figure.neutral, -1.0)
+    assert at.goal_error.shape == at.value.shape == (0,)
+    assert at.goal_jacobian.shape == at.value_jacobian.shape == (0, scene.model.nv)
+    assert at.gap_jacobian.shape == (0, scene.model.nv)
+    assert at.measure == 0.0
+
+
+def test_what_was_told_is_not_overwritten_by_the_next_posture(problem):
+    lineariser = problem.lineariser()
+    at = lineariser.at(problem.start, 0.1)
+    copies = {name: np.array(getattr(at, name)) for name in ("q", "goal_error", "goal_jacobian", "gap", "gap_jacobian")}
+    copies["distance"] = np.array(at.contacts.distance)
+    lineariser.at(posture(problem, 5), 0.1)
+    for name, copy in copies.items():
+        assert np.array_equal(getattr(at.contacts if name == "distance" else at, name), copy)

@@ -1,0 +1,133 @@
+"""Stating a problem: what is refused, and which distance is asked of which pair."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+
+
+@pytest.fixture
+def scene():
+    return wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+
+
+GOAL = wb.Point("right_index_tip", (0.5, -0.2, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "sentence"),
+    [
+        ({"start": np.zeros(55)}, wb.InputError, r"start has shape \(56,\), not \(55,\)"),
+        ({"start": np.full(56, np.nan)}, wb.InputError, "start entry 0 is not finite"),
+        ({"start": np.ones(56)}, wb.InputError, "quaternion is not of unit length"),
+        ({"start": "stading"}, wb.UnknownNameError, "did you mean standing"),
+        ({"goals": GOAL}, wb.InputError, "goals is a list of terms, not Point"),
+        ({"goals": [GOAL, wb.Hold("left_foot")]}, wb.InputError, r"goals\[1\] is a Hold, not a Goal"),
+        ({"goals": ["right_hand"]}, wb.InputError, r"goals\[0\] is a str, not a Goal"),
+        ({"goals": [wb.Point("rigth_index_tip", (0, 0, 0))]}, wb.UnknownNameError, "did you mean right_index_tip"),
+        ({"constraints": [GOAL]}, wb.InputError, r"constraints\[0\] is a Point, not a Constraint or Bound"),
+        ({"constraints": None}, wb.InputError, "constraints is a list of terms, not NoneType"),
+        ({"measures": [wb.Freeze("neck")]}, wb.InputError, r"measures\[0\] is a Freeze, not a Measure"),
+        ({"clearance": -0.001}, wb.InputError, "clearance is -0.001 m"),
+        ({"clearance": 2.0}, wb.InputError, "clearance is 2.0 m"),
+        ({"clearance": np.nan}, wb.InputError, "clearance is nan m"),
+        ({"clearance": "2 mm"}, wb.InputError, "clearance is a distance in metres"),
+        ({"clearance": None}, wb.InputError, "clearance is a distance in metres"),
+        ({"touching": [("right_hand",)]}, wb.InputError, "touching takes pairs of names"),
+        ({"touching": ["floor"]}, wb.InputError, "touching takes pairs of names"),
+        ({"touching": [("right_hand", "flor")]}, wb.UnknownNameError, "did you mean floor"),
+    ],
+)
+def test_mistakes_are_answered_with_a_sentence(scene, given, error, sentence):
+    with pytest.raises(error, match=sentence):
+        wb.Problem(scene, **given)
+
+
+def test_start_is_the_first_posture_a_name_or_a_copy(scene):
+    figure = scene.figure
+    assert np.array_equal(wb.Problem(scene).start, figure.posture("standing"))
+    assert np.array_equal(wb.Problem(scene, "sitting").start, figure.posture("sitting"))
+    q = figure.posture("t_pose")
+    problem = wb.Problem(scene, q)
+    q[:] = np.nan
+    assert np.isfinite(problem.start).all()
+
+
+def test_nearly_unit_quaternions_are_made_unit(scene):
+    q = scene.figure.posture("standing")
+    q[3:7] *= 1.0 + 5e-4
+    assert np.linalg.norm(wb.Problem(scene, q).start[3:7]) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_effort_is_minimised_unless_something_else_is_said(scene):
+    assert [type(term) for term in wb.Problem(scene).measures] == [wb.Effort]
+    assert wb.Problem(scene, measures=[]).measures == ()
+
+
+def test_bounds_and_constraints_are_told_apart(scene):
+    problem = wb.Problem(scene, constraints=[wb.Freeze("neck"), wb.Hold("left_foot"), wb.StepLimit(1.0)])
+    assert [type(term) for term in problem.bounds] == [wb.Freeze, wb.StepLimit]
+    assert [type(term) for term in problem.constraints] == [wb.Hold]
+
+
+def test_pairs_keep_what_they_begin_with_and_leave_what_they_are_in(free_bodies):
+    """A ball 3 mm over the floor, one on it, one in it, one far away; 5 mm are asked."""
+    scene = wb.Scene(free_bodies(*[wb.Sphere(0.1)] * 4)).add(wb.HalfSpace(), name="floor")
+    q = scene.figure.neutral
+    for k, height in enumerate((0.103, 0.1, 0.09, 0.5)):
+        q[7 * k : 7 * k + 3] = k, 0.0, height
+    problem = wb.Problem(scene, q, clearance=0.005)
+    asked = {}
+    for (a, b), clearance in zip(scene.proximity.pairs, problem.clearances, strict=True):
+        asked[scene.piece_owner[a], scene.piece_owner[b]] = clearance
+    on_floor = [asked[f"body{k}", "floor"] for k in range(4)]
+    assert on_floor == pytest.approx([0.003, 0.0, 0.005, 0.005], abs=2e-6)
+    assert {value for pair, value in asked.items() if "floor" not in pair} == {0.005}
+
+
+def test_named_pairs_may_touch_in_either_order(free_bodies):
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1), wb.Sphere(0.1)))
+    scene.add(wb.Box((1.0, 1.0, 0.1)), name="table", at=(0.0, 0.0, -0.5))
+    q = scene.figure.neutral
+    q[7] = 1.0
+    for pair in (("body0", "table"), ("table", "body0")):
+        problem = wb.Problem(scene, q, clearance=0.005, touching=[pair])
+        owners = [{scene.piece_owner[i] for i in pair} for pair in scene.proximity.pairs]
+        expected = [0.0 if names == {"body0", "table"} else 0.005 for names in owners]
+        assert problem.clearances.tolist() == expected
+
+
+def test_goals_are_replaced_and_the_rest_stays(scene):
+    problem = wb.Problem(scene, goals=[GOAL], constraints=[wb.Hold("left_foot")], clearance=0.003)
+    constraints, clearances = problem.constraints, problem.clearances
+    problem.retarget([wb.Point("left_index_tip", (0.5, 0.2, 1.0)), GOAL])
+    assert len(problem.goals) == 2
+    assert problem.constraints is constraints
+    assert problem.clearances is clearances
+    with pytest.raises(wb.UnknownNameError):
+        problem.retarget([wb.Point("left_index", (0.5, 0.2, 1.0))])
+    assert len(problem.goals) == 2
+    with pytest.raises(wb.InputError):
+        problem.retarget(GOAL)
+
+
+def test_a_problem_is_tied_to_the_things_it_was_stated_with(scene):
+    problem = wb.Problem(scene, goals=[GOAL])
+    scene.add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 1.0))
+    for ask in (problem.check_fresh, problem.lineariser, lambda: wb.assess(problem, problem.start)):
+        with pytest.raises(wb.InputError, match="state the problem anew"):
+            ask()
+    again = wb.Problem(scene, goals=[GOAL])
+    scene.move("ball", at=(1.0, 1.0, 1.0))
+    again.check_fresh()
+
+
+def test_terms_are_not_changed_by_being_used(scene):
+    hold = wb.Hold("left_foot")
+    one, two = wb.Problem(scene, constraints=[hold]), wb.Problem(scene, "sitting", constraints=[hold])
+    assert one.constraints[0] is not hold
+    assert wb.assess(one, one.start).constraint_violation == 0.0
+    assert wb.assess(two, two.start).constraint_violation < 1e-12
+    assert wb.assess(one, two.start).constraint_violation > 0.01
