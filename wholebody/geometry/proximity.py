@@ -17,6 +17,8 @@ from wholebody.geometry.memory_views import distance_view, placement_view, read_
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+COAL_ACCURACY = 1e-6  # m: of coal's distances
+
 
 class Contacts(NamedTuple):
     """Pairs nearer than a query distance, nearest first. All arrays have k rows.
@@ -61,6 +63,11 @@ class Proximity:
         self.reach = np.array([core.reach for core in self.cores]).reshape(-1)
         width = np.array([core.width for core in self.cores]).reshape(-1)
         self.widths: Array = width[self.pairs].sum(axis=1)
+        radius = np.array([core.radius for core in self.cores]).reshape(-1)
+        # where round pieces' cores meet, coal's normal is zero or noise along an axis
+        self._cores_meet = np.where(
+            (radius[self.pairs] > 0.0).all(axis=1), COAL_ACCURACY - radius[self.pairs].sum(axis=1), -np.inf
+        )
         self._pair_of = np.full((count, count), -1, dtype=np.intp)
         self._pair_of[self.pairs[:, 0], self.pairs[:, 1]] = np.arange(len(self.pairs))
         rows = self.pairs[:, 0]
@@ -129,13 +136,14 @@ class Proximity:
         keep = np.flatnonzero(table[:, 0] < within)
         table, index = table[keep], index[keep]
         normal = table[:, 1:4]
-        if len(table) and (np.einsum("ij,ij->i", normal, normal) < 0.25).any():
-            self._mend_normals(table, index)
+        broken = table[:, 0] <= self._cores_meet[index]
+        if broken.any():
+            self._mend_normals(table, index, np.flatnonzero(broken))
         return Contacts(self.pairs[index], table[:, 0], normal, table[:, 4:7], table[:, 7:10], index)
 
-    def _mend_normals(self, table: Array, index: Indices) -> None:
+    def _mend_normals(self, table: Array, index: Indices, rows: Indices) -> None:
         """Give a normal to pairs where coal has none: cores that cross exactly (capsule axes, concentric spheres)."""
-        for row in np.flatnonzero(np.einsum("ij,ij->i", table[:, 1:4], table[:, 1:4]) < 0.25):
+        for row in rows:
             first, second = self.pairs[index[row]]
             axis_a = self.cores[first].axis @ self.placements[first, :3]
             axis_b = self.cores[second].axis @ self.placements[second, :3]
