@@ -174,3 +174,14 @@ def test_figure_says_where_its_cones_stand():
     assert set(figure.cones) == set(NAMES)
     assert figure.cones["left_shoulder"].reference == "thorax"
     assert figure.cones["left_hip"].limb == "left_thigh"
+
+
+@pytest.mark.parametrize("name", ["right_shoulder", "left_hip"])
+def test_one_direction_is_answered_as_many_are(name):
+    cone = load("human").cones[name].cone
+    directions = random_directions(3000, 5)
+    angles, gradients = cone.signed_angle(directions)
+    for direction, angle, gradient in zip(directions, angles, gradients, strict=True):
+        one, slope = cone.signed_angle(direction)
+        assert one == pytest.approx(angle, abs=1e-9)
+        assert slope == pytest.approx(gradient, abs=1e-6)
