@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from presenting import command_line, picture, report
+from presenting import OAK, command_line, picture, report
 
 import wholebody as wb
 
@@ -15,11 +15,11 @@ def build() -> wb.Problem:
     """State the problem; tasks/shelf.toml says the same."""
     scene = wb.Scene(wb.load("human", sex="male", stature=1.75, mass=78.0))
     scene.add(wb.HalfSpace(), name="floor")
-    scene.add(wb.Box((0.40, 0.02, 1.90)), name="left side", at=(0.70, 0.20, 0.95))
-    scene.add(wb.Box((0.40, 0.02, 1.90)), name="right side", at=(0.70, -0.80, 0.95))
-    scene.add(wb.Box((0.02, 1.02, 1.90)), name="back", at=(0.91, -0.30, 0.95))
+    scene.add(wb.Box((0.40, 0.02, 1.90)), name="left side", at=(0.70, 0.20, 0.95), color=OAK)
+    scene.add(wb.Box((0.40, 0.02, 1.90)), name="right side", at=(0.70, -0.80, 0.95), color=OAK)
+    scene.add(wb.Box((0.02, 1.02, 1.90)), name="back", at=(0.91, -0.30, 0.95), color=OAK)
     for name, height in (("bottom board", 0.20), ("low board", 0.65), ("board below", 1.05), ("board above", 1.35)):
-        scene.add(wb.Box((0.40, 0.98, 0.02)), name=name, at=(0.70, -0.30, height))
+        scene.add(wb.Box((0.40, 0.98, 0.02)), name=name, at=(0.70, -0.30, height), color=OAK)
     scene.add(wb.Capsule(radius=0.05, length=0.06), name="jar", at=(0.66, -0.12, 1.145), color=(0.75, 0.45, 0.2, 1.0))
     return wb.Problem(
         scene,
