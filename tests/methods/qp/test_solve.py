@@ -71,8 +71,8 @@ def test_goals_out_of_reach_are_answered_with_the_nearest_posture(planar_arm, ho
     problem = wb.Problem(scene, start=np.array(start), goals=[wb.Point("tip", target)])
     solution = honest(problem, wb.solve(problem))
     assert solution.status == "unreachable"
-    # of postures that are equally near to a thousandth the one of less effort is taken
-    assert solution.assessment.goal_error == pytest.approx(beyond, rel=1e-3, abs=2e-5)
+    # of postures that are nearly as near the one of less effort is taken
+    assert solution.assessment.goal_error == pytest.approx(beyond, rel=2e-3, abs=2e-5)
     assert "left" in solution.message
 
 
