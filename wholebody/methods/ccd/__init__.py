@@ -1,0 +1,1 @@
+"""Cyclic coordinate descent: one joint at a time, in closed form, on plain floats."""

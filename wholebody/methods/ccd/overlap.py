@@ -1,0 +1,227 @@
+"""Removal of overlap from frame to frame: the posture shown is as near to the tracked one as contact allows.
+
+Each frame goes from the last posture without overlap towards the tracked one, in steps short enough that what they
+overlap is shallow, and every step is pushed out again by the loop of `remover`. So the joints are drawn to the tracked
+ones in every frame, also at rest (the coach and trainee of Boulic and others 1997), limbs slide along what stops them,
+and the global penetration is asked only where it is a good estimate. A step that cannot be pushed out is shortened by
+interpolation with the last posture without overlap (algorithm 1, step 4, of Schmidl and Lin).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError
+from wholebody.methods.ccd.passing import jump
+from wholebody.methods.ccd.remover import Remover, Tally
+from wholebody.scene import Scene
+
+Array = NDArray[np.float64]
+
+STEP = 0.03  # m: farthest that a chain's tip is drawn at once; half of a forearm's width
+STEPS = 16  # most steps of one frame
+HALVINGS = 7  # of an interpolation: a step of 3 cm to a quarter of a millimetre
+LEAST_GAIN = 1e-7  # rad^2: a chain that gets no nearer than this to the tracked posture stays where it is
+ARRIVED = 1e-12  # rad^2: a chain this near is there
+
+
+@dataclass(frozen=True)
+class OverlapResult:
+    """A posture without overlap, and what it took.
+
+    Attributes:
+        q: (nq,) the posture to show.
+        iterations: goals that cyclic coordinate descent was given.
+        joints: joints that took part.
+        pairs: different pairs of pieces that overlapped on the way.
+        contact_seconds: time of contact queries.
+        ik_seconds: time of cyclic coordinate descent.
+        fell_back: interpolation with the last posture without overlap was needed.
+        deepest: deepest overlap left, metres.
+    """
+
+    q: Array
+    iterations: int
+    joints: int
+    pairs: int
+    contact_seconds: float
+    ik_seconds: float
+    fell_back: bool
+    deepest: float
+
+
+def remove_overlap(
+    scene: Scene, q_free: Array, q_wanted: Array, rng: np.random.Generator, *, steps: int = STEPS
+) -> OverlapResult:
+    """The posture nearest to the wanted one that this frame can reach without overlap.
+
+    Args:
+        scene: figure and things. What was prepared for it is kept from call to call.
+        q_free: (nq,) the last posture without overlap: the one shown before.
+        q_wanted: (nq,) the tracked posture. It may be in anything; limits and cones are kept for it.
+        rng: of the order of the chains; the same seed gives the same answer.
+        steps: most steps of 3 cm that the frame may take; what is left waits for the next frame.
+
+    Returns:
+        The posture, within limits and reach cones and never NaN. Where things moved onto `q_free`, that is removed
+        first; `deepest` says what could not be.
+
+    Raises:
+        InputError: a posture of the wrong shape, or a value that is not finite.
+    """
+    checked = [_posture(scene, q, what) for q, what in ((q_free, "q_free"), (q_wanted, "q_wanted"))]
+    if scene not in _FRAMES or _FRAMES[scene].revision != scene.revision:
+        _FRAMES[scene] = Frames(scene)
+    return _FRAMES[scene].remove(checked[0], checked[1], rng, steps)
+
+
+class Frames:
+    """Removal of overlap from frame to frame in one scene."""
+
+    def __init__(self, scene: Scene, remover: Remover | None = None) -> None:
+        """Prepare the chains, and which degrees of freedom are of which."""
+        self.revision = scene.revision
+        self._model, self._figure, self._proximity = scene.model, scene.figure, scene.proximity
+        self._remover = Remover(scene) if remover is None else remover
+        self._sweeper = scene.sweeper
+        self._parts: list[tuple[NDArray[np.intp], Array]] = []
+        rest = np.ones(scene.model.nv, dtype=bool)
+        for chain in self._remover.chains.values():
+            joints = [scene.model.joints[joint] for joint in chain.limbs.joints]
+            dofs = np.array([joint.idx_v for joint in joints], dtype=np.intp)
+            fresh = rest[dofs]
+            rest[dofs] = False
+            self._parts.append((dofs[fresh], np.array(chain.reach)[fresh]))
+        size = max([float(reach.max(initial=0.5)) for _, reach in self._parts], default=0.5)
+        others = np.flatnonzero(rest)
+        reach = np.full(len(others), 2.0 * size)
+        if scene.figure.root == "free":
+            reach[others < 3] = 1.0
+        self._parts.append((others, reach))
+
+    def remove(self, q_free: Array, q_wanted: Array, rng: np.random.Generator, steps: int = STEPS) -> OverlapResult:
+        """See `remove_overlap`."""
+        remover = self._remover
+        remover.tally = Tally()
+        wanted = remover.into_cones(self._figure.clamp(q_wanted))
+        self._fell_back = False
+        q, overlaps = remover.separate(q_free, rng)
+        before = self._proximity.placements.copy()
+        left = remover.deepest
+        if not overlaps:
+            if not remover.look(wanted) and not self._jumps(before, q, wanted):
+                return self._result(wanted, remover.deepest)
+            q, left = self._approach(q, wanted, before, rng, steps)
+        elif not remover.look(wanted):
+            return self._result(wanted, remover.deepest)
+        return self._result(q, left)
+
+    def _approach(
+        self, q: Array, wanted: Array, before: Array, rng: np.random.Generator, steps: int
+    ) -> tuple[Array, float]:
+        """From a free posture towards the wanted one, step by step; the posture and its deepest overlap."""
+        remover = self._remover
+        settled = [False] * len(self._parts)
+        left = 0.0
+        for _ in range(steps):
+            drawn = self._draw(q, wanted, settled)
+            if drawn is None:
+                break
+            trial, overlaps = remover.separate(drawn, rng)
+            if overlaps:
+                trial = self._interpolate(q, trial)
+            after = self._proximity.placements.copy()
+            if self._jumps(before, q, trial):
+                trial = self._interpolate(q, self._hit)
+                after = self._proximity.placements.copy()
+            trial = self._keep_gains(q, trial, wanted, settled)
+            q, left = trial, remover.deepest
+            before = self._proximity.placements.copy() if self._moved_back else after
+        return q, left
+
+    def _draw(self, q: Array, wanted: Array, settled: list[bool]) -> Array | None:
+        """Draw every part that is not settled a step towards the wanted posture; None where none is left to draw."""
+        way = np.asarray(pin.difference(self._model, q, wanted))
+        arrived = True
+        for k, (dofs, reach) in enumerate(self._parts):
+            part = way[dofs]
+            if settled[k] or not len(dofs) or float(part @ part) < ARRIVED:
+                way[dofs] = part if not settled[k] else 0.0
+                continue
+            arrived = False
+            length = float(np.abs(part) @ reach)
+            if length > STEP:
+                way[dofs] = part * (STEP / length)
+        if arrived:
+            return None
+        return np.asarray(pin.integrate(self._model, q, way))
+
+    def _keep_gains(self, q: Array, trial: Array, wanted: Array, settled: list[bool]) -> Array:
+        """Parts that got no nearer to the wanted posture stay where they were, if that is free, and are settled."""
+        before = np.asarray(pin.difference(self._model, q, wanted))
+        after = np.asarray(pin.difference(self._model, trial, wanted))
+        back = np.zeros(self._model.nv, dtype=bool)
+        for k, (dofs, _) in enumerate(self._parts):
+            old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
+            if old - new < LEAST_GAIN and old > ARRIVED:
+                settled[k] = True
+                back[dofs] = True
+        self._moved_back = bool(back.any())
+        if not self._moved_back:
+            return trial
+        way = np.asarray(pin.difference(self._model, trial, q))
+        kept = np.asarray(pin.integrate(self._model, trial, np.where(back, way, 0.0)))
+        if not self._remover.look(kept):
+            return kept
+        self._remover.look(trial)
+        return trial
+
+    def _interpolate(self, free: Array, q: Array) -> Array:
+        """The last free posture on the way from a free one, by halving."""
+        self._fell_back = True
+        inside, outside = 0.0, 1.0
+        for _ in range(HALVINGS):
+            middle = 0.5 * (inside + outside)
+            if self._remover.look(np.asarray(pin.interpolate(self._model, free, q, middle))):
+                outside = middle
+            else:
+                inside = middle
+        result = np.asarray(pin.interpolate(self._model, free, q, inside))
+        self._remover.look(result)
+        return result
+
+    def _jumps(self, before: Array, q0: Array, q1: Array) -> bool:
+        """Whether the motion passes through something; `_hit` is then where it meets it first."""
+        remover = self._remover
+        hit = jump(remover.scene, before, self._proximity.placements, q0, q1, ~remover.overlapping)
+        if hit is not None:
+            self._hit = hit.q
+        return hit is not None
+
+    def _result(self, q: Array, deepest: float) -> OverlapResult:
+        tally = self._remover.tally
+        return OverlapResult(
+            q=q,
+            iterations=tally.iterations,
+            joints=len(tally.joints),
+            pairs=len(tally.pairs),
+            contact_seconds=tally.contact_seconds,
+            ik_seconds=tally.ik_seconds,
+            fell_back=self._fell_back,
+            deepest=deepest,
+        )
+
+
+def _posture(scene: Scene, q: Array, what: str) -> Array:
+    posture = np.asarray(q, dtype=float)
+    if posture.shape != (scene.model.nq,) or not np.isfinite(posture).all():
+        raise InputError(f"{what} is ({scene.model.nq},) finite numbers; got shape {posture.shape}")
+    return np.asarray(pin.normalize(scene.model, posture))
+
+
+_FRAMES: WeakKeyDictionary[Scene, Frames] = WeakKeyDictionary()

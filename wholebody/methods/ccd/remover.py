@@ -1,0 +1,169 @@
+"""The paper's loop: chain by chain, the penetrating link nearest to the root goes out, until none penetrates."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.figures.figure import Figure
+from wholebody.methods.ccd.limbs import movable
+from wholebody.methods.ccd.links import Overlap
+from wholebody.methods.ccd.pushing import ChainPusher
+from wholebody.scene import Scene
+
+Array = NDArray[np.float64]
+
+TOUCH = 1e-4  # m: an overlap that does not count; coal's own accuracy is a hundredth of it
+GOALS = 8  # most goals for one chain before the next has its turn
+PASSES = 4  # most times that every chain has its turn
+GAIN = 0.98  # a pass that leaves more than this share of the deepest overlap leads nowhere
+
+
+@dataclass
+class Tally:
+    """What a removal did, summed over its parts."""
+
+    iterations: int = 0
+    joints: set[int] = field(default_factory=set)
+    pairs: set[tuple[int, int]] = field(default_factory=set)
+    contact_seconds: float = 0.0
+    ik_seconds: float = 0.0
+
+
+class Remover:
+    """Takes overlap out of postures of one scene, re-used from posture to posture.
+
+    Attributes:
+        chains: name to chain, in the figure's order.
+        deepest: deepest overlap found by the last look, metres; what any pair is allowed counts as none.
+    """
+
+    def __init__(self, scene: Scene, clearances: Array | None = None, fixed: frozenset[int] = frozenset()) -> None:
+        """Prepare the chains of the figure.
+
+        Args:
+            scene: figure and things.
+            clearances: (pairs,) distance asked of every collision pair, metres; zero where None.
+            fixed: Pinocchio's indices of joints that must not move.
+        """
+        self.scene, self.clearances = scene, clearances
+        self._within = 0.0 if clearances is None else float(clearances.max(initial=0.0))
+        self._data = scene.model.createData()
+        self._joints = scene.proximity.joint.tolist()
+        self.tally = Tally()
+        self.deepest = 0.0
+        self.overlapping = np.zeros(len(scene.proximity.pairs), dtype=bool)
+        named = {
+            name: ([joint for joint in joints if joint not in fixed], tip)
+            for name, (joints, tip) in chains_of(scene.figure).items()
+        }
+        everything = frozenset(joint for joints, _ in named.values() for joint in joints)
+        self.chains: dict[str, ChainPusher] = {
+            name: ChainPusher(scene, name, joints, everything - set(joints), tip)
+            for name, (joints, tip) in named.items()
+            if joints
+        }
+
+    def look(self, q: Array) -> list[Overlap]:
+        """What overlaps at a posture q (nq,), the deepest first."""
+        began = time.perf_counter()
+        pin.forwardKinematics(self.scene.model, self._data, q)
+        near = self.scene.proximity.near(self._data, self._within)
+        depth = -near.distance if self.clearances is None else self.clearances[near.number] - near.distance
+        self.deepest = float(depth.max(initial=0.0))
+        self.overlapping[:] = False
+        found: list[Overlap] = []
+        if self.deepest > TOUCH:
+            rows = np.flatnonzero(depth > TOUCH)
+            rows = rows[np.argsort(-depth[rows], kind="stable")]
+            self.overlapping[near.number[rows]] = True
+            for pair, size, normal, a, b in zip(
+                near.pair[rows].tolist(),
+                depth[rows].tolist(),
+                near.normal[rows].tolist(),
+                near.point_a[rows].tolist(),
+                near.point_b[rows].tolist(),
+                strict=True,
+            ):
+                first, second = pair
+                joints = self._joints[first], self._joints[second]
+                found.append(Overlap(first, second, *joints, size, tuple(normal), tuple(a), tuple(b)))
+                self.tally.pairs.add((first, second))
+        self.tally.contact_seconds += time.perf_counter() - began
+        return found
+
+    def separate(self, q: Array, rng: np.random.Generator) -> tuple[Array, list[Overlap]]:
+        """Push links out until nothing overlaps or nothing gains.
+
+        Args:
+            q: (nq,) posture.
+            rng: of the order in which the chains have their turns.
+
+        Returns:
+            The posture, and what still overlaps in it.
+        """
+        q = q.copy()
+        overlaps = self.look(q)
+        names = list(self.chains)
+        for _ in range(PASSES):
+            if not overlaps:
+                break
+            before = self.deepest
+            for k in rng.permutation(len(names)).tolist():
+                overlaps = self._leave(self.chains[names[k]], q, overlaps)
+            if overlaps and self.deepest > GAIN * before:
+                break
+        return q, overlaps
+
+    def _leave(self, chain: ChainPusher, q: Array, overlaps: list[Overlap]) -> list[Overlap]:
+        """One chain leaves what it overlaps, with its goal set anew every time; q is changed in place."""
+        worst = np.inf
+        for _ in range(GOALS):
+            link = chain.find(overlaps)
+            if link is None or link.depth > 2.0 * worst:
+                break
+            worst = min(worst, link.depth)
+            began = time.perf_counter()
+            chain.read(q, self._data)
+            nodes = chain.push(link)
+            chain.limbs.write(q)
+            self.tally.ik_seconds += time.perf_counter() - began
+            self.tally.iterations += 1
+            self.tally.joints.update(chain.limbs.joints[node] for node in nodes)
+            overlaps = self.look(q)
+            if not nodes:
+                break
+        return overlaps
+
+    def into_cones(self, q: Array) -> Array:
+        """Copy of a posture q (nq,) with its limbs turned back into their reach cones."""
+        q = q.copy()
+        for chain in self.chains.values():
+            pin.forwardKinematics(self.scene.model, self._data, q)
+            chain.read(q, self._data)
+            chain.keep_cones()
+            chain.limbs.write(q)
+        return q
+
+
+def chains_of(figure: Figure) -> Mapping[str, tuple[Sequence[int], int]]:
+    """The figure's chains as joints that can turn or slide, and their tips; one for each leaf where it has none."""
+    model = figure.model
+    if figure.chains:
+        return {
+            name: ([k for k in map(figure.joint_id, chain.joints) if movable(model, k)], figure.frame_id(chain.tip))
+            for name, chain in figure.chains.items()
+        }
+    parents = {int(model.parents[joint]) for joint in range(1, model.njoints)}
+    found = {}
+    for leaf in range(1, model.njoints):
+        if leaf not in parents:
+            path = [int(joint) for joint in model.supports[leaf] if joint > 0 and movable(model, int(joint))]
+            tips = [k for k, frame in enumerate(model.frames) if frame.parentJoint == leaf]
+            found[str(model.names[leaf])] = path, tips[-1]
+    return found
