@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from wholebody.assessment import Assessment, assess
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+    from wholebody.methods.newton.assembly import Assembly
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
     from wholebody.problem import Problem, Solution
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "QP",
+    "Assembly",
     "Assessment",
     "Axis",
     "Balance",
@@ -112,6 +114,7 @@ _MODULES = {
     "wholebody.assessment": "Assessment assess",
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
+    "wholebody.methods.newton.assembly": "Assembly",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
     "wholebody.problem": "Problem Solution",

@@ -1,0 +1,184 @@
+"""Assemblies whose answers are known: linkages, rings, stars, redundant and impossible loops."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.methods.newton.assembly import Assembly
+
+Y = (0.0, 1.0, 0.0)
+
+
+def _four_bar(coupler: float = 0.9, rocker: float = 0.7) -> Assembly:
+    """Ground 1, crank 0.3; all in the plane y = 0, crank upright at the start. Not closed yet."""
+    made = Assembly()
+    made.body("crank", (0, 0, 0)).body("coupler", (0, 0, 0.3)).body("rocker", (1, 0, 0))
+    made.revolute("world", "crank", at=(0, 0, 0), axis=Y)
+    made.revolute("crank", "coupler", at=(0, 0, 0.3), axis=Y)
+    made.revolute("coupler", "rocker", at_first=(coupler, 0, 0), at_second=(0, 0, rocker), axis=Y, axis_second=Y)
+    made.revolute("world", "rocker", at=(1, 0, 0), axis=Y)
+    return made
+
+
+def _chain(count: int, limits: tuple[float, float] | None = None) -> Assembly:
+    made = Assembly()
+    for k in range(count):
+        made.body(f"link{k}", (0.2 * k, 0, 0), size=0.1)
+    for k in range(count):
+        base = f"link{k - 1}" if k else "world"
+        made.revolute(base, f"link{k}", at=(0.2 * k, 0, 0), axis=((0, 1, 0), (0, 0, 1))[k % 2], limits=limits)
+    return made
+
+
+@pytest.mark.parametrize("algebra", ["auto", "llt", "kkt", "dense", "svd"])
+def test_a_four_bar_closes_where_geometry_says(algebra: str) -> None:
+    # four revolute joints in a plane are three equations too many in space: redundant, and tolerated
+    made = _four_bar()
+    made.frame_goal("crank", (0, 0, 0))
+    answer = made.solve(algebra=algebra, tolerance=1e-10)
+    assert answer.status == "solved"
+    pin_joint = answer.placements["coupler"].act(np.array((0.9, 0.0, 0.0)))
+    # circles of 0.9 about (0, 0.3) and of 0.7 about (1, 0)
+    assert np.hypot(pin_joint[0], pin_joint[2] - 0.3) == pytest.approx(0.9, abs=1e-9)
+    assert np.hypot(pin_joint[0] - 1.0, pin_joint[2]) == pytest.approx(0.7, abs=1e-9)
+    base = np.hypot(1.0, 0.3)
+    along = (base**2 + 0.9**2 - 0.7**2) / (2.0 * base)
+    across = np.sqrt(0.9**2 - along**2)
+    direction = np.array((1.0, -0.3)) / base
+    wanted = np.array((0.0, 0.3)) + along * direction + across * np.array((-direction[1], direction[0]))
+    assert pin_joint[[0, 2]] == pytest.approx(wanted, abs=1e-8)
+    assert abs(pin_joint[1]) < 1e-9
+
+
+def test_convergence_is_quadratic() -> None:
+    residuals = np.array(_four_bar().solve(tolerance=1e-12).residuals)
+    near = residuals[(residuals < 0.1) & (residuals > 1e-9)]
+    assert len(near) >= 3
+    assert (near[1:] <= 3.0 * near[:-1] ** 2 + 1e-10).all()
+
+
+def test_a_loop_that_cannot_close_is_infeasible_with_the_least_residual() -> None:
+    answer = _four_bar(coupler=0.2, rocker=0.2).solve()  # 0.3 + 0.2 + 0.2 < 1
+    assert answer.status == "infeasible"
+    assert 0.01 < answer.joint_error < 0.3
+    assert "joint of" in answer.message
+    placed = np.array([place.homogeneous for place in answer.placements.values()])
+    assert np.isfinite(placed).all()
+
+
+def test_a_ring_is_a_regular_polygon_when_opened() -> None:
+    count, made = 6, Assembly()
+    rng = np.random.default_rng(0)
+    for k in range(count):
+        angle = 2.0 * np.pi * k / count
+        turn = pin.SE3(pin.utils.rotate("z", angle + np.pi / 2), np.array((np.cos(angle), np.sin(angle), 0.0)))
+        made.body(f"b{k}", turn * pin.SE3(pin.exp6(0.1 * rng.normal(size=6))), size=0.5)
+    for k in range(count):
+        made.spherical(f"b{k}", f"b{(k + 1) % count}", at_first=(1.0, 0, 0), at_second=(0, 0, 0))
+    answer = made.solve(tolerance=1e-10)
+    assert answer.status == "solved"
+    corners = [answer.placements[f"b{k}"].translation for k in range(count)]
+    sides = [np.linalg.norm(corners[k] - corners[k - 1]) for k in range(count)]
+    assert sides == pytest.approx([1.0] * count, abs=1e-9)
+
+
+def test_a_star_with_a_hundred_arms_is_solved_by_splitting_its_hub_off() -> None:
+    made = Assembly().body("hub", size=0.2)
+    for k in range(100):
+        angle = 2.0 * np.pi * k / 100
+        place = np.array((0.2 * np.cos(angle), 0.2 * np.sin(angle), 0.0))
+        made.body(f"arm{k}", place, size=0.2)
+        made.revolute("hub", f"arm{k}", at=place, axis=(0, 0, 1))
+    made.frame_goal("hub", (0.1, 0.2, 0.3, 0.0, 0.0, np.sin(0.2), np.cos(0.2)))
+    answer = made.solve(tolerance=1e-9)
+    assert (answer.status, answer.algebra) == ("solved", "normal/schur")
+    hub = answer.placements["hub"]
+    for k in (0, 33, 99):
+        angle = 2.0 * np.pi * k / 100
+        there = hub.act(np.array((0.2 * np.cos(angle), 0.2 * np.sin(angle), 0.0)))
+        assert answer.placements[f"arm{k}"].translation == pytest.approx(there, abs=1e-8)
+
+
+def test_conflicting_goals_end_in_their_least_squares() -> None:
+    made = Assembly().body("ball")
+    for place in ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 2.0)):
+        made.point_goal("ball", place)
+    answer = made.solve()
+    assert answer.status == "unreachable"
+    assert answer.placements["ball"].translation == pytest.approx([1 / 3, 1 / 3, 2 / 3], abs=1e-3)
+
+
+def test_a_goal_out_of_reach_is_approached_with_joints_held() -> None:
+    made = _chain(5)
+    made.point_goal("link4", (0.0, 0.5, 2.0), place=(0.2, 0, 0))
+    answer = made.solve()
+    assert answer.status == "unreachable"
+    assert answer.joint_error < 1e-5
+    tip = answer.placements["link4"].act(np.array((0.2, 0.0, 0.0)))
+    assert np.linalg.norm(tip) <= 1.0 + 1e-4
+
+
+@pytest.mark.parametrize("goal", [(1.0, 0.3, 0.5), (1.6, 0.4, 0.3)])
+def test_a_slack_and_a_barrier_find_the_same_nearest_point(goal: tuple[float, float, float]) -> None:
+    left = []
+    for kind in ("slack", "barrier"):
+        made = _chain(10, limits=(-0.4, 0.4))
+        made.point_goal("link9", goal, place=(0.2, 0, 0))
+        answer = made.solve(inequalities=kind)
+        assert answer.joint_error < 1e-5
+        left.append(answer.goal_error)
+        turns = [answer.placements[f"link{k}"] for k in range(10)]
+        for base, link in zip([pin.SE3.Identity(), *turns], turns, strict=False):
+            assert np.linalg.norm(pin.log3((base.actInv(link)).rotation)) < 0.4 + 1e-4
+    assert left[0] == pytest.approx(left[1], abs=3e-3)
+
+
+def test_a_joint_that_begins_at_its_limit_leaves_it() -> None:
+    # the squared slack of the limit is exactly zero at the start
+    made = Assembly().body("arm", size=0.5)
+    made.revolute("world", "arm", at=(0, 0, 0), axis=(0, 0, 1), limits=(0.0, 1.0))
+    made.point_goal("arm", (np.cos(0.6), np.sin(0.6), 0), place=(1, 0, 0))
+    answer = made.solve(tolerance=1e-9)
+    assert answer.status == "solved"
+    assert pin.log3(answer.placements["arm"].rotation)[2] == pytest.approx(0.6, abs=1e-8)
+
+
+def test_points_slide_on_planes_and_along_axes() -> None:
+    made = Assembly().body("table", (0, 0, 0.5)).body("cup", (0.1, 0, 0.7)).body("drawer", (0, 0, 0.3))
+    made.fixed("world", "table")
+    made.on_plane("cup", (0, 0, -0.1), normal=(0, 0, 1), through=(0, 0, 0), of="table")
+    made.prismatic("table", "drawer", axis=(1, 0, 0))
+    made.point_goal("cup", (0.4, 0.2, 0.9)).point_goal("drawer", (0.5, 0.3, 0.0))
+    answer = made.solve()
+    assert answer.status == "unreachable"
+    assert answer.placements["cup"].act(np.array((0, 0, -0.1)))[2] == pytest.approx(0.5, abs=1e-5)
+    assert answer.placements["drawer"].translation == pytest.approx([0.5, 0.0, 0.3], abs=2e-3)
+    assert answer.placements["drawer"].rotation == pytest.approx(np.eye(3), abs=1e-4)
+
+
+def test_bad_input_names_the_bodies() -> None:
+    made = Assembly().body("a").body("b", (1, 0, 0))
+    with pytest.raises(InputError, match="'a'"):
+        made.body("a")
+    with pytest.raises(InputError, match=r"'c' has size 0"):
+        made.body("c", size=0.0)
+    with pytest.raises(InputError, match=r"'c'.*length"):
+        made.body("c", (0, 0, 0, 0, 0, 0, 2.0))
+    with pytest.raises(InputError, match=r"'c'.*finite"):
+        made.body("c", (0, np.nan, 0))
+    with pytest.raises(UnknownNameError, match="no body is called 'd'"):
+        made.spherical("a", "d", at=(0, 0, 0))
+    made.spherical("a", "b", at=(0.5, 0, 0))
+    with pytest.raises(InputError, match="'b' and 'a' have one already"):
+        made.spherical("b", "a", at=(0.5, 0, 0))
+    with pytest.raises(InputError, match="itself"):
+        made.fixed("a", "a")
+    with pytest.raises(InputError, match="no room"):
+        made.revolute("a", "b", at=(0, 0, 0), axis=Y, limits=(1.0, 0.5))
+    with pytest.raises(InputError, match="no bodies"):
+        Assembly().solve()
+    with pytest.raises(InputError, match="tolerance"):
+        made.solve(tolerance=0.0)

@@ -1,0 +1,100 @@
+"""Every factorisation against the dense one, on systems of every shape."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wholebody.errors import UnknownNameError
+from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern
+from wholebody.methods.newton.linear_algebra.choice import dense_columns, linear_algebra
+from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
+from wholebody.methods.newton.linear_algebra.reference import Dense
+
+SPARSE = ("auto", "normal", "llt", "kkt", "schur", "svd")
+
+
+def _pattern(rng: np.random.Generator, height: int, width: int, hub: bool = False) -> Pattern:
+    full = rng.random((height, width)) < 4.0 / width
+    full[np.arange(height), np.arange(height)] = True
+    if hub:
+        full[:, -3:] = True
+        full[-2:, :-3] = False  # rows that only the hub has
+    rows, columns = np.nonzero(full)
+    order = rng.permutation(len(rows))
+    return Pattern(rows[order], columns[order], height, width)
+
+
+def _system(rng: np.random.Generator, pattern: Pattern) -> LinearSystem:
+    return LinearSystem(
+        rng.normal(size=len(pattern.rows)),
+        rng.uniform(0.5, 2.0, pattern.width),
+        np.where(rng.random(pattern.height) < 0.3, rng.uniform(0.1, 1e3, pattern.height), 1e-10),
+        rng.normal(size=pattern.width),
+        rng.normal(size=pattern.height),
+    )
+
+
+@pytest.mark.parametrize("name", SPARSE)
+@pytest.mark.parametrize("hub", [False, True])
+def test_each_solves_what_the_dense_one_solves(name: str, hub: bool) -> None:
+    rng = np.random.default_rng(1)
+    pattern = _pattern(rng, 130 if hub else 40, 180 if hub else 60, hub)
+    assert len(dense_columns(pattern)) == (3 if hub else 0)
+    solver, reference = linear_algebra(pattern, name), Dense(pattern)
+    for _ in range(3):  # refilled, not rebuilt
+        system = _system(rng, pattern)
+        step, multiplier = solver.solve(system)
+        wanted, its_multiplier = reference.solve(system)
+        assert step == pytest.approx(wanted, abs=1e-6)
+        assert multiplier == pytest.approx(its_multiplier, rel=1e-7, abs=1e-5)
+    assert 0 < solver.fill < 200 * pattern.height
+
+
+def test_a_hub_costs_less_when_its_columns_are_split_off() -> None:
+    rng = np.random.default_rng(2)
+    pattern = _pattern(rng, 400, 500, hub=True)
+    split, filled = linear_algebra(pattern, "schur"), linear_algebra(pattern, "normal")
+    system = _system(rng, pattern)
+    split.solve(system)
+    filled.solve(system)
+    assert filled.fill == 400 * 401 // 2
+    assert split.fill < 0.5 * filled.fill
+
+
+def test_second_derivatives_enter_the_kkt_matrix() -> None:
+    rng = np.random.default_rng(4)
+    pattern = _pattern(rng, 8, 12)
+    rows = np.array([3, 3, 5, 7, 7])
+    columns = np.array([1, 1, 5, 2, 7])
+    values = np.array([0.2, 0.1, 0.4, -0.2, 0.3])
+    system = _system(rng, pattern)
+    solver = QuasiDefinite(pattern, (rows, columns))
+    step, _ = solver.solve(system, values)
+    hessian = np.diag(system.weight)
+    for row, column, value in zip(rows, columns, values, strict=True):
+        hessian[row, column] += value
+        if row != column:
+            hessian[column, row] += value
+    jacobian = pattern.dense(system.values)
+    matrix = np.block([[hessian, -jacobian.T], [-jacobian, -np.diag(system.damping)]])
+    wanted = np.linalg.solve(matrix, np.concatenate([-system.gradient, system.residual]))
+    assert step == pytest.approx(wanted[:12], abs=1e-6)
+    assert solver.convex()
+    solver.solve(system, np.array([0.0, 0.0, -50.0, 0.0, -50.0]))
+    jacobian_null = np.linalg.svd(jacobian)[2][8:]
+    bent = jacobian_null @ (np.diag(system.weight) - np.diag(50.0 * np.isin(np.arange(12), (5, 7)))) @ jacobian_null.T
+    assert solver.convex() == bool(np.linalg.eigvalsh(bent).min() > 0.0)
+
+
+def test_conflicting_rows_are_met_in_the_least_squares_sense() -> None:
+    pattern = Pattern(np.array([0, 1]), np.array([0, 0]), 2, 1)
+    system = LinearSystem(np.ones(2), np.ones(1), np.full(2, 1e-9), np.zeros(1), np.array((1.0, -2.0)))
+    for name in SPARSE:
+        step, _ = linear_algebra(pattern, name).solve(system)
+        assert step == pytest.approx([0.5], abs=1e-6), name
+
+
+def test_an_unknown_name_is_named() -> None:
+    with pytest.raises(UnknownNameError, match="linear algebra"):
+        linear_algebra(Pattern(np.zeros(1, int), np.zeros(1, int), 1, 1), "cholesky")

@@ -1,0 +1,292 @@
+"""Assemblies: bodies and joints that no URDF can say, such as closed chains, rings, stars and loose parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.geometry.placement import PlacementLike, placement
+from wholebody.methods.newton.assembly_solution import AssemblySolution, answer
+from wholebody.methods.newton.equations import EquationSet
+from wholebody.methods.newton.inequalities import Kind
+from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
+from wholebody.methods.newton.linear_algebra.choice import linear_algebra
+from wholebody.methods.newton.quaternions import axes_with_z
+from wholebody.methods.newton.reaching import reach
+from wholebody.methods.newton.system import System
+from wholebody.tasks.inputs import direction, numbers, point
+
+Array = NDArray[np.float64]
+
+WORLD = "world"
+
+
+class Assembly:
+    """Rigid bodies, joints between them and with the world, and goals; solved in full coordinates.
+
+    Joints are given at the bodies' present placements: `at` and `axis` in the world. Where the two sides do not fit
+    yet, `at_first` and `at_second` say the place in either body's frame instead. Bodies need not be connected.
+    """
+
+    def __init__(self) -> None:
+        """Begin with the world alone."""
+        self._names: dict[str, int] = {}
+        self._places: list[Array] = []
+        self._sizes: list[float] = []
+        self._joined: dict[frozenset[str], str] = {}
+        self._equations = EquationSet()
+        self._prepared: tuple[str, System, LinearAlgebra] | None = None
+        self.structures = 0
+
+    # ---- bodies
+
+    def body(self, name: str, at: PlacementLike = (0.0, 0.0, 0.0), *, size: float = 0.3) -> Assembly:
+        """Add a body.
+
+        Args:
+            name: one that no other body has.
+            at: (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3.
+            size: metres from its origin to its rim; turning it counts as moving the rim.
+
+        Raises:
+            InputError: the name is taken, the size is not positive, or the placement cannot be read.
+        """
+        if not isinstance(name, str) or not name or name == WORLD or name in self._names:
+            raise InputError(f"body {name!r}: the name is taken or not a name; give another one")
+        length = float(numbers(size, (), f"body {name!r}: size"))
+        if length <= 0.0:
+            raise InputError(f"body {name!r} has size {length:g}; give metres greater than zero")
+        placed = pin.SE3ToXYZQUAT(placement(at, f"body {name!r}"))
+        self._names[name] = len(self._places)
+        self._places.append(np.array(placed))
+        self._sizes.append(length)
+        self._prepared = None
+        return self
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self._names)
+
+    def placement(self, name: str) -> Any:
+        """Where a body is (pin.SE3)."""
+        return pin.XYZQUATToSE3(self._place(self._index(name, "placement")))
+
+    # ---- joints
+
+    def spherical(self, first: str, second: str, **where: Any) -> Assembly:
+        """A point of one body stays at a point of the other. Takes `at`, or `at_first` and `at_second`."""
+        a, b = self._pair(first, second, "spherical joint")
+        ends = self._ends(a, b, "spherical joint", first, second, **where)
+        self._equations.coincide(a, b, f"the spherical joint of {first!r} and {second!r}", *ends)
+        return self._changed()
+
+    def revolute(
+        self,
+        first: str,
+        second: str,
+        *,
+        axis: ArrayLike,
+        limits: Sequence[float] | None = None,
+        axis_second: ArrayLike | None = None,
+        **where: Any,
+    ) -> Assembly:
+        """Two bodies turn about one axis.
+
+        Args:
+            first: name of a body, or "world".
+            second: another.
+            axis: (3,) direction in the world; in the first body's frame if `axis_second` is given.
+            limits: least and greatest angle from the present one, radians.
+            axis_second: (3,) the direction in the second body's frame.
+            where: `at`, or `at_first` and `at_second`.
+        """
+        what = f"the revolute joint of {first!r} and {second!r}"
+        a, b = self._pair(first, second, "revolute joint")
+        ends = self._ends(a, b, "revolute joint", first, second, **where)
+        along = direction(axis, f"{what}: axis")
+        turn_a, turn_b = pin.Quaternion(self._place(a)[3:]), pin.Quaternion(self._place(b)[3:])
+        if axis_second is None:
+            ours, theirs = turn_a.inverse() * along, turn_b.inverse() * along
+        else:
+            ours, theirs = along, direction(axis_second, f"{what}: axis_second")
+        basis_a = _with_z(ours)
+        # the second body's axes agree with the first's at the present placements, so that the angle is zero now
+        basis_b = (turn_b.inverse() * turn_a * basis_a) if axis_second is None else _with_z(theirs)
+        self._equations.coincide(a, b, what, *ends)
+        self._equations.turn(a, b, what, basis_a, basis_b, 2)
+        if limits is not None:
+            low, high = numbers(limits, (2,), f"{what}: limits").tolist()
+            if low >= high:
+                raise InputError(f"{what}: limits {low:g} and {high:g} leave no room; give the lower one first")
+            self._equations.limit(a, b, f"the limit of {what[4:]}", basis_a, basis_b, low, high)
+        return self._changed()
+
+    def prismatic(self, first: str, second: str, *, axis: ArrayLike) -> Assembly:
+        """Two bodies slide along one direction (3,) in the world, without turning."""
+        what = f"the prismatic joint of {first!r} and {second!r}"
+        a, b = self._pair(first, second, "prismatic joint")
+        along = direction(axis, f"{what}: axis")
+        turn_a, turn_b = pin.Quaternion(self._place(a)[3:]), pin.Quaternion(self._place(b)[3:])
+        basis = _with_z(turn_a.inverse() * along)
+        self._equations.turn(a, b, what, basis, turn_b.inverse() * turn_a * basis, 3)
+        way = turn_a.inverse() * (self._place(b)[:3] - self._place(a)[:3])
+        for side in basis.toRotationMatrix().T[:2]:
+            self._equations.slide(a, b, what, side, np.zeros(3), float(side @ way))
+        return self._changed()
+
+    def fixed(self, first: str, second: str, *, placement_second: PlacementLike | None = None) -> Assembly:
+        """Two bodies keep their placement to each other: the present one, or the second's in the first's frame."""
+        what = f"the fixed joint of {first!r} and {second!r}"
+        a, b = self._pair(first, second, "fixed joint")
+        here = pin.XYZQUATToSE3(self._place(a)).actInv(pin.XYZQUATToSE3(self._place(b)))
+        wanted = here if placement_second is None else placement(placement_second, what)
+        self._equations.coincide(a, b, what, np.array(wanted.translation), np.zeros(3))
+        self._equations.turn(a, b, what, pin.Quaternion(wanted.rotation), pin.Quaternion.Identity(), 3)
+        return self._changed()
+
+    def on_plane(
+        self, body: str, place: ArrayLike, *, normal: ArrayLike, through: ArrayLike, of: str = WORLD, side: str = "on"
+    ) -> Assembly:
+        """A point of a body, (3,) in its frame, stays in a plane that the world or another body carries.
+
+        Args:
+            body: name.
+            place: (3,) the point, metres.
+            normal: (3,) of the plane, in the frame of `of`.
+            through: (3,) a point of the plane, in the frame of `of`.
+            of: which body carries the plane.
+            side: "on", or "above" where the point may leave along the normal.
+        """
+        what = f"the plane of {body!r} and {of!r}"
+        if side not in ("on", "above"):
+            raise InputError(f"{what}: side is {side!r}; give 'on' or 'above'")
+        a, b = self._index(of, what), self._index(body, what)
+        if a == b:
+            raise InputError(f"{what}: a body cannot stay on a plane of its own; name another one")
+        unit = direction(normal, f"{what}: normal")
+        height = float(unit @ point(through, f"{what}: through"))
+        self._equations.slide(a, b, what, unit, point(place, f"{what}: place"), height, above=side == "above")
+        return self._changed()
+
+    # ---- goals
+
+    def point_goal(self, body: str, target: ArrayLike, *, place: ArrayLike = (0.0, 0.0, 0.0)) -> Assembly:
+        """Bring a point of a body, (3,) in its frame, to a place in the world (3,), if it can be."""
+        what = f"the goal of {body!r}"
+        ends = point(place, f"{what}: place"), point(target, f"{what}: target")
+        self._equations.coincide(self._index(body, what), -1, what, *ends, goal=True)
+        return self._changed()
+
+    def frame_goal(self, body: str, target: PlacementLike) -> Assembly:
+        """Bring a body to a placement in the world, if it can be."""
+        what = f"the goal of {body!r}"
+        wanted, index = placement(target, what), self._index(body, what)
+        self._equations.coincide(index, -1, what, np.zeros(3), np.array(wanted.translation), goal=True)
+        identity = pin.Quaternion.Identity()
+        self._equations.turn(index, -1, what, identity, pin.Quaternion(wanted.rotation), 3, goal=True)
+        return self._changed()
+
+    def drop_goals(self) -> Assembly:
+        """Take all goals out."""
+        self._equations = self._equations.without_goals()
+        return self._changed()
+
+    # ---- solving
+
+    def system(self) -> System:
+        """The equations as they stand."""
+        if not self._places:
+            raise InputError("the assembly has no bodies; add some with body(...)")
+        rims = np.repeat((2.0 * np.array(self._sizes)) ** 2, 4).reshape(-1, 4)
+        weight = np.concatenate([np.ones((len(rims), 3)), rims], axis=1).ravel()
+        return self._equations.system(len(self._places), list(self._names), weight)
+
+    def variables(self) -> Array:
+        """(7 n,) where the bodies are."""
+        return np.concatenate(self._places)
+
+    def solve(
+        self, *, tolerance: float = 1e-5, iterations: int = 100, algebra: str = "auto", inequalities: Kind = "slack"
+    ) -> AssemblySolution:
+        """Move the bodies, each as little as can be, until joints and goals hold; they stay there.
+
+        Args:
+            tolerance: metres and radians, from 1e-12.
+            iterations: most Newton iterations.
+            algebra: "auto", "normal", "llt", "kkt", "schur", "dense" or "svd".
+            inequalities: "slack" or "barrier".
+
+        Raises:
+            InputError: there are no bodies, or a setting is out of range.
+            UnknownNameError: no such linear algebra.
+        """
+        if not 1e-12 <= tolerance <= 0.1 or iterations < 1:
+            raise InputError(f"tolerance {tolerance:g} and iterations {iterations}; give 1e-12 to 0.1 m and at least 1")
+        if inequalities not in ("slack", "barrier"):
+            raise InputError(f"inequalities is {inequalities!r}; give 'slack' or 'barrier'")
+        if self._prepared is None or self._prepared[0] != algebra:
+            system = self.system()
+            self._prepared = (algebra, system, linear_algebra(system.pattern, algebra))
+            self.structures += 1
+        _, system, factor = self._prepared
+        found = reach(system, self.variables(), factor, tolerance=tolerance, iterations=iterations, kind=inequalities)
+        self._places = list(found.x.reshape(-1, 7))
+        return answer(list(self._names), system, found, tolerance, factor.name)
+
+    # ---- looking names up
+
+    def _changed(self) -> Assembly:
+        self._prepared = None
+        return self
+
+    def _index(self, name: str, where: str) -> int:
+        if name == WORLD:
+            return -1
+        if name not in self._names:
+            raise UnknownNameError("body", name, [*self._names, WORLD], where)
+        return self._names[name]
+
+    def _place(self, index: int) -> Array:
+        return self._places[index] if index >= 0 else np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+
+    def _pair(self, first: str, second: str, kind: str) -> tuple[int, int]:
+        a, b = self._index(first, kind), self._index(second, kind)
+        if a == b:
+            raise InputError(f"{kind}: {first!r} cannot be joined to itself; name two bodies")
+        pair = frozenset((first, second))
+        if kind in self._joined.get(pair, "").split(", "):
+            raise InputError(f"{kind}: {first!r} and {second!r} have one already; leave the second out")
+        self._joined[pair] = ", ".join(filter(None, [self._joined.get(pair, ""), kind]))
+        return a, b
+
+    def _ends(
+        self,
+        a: int,
+        b: int,
+        kind: str,
+        first: str,
+        second: str,
+        at: Any = None,
+        at_first: Any = None,
+        at_second: Any = None,
+    ) -> tuple[Array, Array]:
+        """The joint's place in either body."""
+        where = f"{kind} of {first!r} and {second!r}"
+        if (at is None) == (at_first is None) or (at_first is None) != (at_second is None):
+            raise InputError(f"{where}: give its place as at=(x, y, z) in the world, or as at_first and at_second")
+        if at is None:
+            return point(at_first, f"{where}: at_first"), point(at_second, f"{where}: at_second")
+        place = point(at, f"{where}: at")
+        sides = [pin.XYZQUATToSE3(self._place(index)).actInv(place) for index in (a, b)]
+        return np.array(sides[0]), np.array(sides[1])
+
+
+def _with_z(direction: Array) -> Any:
+    """Axes (pin.Quaternion) whose z is a unit direction (3,)."""
+    return pin.Quaternion(axes_with_z(direction[None])[0])

@@ -1,0 +1,274 @@
+"""Equations of bodies, many of one type at once: residuals, Jacobians and second derivatives as arrays.
+
+A body has seven variables: its place r [m] and its Euler parameters e. Bodies are rows of an array (N + 1, 7) whose
+last row is the world, which does not move. Each batch has k equations groups of `size` rows between one or two bodies.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.methods.newton import quaternions as quat
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+PLACE, TURN = slice(0, 3), slice(3, 7)
+OTHER_PLACE, OTHER_TURN = slice(7, 10), slice(10, 14)
+
+
+class Batch(ABC):
+    """Equations of one type.
+
+    Attributes:
+        bodies: (k, b) which bodies each is about; b is 1 or 2.
+        size: rows of each.
+        pattern: (size, 7 b) where the Jacobian can be other than zero.
+        labels: (k,) what each is called in messages.
+    """
+
+    size: int
+    pattern: Mask
+
+    def __init__(self, bodies: Indices, labels: list[str]) -> None:
+        self.bodies = np.asarray(bodies, dtype=np.intp)
+        self.labels = labels
+
+    def __len__(self) -> int:
+        """Number of equation groups."""
+        return len(self.bodies)
+
+    @abstractmethod
+    def residual(self, x: Array) -> Array:
+        """(k, size) of the bodies x (N + 1, 7); metres and radians."""
+
+    @abstractmethod
+    def jacobian(self, x: Array) -> Array:
+        """(k, size, 7 b) its derivative."""
+
+    @abstractmethod
+    def curvature(self, x: Array, force: Array) -> Array:
+        """(k, 7 b, 7 b) second derivative of the sum over rows of force (k, size) times residual."""
+
+
+class Unit(Batch):
+    """Euler parameters of unit length: (e.e - 1) / 2 = 0."""
+
+    size = 1
+    pattern = np.array([[False] * 3 + [True] * 4])
+
+    def residual(self, x: Array) -> Array:  # noqa: D102
+        e = x[self.bodies[:, 0], 3:]
+        result: Array = 0.5 * ((e * e).sum(axis=1, keepdims=True) - 1.0)
+        return result
+
+    def jacobian(self, x: Array) -> Array:  # noqa: D102
+        result = np.zeros((len(self), 1, 7))
+        result[:, 0, TURN] = x[self.bodies[:, 0], 3:]
+        return result
+
+    def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
+        result = np.zeros((len(self), 7, 7))
+        result[:, TURN, TURN] = force[:, :, None] * np.eye(4)
+        return result
+
+
+class Coincide(Batch):
+    """A point of one body is a point of another, along given directions: n . (r1 + R1 c1 - r2 - R2 c2) - h = 0.
+
+    With the three axes of the world this is the spherical joint and the point goal; with one normal it is the gap of a
+    contact, h being the clearance.
+    """
+
+    def __init__(
+        self, bodies: Indices, labels: list[str], first: Array, second: Array, directions: Array, height: Array
+    ) -> None:
+        """Take points (k, 3) in each body, directions (k, size, 3) in the world and heights (k, size)."""
+        super().__init__(bodies, labels)
+        self.size = directions.shape[1]
+        self.first, self.second, self.directions, self.height = first, second, directions, height
+        self._axes = self.size == 3 and bool((directions == np.eye(3)).all())
+        self.pattern = np.ones((self.size, 14), dtype=bool)
+        if self._axes:
+            self.pattern[:, PLACE] = self.pattern[:, OTHER_PLACE] = np.eye(3, dtype=bool)
+
+    def residual(self, x: Array) -> Array:  # noqa: D102
+        a, b = x[self.bodies[:, 0]], x[self.bodies[:, 1]]
+        way = a[:, :3] + quat.rotate(a[:, 3:], self.first) - b[:, :3] - quat.rotate(b[:, 3:], self.second)
+        result: Array = (way if self._axes else np.einsum("kij,kj->ki", self.directions, way)) - self.height
+        return result
+
+    def jacobian(self, x: Array) -> Array:  # noqa: D102
+        result = np.empty((len(self), self.size, 14))
+        result[:, :, PLACE] = self.directions
+        result[:, :, OTHER_PLACE] = -self.directions
+        turn = quat.rotate_derivative(x[self.bodies[:, 0], 3:], self.first)
+        other = quat.rotate_derivative(x[self.bodies[:, 1], 3:], self.second)
+        if not self._axes:
+            turn, other = self.directions @ turn, self.directions @ other
+        result[:, :, TURN] = turn
+        np.negative(other, out=result[:, :, OTHER_TURN])
+        return result
+
+    def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
+        push = np.einsum("ki,kij->kj", force, self.directions)
+        result = np.zeros((len(self), 14, 14))
+        result[:, TURN, TURN] = 2.0 * quat.rotate_form(self.first, push)
+        result[:, OTHER_TURN, OTHER_TURN] = -2.0 * quat.rotate_form(self.second, push)
+        return result
+
+
+class Turn(Batch):
+    """Axes carried by two bodies agree: rows of 2 conj(e1 f1) (e2 f2), which is bilinear.
+
+    The x and y components vanish where the z axes point the same way (revolute joint; the opposite way is no solution),
+    all three where the axes agree (fixed and prismatic joint). To first order a row is an angle [rad].
+    """
+
+    def __init__(self, bodies: Indices, labels: list[str], forms: Array) -> None:
+        """Take the bilinear forms (k, size, 4, 4)."""
+        super().__init__(bodies, labels)
+        self.size = forms.shape[1]
+        self.forms = forms
+        self.pattern = np.zeros((self.size, 14), dtype=bool)
+        self.pattern[:, TURN] = self.pattern[:, OTHER_TURN] = True
+
+    def residual(self, x: Array) -> Array:  # noqa: D102
+        right = self.forms @ x[self.bodies[:, 1], None, 3:, None]
+        result: Array = (right[..., 0] @ x[self.bodies[:, 0], 3:, None])[..., 0]
+        return result
+
+    def jacobian(self, x: Array) -> Array:  # noqa: D102
+        result = np.zeros((len(self), self.size, 14))
+        result[:, :, TURN] = (self.forms @ x[self.bodies[:, 1], None, 3:, None])[..., 0]
+        result[:, :, OTHER_TURN] = (x[self.bodies[:, 0], None, None, 3:] @ self.forms)[:, :, 0]
+        return result
+
+    def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
+        result = np.zeros((len(self), 14, 14))
+        mixed = np.einsum("ki,kiab->kab", force, self.forms)
+        result[:, TURN, OTHER_TURN] = mixed
+        result[:, OTHER_TURN, TURN] = mixed.transpose(0, 2, 1)
+        return result
+
+
+class Slide(Batch):
+    """A point of one body in a plane that another carries: (R1 u) . (r2 + R2 c2 - r1) - h = 0.
+
+    One row is a point on a surface; two, with orientation rows, a prismatic joint.
+    """
+
+    def __init__(self, bodies: Indices, labels: list[str], normals: Array, points: Array, height: Array) -> None:
+        """Take normals (k, size, 3) in the first body, points (k, 3) in the second and heights (k, size) [m]."""
+        super().__init__(bodies, labels)
+        self.size = normals.shape[1]
+        self.normals, self.points, self.height = normals, points, height
+        self.pattern = np.ones((self.size, 14), dtype=bool)
+
+    def _parts(self, x: Array) -> tuple[Array, Array, Array]:
+        a, b = x[self.bodies[:, 0]], x[self.bodies[:, 1]]
+        k, m = self.normals.shape[:2]
+        turn = np.repeat(a[:, 3:], m, axis=0)
+        normals = quat.rotate(turn, self.normals.reshape(-1, 3)).reshape(k, m, 3)
+        way = b[:, :3] + quat.rotate(b[:, 3:], self.points) - a[:, :3]
+        return turn, normals, way
+
+    def residual(self, x: Array) -> Array:  # noqa: D102
+        _, normals, way = self._parts(x)
+        result: Array = (normals @ way[:, :, None])[..., 0] - self.height
+        return result
+
+    def jacobian(self, x: Array) -> Array:  # noqa: D102
+        turn, normals, way = self._parts(x)
+        k, m = self.normals.shape[:2]
+        result = np.empty((k, m, 14))
+        result[:, :, PLACE] = -normals
+        result[:, :, OTHER_PLACE] = normals
+        change = quat.rotate_derivative(turn, self.normals.reshape(-1, 3)).reshape(k, m, 3, 4)
+        result[:, :, TURN] = (way[:, None, None, :] @ change)[:, :, 0]
+        result[:, :, OTHER_TURN] = normals @ quat.rotate_derivative(x[self.bodies[:, 1], 3:], self.points)
+        return result
+
+    def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
+        _, normals, way = self._parts(x)
+        first = np.einsum("ki,kij->kj", force, self.normals)
+        push = np.einsum("ki,kij->kj", force, normals)
+        change = quat.rotate_derivative(x[self.bodies[:, 0], 3:], first)  # (k, 3, 4)
+        other = quat.rotate_derivative(x[self.bodies[:, 1], 3:], self.points)
+        result = np.zeros((len(self), 14, 14))
+        result[:, TURN, TURN] = 2.0 * quat.rotate_form(first, way)
+        result[:, OTHER_TURN, OTHER_TURN] = 2.0 * quat.rotate_form(self.points, push)
+        result[:, OTHER_PLACE, TURN] = change
+        result[:, PLACE, TURN] = -change
+        result[:, OTHER_TURN, TURN] = other.transpose(0, 2, 1) @ change
+        upper = result[:, TURN, :].copy()
+        for block in (PLACE, OTHER_PLACE, OTHER_TURN):
+            upper[:, :, block] = result[:, block, TURN].transpose(0, 2, 1)
+        result[:, TURN, :] = upper
+        return result
+
+
+class Angle(Batch):
+    """Angle of a revolute joint about z of its axes: sign (2 atan2(z, w) of conj(e1 f1) (e2 f2) - bound).
+
+    As an equality it sets the joint; as an inequality it is a limit. The angle is taken on the turn nearest `center`.
+    """
+
+    size = 1
+    pattern = np.array([([False] * 3 + [True] * 4) * 2])
+
+    def __init__(
+        self, bodies: Indices, labels: list[str], forms: Array, center: Array, bound: Array, sign: Array
+    ) -> None:
+        """Take forms (k, 2, 4, 4) of z and w, and centers, bounds [rad] and signs (k,)."""
+        super().__init__(bodies, labels)
+        self.forms, self.center, self.bound, self.sign = forms, center, bound, sign
+
+    def _components(self, x: Array) -> tuple[Array, Array, Array]:
+        """Components (k, 2) z and w, and their derivatives by either quaternion, (k, 2, 4)."""
+        right = (self.forms @ x[self.bodies[:, 1], None, 3:, None])[..., 0]
+        left = (x[self.bodies[:, 0], None, None, 3:] @ self.forms)[:, :, 0]
+        return (right @ x[self.bodies[:, 0], 3:, None])[..., 0], right, left
+
+    def angle(self, x: Array) -> Array:
+        """(k,) the angles [rad]."""
+        part = self._components(x)[0]
+        angle = 2.0 * np.arctan2(part[:, 0], part[:, 1])
+        result: Array = angle - 2.0 * np.pi * np.round((angle - self.center) / (2.0 * np.pi))
+        return result
+
+    def residual(self, x: Array) -> Array:  # noqa: D102
+        result: Array = (self.sign * (self.angle(x) - self.bound))[:, None]
+        return result
+
+    def _gradients(self, x: Array) -> tuple[Array, Array, Array]:
+        part, right, left = self._components(x)
+        gradient = np.zeros((len(self), 2, 14))
+        gradient[:, :, TURN], gradient[:, :, OTHER_TURN] = right, left
+        square = np.maximum((part * part).sum(axis=1), 1e-12)
+        return part, gradient, square
+
+    def jacobian(self, x: Array) -> Array:  # noqa: D102
+        part, gradient, square = self._gradients(x)
+        row = part[:, 1:] * gradient[:, 0] - part[:, :1] * gradient[:, 1]
+        result: Array = (2.0 * self.sign / square)[:, None, None] * row[:, None, :]
+        return result
+
+    def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
+        part, gradient, square = self._gradients(x)
+        sine, cosine = part[:, 0, None, None], part[:, 1, None, None]
+        mixed = cosine * self.forms[:, 0] - sine * self.forms[:, 1]
+        second = np.zeros((len(self), 14, 14))
+        second[:, TURN, OTHER_TURN] = mixed
+        second[:, OTHER_TURN, TURN] = mixed.transpose(0, 2, 1)
+        s, c = gradient[:, 0], gradient[:, 1]
+        row = part[:, 1:] * s - part[:, :1] * c
+        second += s[:, :, None] * c[:, None, :] - c[:, :, None] * s[:, None, :]
+        radial = part[:, :1] * s + part[:, 1:] * c
+        second -= (2.0 / square)[:, None, None] * row[:, :, None] * radial[:, None, :]
+        result: Array = (2.0 * self.sign * force[:, 0] / square)[:, None, None] * second
+        return result

@@ -1,0 +1,95 @@
+"""Equations as they are collected one by one, before they are batched by type."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.methods.newton.batches import Angle, Batch, Coincide, Slide, Turn, Unit
+from wholebody.methods.newton.quaternions import relative_forms
+from wholebody.methods.newton.system import System
+
+Array = NDArray[np.float64]
+
+
+class Row(NamedTuple):
+    """One group of equations: its bodies (-1 is the world), its label and its numbers."""
+
+    first: int
+    second: int
+    label: str
+    numbers: tuple[Any, ...]
+
+
+class EquationSet:
+    """Groups of equations by type and by whether they may be missed or are one-sided."""
+
+    def __init__(self) -> None:
+        self.rows: dict[tuple[str, bool, bool], list[Row]] = {}
+
+    def coincide(self, a: int, b: int, label: str, first: Array, second: Array, *, goal: bool = False) -> None:
+        """A point (3,) of one body at a point of the other."""
+        self._add("coincide", a, b, label, first, second, goal=goal)
+
+    def turn(self, a: int, b: int, label: str, first: Any, second: Any, size: int, *, goal: bool = False) -> None:
+        """Axes (pin.Quaternion) of two bodies agree: in z (size 2) or wholly (size 3)."""
+        self._add(f"turn{size}", a, b, label, first.coeffs(), second.coeffs(), goal=goal)
+
+    def slide(
+        self, a: int, b: int, label: str, normal: Array, place: Array, height: float, *, above: bool = False
+    ) -> None:
+        """A point (3,) of the second body in a plane of the first, or above it."""
+        self._add("slide", a, b, label, normal, place, height, one_sided=above)
+
+    def limit(self, a: int, b: int, label: str, first: Any, second: Any, low: float, high: float) -> None:
+        """The angle about z of two axes (pin.Quaternion) stays between bounds; infinite ones are none."""
+        center = 0.5 * (low + high) if np.isfinite(low + high) else 0.0
+        for bound, sign in ((low, 1.0), (high, -1.0)):
+            if np.isfinite(bound):
+                parts = (first.coeffs(), second.coeffs(), center, bound, sign)
+                self._add("angle", a, b, label, *parts, one_sided=True)
+
+    def angle(self, a: int, b: int, label: str, first: Any, second: Any, value: float, *, goal: bool = False) -> None:
+        """The angle about z of two axes (pin.Quaternion) has a value."""
+        self._add("angle", a, b, label, first.coeffs(), second.coeffs(), value, value, 1.0, goal=goal)
+
+    def without_goals(self) -> EquationSet:
+        """A copy that has none."""
+        result = EquationSet()
+        result.rows = {key: list(rows) for key, rows in self.rows.items() if not key[1]}
+        return result
+
+    def system(self, count: int, names: list[str], weight: Array) -> System:
+        """All of it for `count` bodies."""
+        units = [f"the Euler parameters of {name!r}" for name in names]
+        batches: list[Batch] = [Unit(np.arange(count)[:, None], units)]
+        goals, one_sided = [False], [False]
+        for (kind, goal, sided), rows in self.rows.items():
+            batches.append(_batch(kind, rows, count))
+            goals.append(goal)
+            one_sided.append(sided)
+        return System(count, batches, goals, one_sided, weight)
+
+    def _add(
+        self, kind: str, a: int, b: int, label: str, *numbers: Any, goal: bool = False, one_sided: bool = False
+    ) -> None:
+        self.rows.setdefault((kind, goal, one_sided), []).append(Row(a, b, label, numbers))
+
+
+def _batch(kind: str, rows: list[Row], count: int) -> Batch:
+    bodies = np.array([(row.first, row.second) for row in rows], dtype=np.intp)
+    bodies[bodies < 0] = count
+    labels = [row.label for row in rows]
+    columns = [np.array(column, dtype=float) for column in zip(*(row.numbers for row in rows), strict=True)]
+    k = len(rows)
+    if kind == "coincide":
+        axes = np.broadcast_to(np.eye(3), (k, 3, 3))
+        return Coincide(bodies, labels, columns[0], columns[1], axes, np.zeros((k, 3)))
+    if kind == "slide":
+        return Slide(bodies, labels, columns[0][:, None], columns[1], columns[2][:, None])
+    forms = relative_forms(columns[0], columns[1])
+    if kind == "angle":
+        return Angle(bodies, labels, forms[:, 2:], columns[2], columns[3], columns[4])
+    return Turn(bodies, labels, 2.0 * forms[:, : int(kind[-1])])

@@ -1,0 +1,42 @@
+"""Which factorisation when: by name, or by the pattern."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.errors import UnknownNameError
+from wholebody.methods.newton.linear_algebra.base import Indices, LinearAlgebra, Pattern
+from wholebody.methods.newton.linear_algebra.dense_columns import DenseColumns
+from wholebody.methods.newton.linear_algebra.normal import NormalEquations
+from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
+from wholebody.methods.newton.linear_algebra.reference import Dense, SingularValues
+
+NAMES = ("auto", "normal", "llt", "kkt", "schur", "dense", "svd")
+DENSE_ROWS = (
+    100  # rows in which a column must stand to be split off, about a hub with twenty joints; fewer = more splits
+)
+
+
+def dense_columns(pattern: Pattern) -> Indices:
+    """Columns that would fill the normal equations."""
+    return np.flatnonzero(np.bincount(pattern.columns, minlength=pattern.width) > DENSE_ROWS)
+
+
+def linear_algebra(pattern: Pattern, name: str = "auto") -> LinearAlgebra:
+    """The factorisation of this name for a pattern.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    if name not in NAMES:
+        raise UnknownNameError("linear algebra", name, NAMES)
+    dense = dense_columns(pattern)
+    if name == "schur" or (name == "auto" and len(dense)):
+        return DenseColumns(pattern, dense)
+    if name == "kkt":
+        return QuasiDefinite(pattern)
+    if name == "dense":
+        return Dense(pattern)
+    if name == "svd":
+        return SingularValues(pattern)
+    return NormalEquations(pattern, square_root=name == "llt")

@@ -1,0 +1,62 @@
+"""The pattern and the values of J D^-1 J' + M: laid out once a structure, refilled at every iteration."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.methods.newton.linear_algebra.base import Indices, Pattern
+
+Array = NDArray[np.float64]
+
+
+class Gram:
+    """Lower triangle of J D^-1 J' + M in compressed columns.
+
+    Attributes:
+        matrix: scipy's csc_matrix, whose data `refill` overwrites.
+    """
+
+    def __init__(self, pattern: Pattern) -> None:
+        """Pair the entries of J that share a column, and find out where their products go."""
+        from scipy.sparse import csc_matrix
+
+        self.pattern = pattern
+        first, second = _pairs(pattern)
+        rows = np.concatenate([pattern.rows[first], np.arange(pattern.height)])
+        columns = np.concatenate([pattern.rows[second], np.arange(pattern.height)])
+        key = columns * pattern.height + rows
+        places, index = np.unique(key, return_inverse=True)
+        column = places // max(pattern.height, 1)
+        pointer = np.searchsorted(column, np.arange(pattern.height + 1)).astype(np.int32)
+        shape = (pattern.height, pattern.height)
+        inner = (places % max(pattern.height, 1)).astype(np.int32)
+        self.matrix = csc_matrix((np.zeros(len(places)), inner, pointer), shape=shape)
+        order = np.argsort(index[: len(first)], kind="stable")
+        self._first, self._second = first[order], second[order]
+        self._target = index[: len(first)][order]
+        self._diagonal = index[len(first) :]
+        filled = np.unique(self._target)
+        self._filled = filled
+        self._starts = np.searchsorted(self._target, filled)
+
+    def refill(self, values: Array, weight: Array, damping: Array) -> None:
+        """Compute the matrix for values (nnz,) of J, diagonals D and M."""
+        scaled = values / weight[self.pattern.columns]
+        data = self.matrix.data
+        data[:] = 0.0
+        if len(self._first):
+            data[self._filled] = np.add.reduceat(scaled[self._first] * values[self._second], self._starts)
+        data[self._diagonal] += damping
+
+
+def _pairs(pattern: Pattern) -> tuple[Indices, Indices]:
+    """Pairs of entries (row >= row of the other) in one column."""
+    order = np.lexsort((pattern.rows, pattern.columns))
+    columns = pattern.columns[order]
+    counts = np.bincount(columns, minlength=pattern.width)
+    place = np.arange(len(columns)) - np.repeat(np.cumsum(counts) - counts, counts)
+    after = counts[columns] - place  # partners of an entry: itself and all that follow in its column
+    first = np.repeat(np.arange(len(columns)), after)
+    offset = np.arange(len(first)) - np.repeat(np.cumsum(after) - after, after)
+    return order[first + offset], order[first]

@@ -1,0 +1,218 @@
+"""Newton steps towards equations: at each the least motion that meets them to first order (eqs. 5 to 7).
+
+The previous state of the objective 1/2 |x - x0|^2 is the last iterate, so the multipliers vanish at the solution, the
+KKT matrix [D, -J'; -J, 0] is exact there, and convergence is quadratic. Goals that are far are asked for in pieces
+(B8); a step that does not near them is damped (B7), which leads to least squares where goals conflict.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.methods.newton.inequalities import FREE, Inequalities, Kind, inequalities
+from wholebody.methods.newton.linear_algebra.base import LinearAlgebra, LinearSystem, SingularSystemError
+from wholebody.methods.newton.system import System
+
+Array = NDArray[np.float64]
+
+HARD_DAMPING = 1e-10  # of what must hold: redundant equations are tolerated at this loss of accuracy
+GOAL_DAMPING = 1e-7  # of goals, far above, so that they give way first
+FIRST_DAMPING = 1e-5  # what a failed step begins with
+MOST_DAMPING = 1e4
+DAMPING_UP, DAMPING_DOWN = 8.0, 0.1
+HARD_SHARE = 1e-6  # of the squared damping goes to what must hold, which only conflicts among that need
+PULL = 0.3  # m or rad: of a goal farther away, a step asks for this much; larger = fewer steps, more of them failed
+LARGEST_TURN = 0.35  # change of Euler parameters in a step, twice that in radians; beyond it the linearisation is idle
+FUNNEL = 0.5  # m or rad of equations that a step may leave for a metre of goal; larger = longer steps, more to mend
+WIDEST = 0.5  # m or rad of equations that any step may leave
+MEND = 0.7  # share of the funnel from which a step only mends; larger = fewer such steps, more damped ones
+MENDING_DAMPING = 0.03  # of goals in such a step: they stay where they are, but not at any price
+NARROW = 0.7  # what is left of the funnel after a step that only mended
+WORTH = 0.05  # share of the promised progress that a step must make
+STAGNANT = 1e-6  # relative progress below which steps count as none
+PATIENCE = 12  # such steps in a row before the nearest point counts as found
+SYSTEMS = 25  # most linear systems a step, while inequalities come and go
+MENDING = 30  # most steps that only mend what must hold, where the goals were not met
+
+
+class Reached(NamedTuple):
+    """Where the iteration ended.
+
+    Attributes:
+        x: (7 n,) the variables.
+        met: whether all equations hold to the tolerance.
+        hard: largest error of what must hold.
+        goal: largest error of the goals.
+        residuals: largest error before each iteration, and at the end.
+        systems: linear systems solved.
+        stationary: whether no further progress is possible.
+    """
+
+    x: Array
+    met: bool
+    hard: float
+    goal: float
+    residuals: tuple[float, ...]
+    systems: int
+    stationary: bool
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations."""
+        return len(self.residuals) - 1
+
+
+def reach(
+    system: System, x: Array, algebra: LinearAlgebra, *, tolerance: float, iterations: int, kind: Kind = "slack"
+) -> Reached:
+    """Meet all equations from x (7 n,), or come as near as goes.
+
+    Args:
+        system: the equations.
+        x: where to begin.
+        algebra: for the system's pattern.
+        tolerance: metres and radians.
+        iterations: most of them.
+        kind: how inequalities are dealt with.
+    """
+    run = _Run(system, x, algebra, tolerance, kind)
+    run.iterate(iterations, goals=True)
+    if run.hard > tolerance and system.goal.any():
+        stationary = run.stationary
+        run.iterate(MENDING, goals=False)
+        run.stationary = stationary if run.hard <= tolerance else run.stationary
+    met = max(run.hard, run.goal) <= tolerance
+    return Reached(run.x, met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)
+
+
+class _Run:
+    """State of one iteration."""
+
+    def __init__(self, system: System, x: Array, algebra: LinearAlgebra, tolerance: float, kind: Kind) -> None:
+        self.system, self.algebra, self.tolerance = system, algebra, tolerance
+        self.goal_rows = np.flatnonzero(system.goal)
+        self.one_sided = np.flatnonzero(system.inequality)
+        self._move(unit(x), None)
+        self.state: Inequalities = inequalities(kind, self.residual[self.one_sided])
+        self.residuals = [max(self.hard, self.goal)]
+        self.systems, self.stationary = 0, False
+
+    def _move(self, x: Array, residual: Array | None) -> None:
+        self.x = x
+        self.residual = self.system.residual(x) if residual is None else residual
+        self.values = self.system.values(x)
+        error = np.abs(self._error(self.residual))
+        self.goal = float(error[self.goal_rows].max(initial=0.0))
+        error[self.goal_rows] = 0.0
+        self.hard = float(error.max(initial=0.0))
+
+    def _error(self, residual: Array) -> Array:
+        error: Array = residual.copy()
+        error[self.one_sided] = np.minimum(residual[self.one_sided], 0.0)
+        return error
+
+    def iterate(self, iterations: int, goals: bool) -> None:
+        """Step until everything holds, nothing moves any more, or the iterations are spent."""
+        damping, share, pull, stagnant = 0.0, 1.0, PULL, 0
+        self.stationary = False
+        least = sum(self._norms(self.residual))
+        funnel = max(min(FUNNEL * self._norms(self.residual)[1], WIDEST), self.tolerance)
+        for _ in range(iterations):
+            if max(self.hard, self.goal * goals) <= self.tolerance and self.state.finished():
+                return
+            before = self._norms(self.residual)
+            try:
+                mend = not goals or (self.goal > self.tolerance and before[0] > MEND * funnel)
+                step = self._step(damping, share, 0.0 if mend else min(1.0, pull / max(self.goal, 1e-300)), goals)
+            except SingularSystemError:
+                step = np.zeros_like(self.x)
+            length = min(1.0, LARGEST_TURN / max(_largest_turn(step), 1e-300)) * self.state.share()
+            trial = unit(self.x + length * step)
+            found = self.system.residual(trial)
+            after = self._norms(found)
+            promised = self._norms(self.residual + length * self.system.pattern.times(self.values, step))
+            if not self._better(before, after, promised, 0.0 if mend else funnel) and self.state.finished():
+                self.residuals.append(self.residuals[-1])
+                if damping >= MOST_DAMPING:
+                    self.stationary = True
+                    return
+                damping = max(FIRST_DAMPING, damping * DAMPING_UP)
+                share, pull = max(0.5 * share, 0.05), max(0.5 * pull, 1e-3)
+                continue
+            if mend and after[1] >= before[1]:
+                funnel = max(NARROW * funnel, self.tolerance)
+            nearer = sum(after) < (1.0 - STAGNANT) * least
+            least = min(least, sum(after))
+            stagnant = 0 if nearer or not self.state.finished() else stagnant + 1
+            self._move(trial, found)
+            self.state.accept(length, found[self.one_sided])
+            self.residuals.append(max(self.hard, self.goal))
+            damping = damping * DAMPING_DOWN if damping > FIRST_DAMPING else 0.0
+            share, pull = min(1.0, 2.0 * share), min(PULL, 2.0 * pull)
+            if stagnant >= PATIENCE:
+                self.stationary = True
+                return
+
+    def _step(self, damping: float, share: float, pull: float, goals: bool) -> Array:
+        """The step of one iteration; inequalities come and go until the linear solution agrees with them."""
+        asked = self.residual * share
+        asked[self.goal_rows] = self.residual[self.goal_rows] * min(pull, share)
+        diagonal = np.full(len(asked), HARD_DAMPING + HARD_SHARE * damping * damping)
+        diagonal[self.goal_rows] = (GOAL_DAMPING if pull else MENDING_DAMPING) + damping if goals else FREE
+        gradient = np.zeros_like(self.x)
+        rows, phi = self.one_sided, self.residual[self.one_sided]
+        base = diagonal[rows]
+        at = np.zeros_like(self.x)
+        self.state.begin(phi)
+        for _ in range(SYSTEMS):
+            wanted, extra = self.state.rows(phi)
+            asked[rows], diagonal[rows] = wanted, base + extra
+            system = LinearSystem(self.values, self.system.weight, diagonal, gradient, asked)
+            step, y = self.algebra.solve(system)
+            self.systems += 1
+            if not len(rows):
+                return step
+            change = self.system.pattern.times(self.values, step)[rows]
+            share, again = self.state.correct(phi + change, y[rows])
+            at = at + share * (step - at)
+            if not again:
+                break
+        return at
+
+    def _norms(self, residual: Array) -> tuple[float, float]:
+        """Norms of the errors of what must hold, and of the goals."""
+        error = self._error(residual)
+        goal = error[self.goal_rows]
+        square = float(goal @ goal)
+        return sqrt(max(float(error @ error) - square, 0.0)), sqrt(square)
+
+    def _better(
+        self, before: tuple[float, float], after: tuple[float, float], promised: tuple[float, float], funnel: float
+    ) -> bool:
+        """Whether a step nears the goals without leaving the funnel, or mends what must hold (Gould and Toint 2010)."""
+        hard, goal = after
+        if not np.isfinite(hard + goal):
+            return False
+        if hard + goal <= 0.1 * self.tolerance:
+            return True
+        gain = before[1] - promised[1]
+        if hard <= funnel and gain > 0.0 and before[1] - goal >= WORTH * gain:
+            return True
+        return hard < 0.9 * before[0]
+
+
+def unit(x: Array) -> Array:
+    """Copy of the variables (7 n,) with Euler parameters of unit length."""
+    bodies = x.reshape(-1, 7).copy()
+    bodies[:, 3:] /= np.sqrt((bodies[:, 3:] ** 2).sum(axis=1, keepdims=True))
+    result: Array = bodies.ravel()
+    return result
+
+
+def _largest_turn(step: Array) -> float:
+    turn = step.reshape(-1, 7)[:, 3:]
+    return float(np.sqrt((turn * turn).sum(axis=1).max(initial=0.0)))

@@ -1,0 +1,116 @@
+"""All equations of an assembly as one sparse system: its pattern once, its values at every iteration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.methods.newton.batches import Batch
+from wholebody.methods.newton.linear_algebra.base import Pattern
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+WORLD = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+
+
+class System:
+    """Equations c(x) = 0 and inequalities c(x) >= 0 of n bodies.
+
+    Attributes:
+        batches: the equations.
+        pattern: where the Jacobian (m, 7 n) can be other than zero.
+        goal: (m,) rows that may be missed where they cannot be met.
+        inequality: (m,) rows that are to be at least zero.
+        weight: (7 n,) weight of each variable in the least motion.
+    """
+
+    def __init__(
+        self, count: int, batches: Sequence[Batch], goals: Sequence[bool], inequalities: Sequence[bool], weight: Array
+    ) -> None:
+        """Lay out rows and pattern.
+
+        Args:
+            count: bodies, without the world.
+            batches: equations; those without members are left out.
+            goals: for each batch, whether it may be missed.
+            inequalities: for each batch, whether its rows are to be at least zero.
+            weight: (7 count,).
+        """
+        kept = [index for index, batch in enumerate(batches) if len(batch)]
+        self.count = count
+        self.batches = [batches[index] for index in kept]
+        self.weight = weight
+        sizes = [len(batch) * batch.size for batch in self.batches]
+        self.starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
+        self.goal = _spread(sizes, [goals[index] for index in kept])
+        self.inequality = _spread(sizes, [inequalities[index] for index in kept])
+        rows, columns = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
+        self._masks = []
+        for batch, start in zip(self.batches, self.starts, strict=False):
+            column = _columns(batch)
+            row = start + np.arange(len(batch) * batch.size).reshape(len(batch), batch.size, 1)
+            mask = batch.pattern[None] & (column < 7 * count)[:, None, :]
+            mask = np.broadcast_to(mask, (len(batch), *batch.pattern.shape))
+            self._masks.append(np.flatnonzero(mask))
+            rows.append(np.broadcast_to(row, mask.shape)[mask])
+            columns.append(np.broadcast_to(column[:, None, :], mask.shape)[mask])
+        self.pattern = Pattern(np.concatenate(rows), np.concatenate(columns), int(self.starts[-1]), 7 * count)
+        self._curvature_places = self._lay_curvature()
+
+    def bodies(self, x: Array) -> Array:
+        """The variables (7 n,) as bodies (n + 1, 7), the world last."""
+        result: Array = np.concatenate([x, WORLD]).reshape(-1, 7)
+        return result
+
+    def residual(self, x: Array) -> Array:
+        """(m,) metres and radians."""
+        bodies = self.bodies(x)
+        return np.concatenate([np.zeros(0), *(batch.residual(bodies).ravel() for batch in self.batches)])
+
+    def values(self, x: Array) -> Array:
+        """Values (nnz,) of the Jacobian in the order of the pattern."""
+        bodies = self.bodies(x)
+        parts = zip(self.batches, self._masks, strict=True)
+        return np.concatenate([np.zeros(0), *(batch.jacobian(bodies).ravel()[mask] for batch, mask in parts)])
+
+    def curvature(self, x: Array, force: Array) -> tuple[Indices, Indices, Array]:
+        """Second derivative of force (m,) times residual: rows, columns and values, to be summed where they repeat."""
+        bodies = self.bodies(x)
+        rows, columns, keeps = self._curvature_places
+        values = [np.zeros(0)]
+        for batch, start, stop, keep in zip(self.batches, self.starts, self.starts[1:], keeps, strict=False):
+            push = force[start:stop].reshape(len(batch), batch.size)
+            values.append(batch.curvature(bodies, push).ravel()[keep])
+        return rows, columns, np.concatenate(values)
+
+    def label(self, row: int) -> str:
+        """What a row is called."""
+        index = int(np.searchsorted(self.starts, row, side="right")) - 1
+        batch = self.batches[index]
+        return batch.labels[(row - int(self.starts[index])) // batch.size]
+
+    def _lay_curvature(self) -> tuple[Indices, Indices, list[Indices]]:
+        rows, columns, keeps = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], []
+        for batch in self.batches:
+            column = _columns(batch)
+            shape = (*column.shape, column.shape[1])
+            row = np.broadcast_to(column[:, :, None], shape)
+            other = np.broadcast_to(column[:, None, :], shape)
+            keep = np.flatnonzero((row < 7 * self.count) & (other < 7 * self.count) & (row >= other))
+            keeps.append(keep)
+            rows.append(row.ravel()[keep])
+            columns.append(other.ravel()[keep])
+        return np.concatenate(rows), np.concatenate(columns), keeps
+
+
+def _columns(batch: Batch) -> Indices:
+    """(k, 7 b) columns of the variables of each equation; those of the world come after all others."""
+    return (7 * batch.bodies[:, :, None] + np.arange(7)).reshape(len(batch), -1)
+
+
+def _spread(sizes: list[int], flags: list[bool]) -> Mask:
+    return np.repeat(np.array(flags, dtype=bool), np.array(sizes, dtype=np.intp))
