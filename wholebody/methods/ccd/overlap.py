@@ -24,9 +24,11 @@ from wholebody.scene import Scene
 Array = NDArray[np.float64]
 
 STEP = 0.03  # m: farthest that a chain's tip is drawn at once; half of a forearm's width
-STEPS = 16  # most steps of one frame
+STEPS = 8  # most steps of one frame
+MOST_GOALS = 40  # after so many the next frame goes on: some 5 ms
 HALVINGS = 7  # of an interpolation: a step of 3 cm to a quarter of a millimetre
 LEAST_GAIN = 1e-7  # rad^2: a chain that gets no nearer than this to the tracked posture stays where it is
+HELD_UP = 0.4  # a part that gains less than this share of what drawing alone would have is held up (2 is all of it)
 ARRIVED = 1e-12  # rad^2: a chain this near is there
 
 
@@ -129,57 +131,80 @@ class Frames:
         settled = [False] * len(self._parts)
         left = 0.0
         for _ in range(steps):
+            if remover.tally.iterations > MOST_GOALS:
+                break
             drawn = self._draw(q, wanted, settled)
             if drawn is None:
                 break
-            trial, overlaps = remover.separate(drawn, rng)
+            trial, overlaps = remover.separate(drawn[0], rng)
             if overlaps:
                 trial = self._interpolate(q, trial)
-            after = self._proximity.placements.copy()
             if self._jumps(before, q, trial):
                 trial = self._interpolate(q, self._hit)
-                after = self._proximity.placements.copy()
-            trial = self._keep_gains(q, trial, wanted, settled)
-            q, left = trial, remover.deepest
-            before = self._proximity.placements.copy() if self._moved_back else after
+            q = self._keep_gains(q, trial, wanted, drawn[1], settled)
+            left = remover.deepest
+            before = self._proximity.placements.copy()
         return q, left
 
-    def _draw(self, q: Array, wanted: Array, settled: list[bool]) -> Array | None:
-        """Draw every part that is not settled a step towards the wanted posture; None where none is left to draw."""
+    def _draw(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
+        """Draw every part that is not settled a step towards the wanted posture; None where none is left to draw.
+
+        Returns:
+            The posture drawn, (nq,), and the share of its way that each part was drawn, (parts,).
+        """
         way = np.asarray(pin.difference(self._model, q, wanted))
-        arrived = True
+        shares = np.zeros(len(self._parts))
         for k, (dofs, reach) in enumerate(self._parts):
             part = way[dofs]
-            if settled[k] or not len(dofs) or float(part @ part) < ARRIVED:
-                way[dofs] = part if not settled[k] else 0.0
-                continue
-            arrived = False
             length = float(np.abs(part) @ reach)
-            if length > STEP:
-                way[dofs] = part * (STEP / length)
-        if arrived:
+            if not settled[k] and float(part @ part) >= ARRIVED:
+                shares[k] = min(1.0, STEP / length)
+            way[dofs] = part * shares[k]
+        if not shares.any():
             return None
-        return np.asarray(pin.integrate(self._model, q, way))
+        return np.asarray(pin.integrate(self._model, q, way)), shares
 
-    def _keep_gains(self, q: Array, trial: Array, wanted: Array, settled: list[bool]) -> Array:
-        """Parts that got no nearer to the wanted posture stay where they were, if that is free, and are settled."""
+    def _keep_gains(self, q: Array, trial: Array, wanted: Array, shares: Array, settled: list[bool]) -> Array:
+        """Undo what brought a part no nearer to the wanted posture, and draw joints one by one where a part is held up.
+
+        Where pushing undoes what drawing did, single joints may still be free: a shoulder that draws the whole arm
+        back, although the wrist cannot straighten yet. A part for which this gains nothing either is settled.
+        """
         before = np.asarray(pin.difference(self._model, q, wanted))
         after = np.asarray(pin.difference(self._model, trial, wanted))
         back = np.zeros(self._model.nv, dtype=bool)
+        slow = []
         for k, (dofs, _) in enumerate(self._parts):
             old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
-            if old - new < LEAST_GAIN and old > ARRIVED:
-                settled[k] = True
+            if shares[k] and old - new < LEAST_GAIN:
                 back[dofs] = True
-        self._moved_back = bool(back.any())
-        if not self._moved_back:
-            return trial
-        way = np.asarray(pin.difference(self._model, trial, q))
-        kept = np.asarray(pin.integrate(self._model, trial, np.where(back, way, 0.0)))
-        if not self._remover.look(kept):
-            return kept
-        self._remover.look(trial)
+            if shares[k] and old - new < HELD_UP * shares[k] * old:
+                slow.append(k)
+        if back.any():
+            way = np.asarray(pin.difference(self._model, trial, q))
+            kept = np.asarray(pin.integrate(self._model, trial, np.where(back, way, 0.0)))
+            if not self._remover.look(kept):
+                trial = kept
+        for k in slow:
+            trial, gained = self._draw_joints(trial, wanted, k)
+            settled[k] = not gained
+        if len(slow) or back.any():
+            self._remover.look(trial)
         return trial
+
+    def _draw_joints(self, q: Array, wanted: Array, part: int) -> tuple[Array, bool]:
+        """Draw one joint after the other, from the root outwards, where that is free; whether any moved."""
+        gained = False
+        for dof, reach in zip(*self._parts[part], strict=True):
+            way = float(pin.difference(self._model, q, wanted)[dof])
+            if way * way < LEAST_GAIN:
+                continue
+            step = np.zeros(self._model.nv)
+            step[dof] = min(max(way, -STEP / reach), STEP / reach)
+            trial = np.asarray(pin.integrate(self._model, q, step))
+            if not self._remover.look(trial):
+                q, gained = trial, True
+        return q, gained
 
     def _interpolate(self, free: Array, q: Array) -> Array:
         """The last free posture on the way from a free one, by halving."""

@@ -17,8 +17,8 @@ from wholebody.scene import Scene
 Array = NDArray[np.float64]
 
 SKIN = 2e-4  # m: how far outside a goal lies, so that the next look finds nothing
-CLOSE = 5e-5  # m: a goal nearer than this is reached
-SWEEPS = 8  # for one goal; it is set anew afterwards, so more is lost time
+CLOSE = 1e-4  # m: a goal nearer than this is reached
+SWEEPS = 5  # for one goal; it is set anew afterwards, so more is lost time
 SLOW = 0.9  # a sweep that leaves more than this share of the distance is the last one
 PARALLEL = 0.26  # sine of 15 degrees: a bone at a smaller angle to the obstacle's surface is nearly parallel to it
 SHORT = 0.02  # m: a link shorter than this has no direction worth the name
@@ -109,7 +109,7 @@ class ChainPusher:
         local = seen_from(frame, effector[0] - frame[9], effector[1] - frame[10], effector[2] - frame[11])
         aims = Aims()
         aims.add(node, effector, goal)
-        steps = aims.plan(limbs, nodes)
+        steps = [(k, (0,), 1) for k in nodes]
         left = aims.distance()
         for _ in range(SWEEPS):
             sweep(limbs, aims, steps)
@@ -132,7 +132,7 @@ class ChainPusher:
             frame, aims = limbs.frames[link.node], Aims()
             for k, wanted in enumerate(axes):
                 aims.add(link.node, (frame[k], frame[3 + k], frame[6 + k]), wanted, direction=True)
-            change = sweep(limbs, aims, aims.plan(limbs, own))
+            change = sweep(limbs, aims, [(node, (0, 1, 2), 0) for node in own])
             limbs.forward()
             if change < CLOSE:
                 break

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 TOUCH = 1e-4  # m: an overlap that does not count; coal's own accuracy is a hundredth of it
 GOALS = 8  # most goals for one chain before the next has its turn
 PASSES = 4  # most times that every chain has its turn
+SLOW = 0.8  # a goal that leaves more than this share of the link's overlap is the last one of the turn
 GAIN = 0.98  # a pass that leaves more than this share of the deepest overlap leads nowhere
 
 
@@ -122,12 +123,12 @@ class Remover:
 
     def _leave(self, chain: ChainPusher, q: Array, overlaps: list[Overlap]) -> list[Overlap]:
         """One chain leaves what it overlaps, with its goal set anew every time; q is changed in place."""
-        worst = np.inf
+        worst, node = np.inf, -1
         for _ in range(GOALS):
             link = chain.find(overlaps)
-            if link is None or link.depth > 2.0 * worst:
+            if link is None or (link.node == node and link.depth > SLOW * worst):
                 break
-            worst = min(worst, link.depth)
+            worst, node = link.depth, link.node
             began = time.perf_counter()
             chain.read(q, self._data)
             nodes = chain.push(link)
