@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from wholebody.assessment import Assessment, assess
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+    from wholebody.methods.ccd.method import CCD
     from wholebody.methods.newton.assembly import Assembly
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from wholebody.view import Viewer
 
 __all__ = [
+    "CCD",
     "QP",
     "Assembly",
     "Assessment",
@@ -114,6 +116,7 @@ _MODULES = {
     "wholebody.assessment": "Assessment assess",
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
+    "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.newton.assembly": "Assembly",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",

@@ -37,6 +37,7 @@ class Problem:
         scene: figure and things.
         start: (nq,) the posture it begins from.
         goals, constraints, bounds, measures: the terms, resolved on this scene and start.
+        measures_given: whether measures were asked for; false where `Effort()` stands in for none.
         clearance: distance asked of every pair, metres.
         clearances: (pairs,) distance asked of each collision pair of the scene.
     """
@@ -74,6 +75,7 @@ class Problem:
         self.clearance = _clearance(clearance)
         terms = [*_checked(goals, (Goal,), "goals")]
         given = [*_checked(constraints, (Constraint, Bound), "constraints")]
+        self.measures_given = measures is not None
         measured = [Effort()] if measures is None else [*_checked(measures, (Measure,), "measures")]
         self.goals: tuple[Goal, ...] = tuple(goal.resolve(scene, self.start) for goal in terms)
         self.constraints: tuple[Constraint, ...] = tuple(

@@ -7,7 +7,7 @@ from typing import Protocol
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.problem import Problem, Solution
 
-METHODS = ("qp",)
+METHODS = ("qp", "ccd")
 
 
 class Method(Protocol):
@@ -31,6 +31,10 @@ def method_named(name: str) -> Method:
         from wholebody.methods.qp.method import QP
 
         return QP()
+    if name == "ccd":
+        from wholebody.methods.ccd.method import CCD
+
+        return CCD()
     raise UnknownNameError("method", name, METHODS)
 
 
@@ -39,7 +43,7 @@ def solve(problem: Problem, method: str | Method = "qp") -> Solution:
 
     Args:
         problem: what is asked.
-        method: "qp", or a configured method such as `QP(solver="daqp", tolerance=1e-8)`.
+        method: "qp", "ccd", or a configured method such as `QP(solver="daqp", tolerance=1e-8)`.
 
     Returns:
         The posture with its status and the independent assessment. Goals out of reach and starts in penetration are
@@ -47,7 +51,7 @@ def solve(problem: Problem, method: str | Method = "qp") -> Solution:
 
     Raises:
         UnknownNameError: there is no such method.
-        InputError: the scene changed after the problem was stated.
+        InputError: the scene changed after the problem was stated, or the method cannot take some of its terms.
     """
     if not isinstance(problem, Problem):
         raise InputError(f"solve takes a Problem, not a {type(problem).__name__}")

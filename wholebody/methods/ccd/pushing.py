@@ -33,7 +33,15 @@ class ChainPusher:
         reach: for each node, an upper bound of the distance from its joint to the chain's farthest point, metres.
     """
 
-    def __init__(self, scene: Scene, name: str, joints: Sequence[int], foreign: frozenset[int], tip: int) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        name: str,
+        joints: Sequence[int],
+        foreign: frozenset[int],
+        tip: int,
+        cones: Sequence[str] | None = None,
+    ) -> None:
         """Prepare a chain.
 
         Args:
@@ -42,11 +50,12 @@ class ChainPusher:
             joints: Pinocchio's indices of its joints.
             foreign: joints of the other chains.
             tip: index of the frame at its end.
+            cones: names of the reach cones to keep; all of the figure's where None.
         """
         self.name = name
         self.limbs = Limbs(scene.model, joints)
         self._finder = LinkFinder(scene, self.limbs, foreign)
-        self._guards = guards(scene.figure, self.limbs)
+        self._guards = guards(scene.figure, self.limbs, cones)
         self._tip = _three(scene.model.frames[tip].placement.translation)
         self._bearing = self._links_with_pieces(scene)
         self.reach = self._reaches(scene)

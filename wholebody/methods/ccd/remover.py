@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -40,32 +41,47 @@ class Remover:
     """Takes overlap out of postures of one scene, re-used from posture to posture.
 
     Attributes:
-        chains: name to chain, in the figure's order.
-        deepest: deepest overlap found by the last look, metres; what any pair is allowed counts as none.
+        tally: what was done since it was last set.
+        deepest: deepest overlap found by the last look, metres, against the distance asked of the pair.
+        overlapping: (pairs,) bool: which collision pairs overlapped at the last look.
     """
 
-    def __init__(self, scene: Scene, clearances: Array | None = None, fixed: frozenset[int] = frozenset()) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        clearances: Array | None = None,
+        fixed: frozenset[int] = frozenset(),
+        cones: Sequence[str] | None = None,
+        touch: float = TOUCH,
+    ) -> None:
         """Prepare the chains of the figure.
 
         Args:
             scene: figure and things.
             clearances: (pairs,) distance asked of every collision pair, metres; zero where None.
             fixed: Pinocchio's indices of joints that must not move.
+            cones: names of the reach cones that are kept; all of the figure's where None.
+            touch: overlap that does not count, metres.
         """
-        self.scene, self.clearances = scene, clearances
+        self.scene, self.clearances, self.touch = scene, clearances, touch
         self._within = 0.0 if clearances is None else float(clearances.max(initial=0.0))
         self._data = scene.model.createData()
         self._joints = scene.proximity.joint.tolist()
         self.tally = Tally()
         self.deepest = 0.0
         self.overlapping = np.zeros(len(scene.proximity.pairs), dtype=bool)
+        self._fixed, self._cones = fixed, cones
+
+    @cached_property
+    def chains(self) -> dict[str, ChainPusher]:
+        """Name to chain, in the figure's order; made when something overlaps first."""
         named = {
-            name: ([joint for joint in joints if joint not in fixed], tip)
-            for name, (joints, tip) in chains_of(scene.figure).items()
+            name: ([joint for joint in joints if joint not in self._fixed], tip)
+            for name, (joints, tip) in chains_of(self.scene.figure).items()
         }
         everything = frozenset(joint for joints, _ in named.values() for joint in joints)
-        self.chains: dict[str, ChainPusher] = {
-            name: ChainPusher(scene, name, joints, everything - set(joints), tip)
+        return {
+            name: ChainPusher(self.scene, name, joints, everything - set(joints), tip, self._cones)
             for name, (joints, tip) in named.items()
             if joints
         }
@@ -79,8 +95,8 @@ class Remover:
         self.deepest = float(depth.max(initial=0.0))
         self.overlapping[:] = False
         found: list[Overlap] = []
-        if self.deepest > TOUCH:
-            rows = np.flatnonzero(depth > TOUCH)
+        if self.deepest > self.touch:
+            rows = np.flatnonzero(depth > self.touch)
             rows = rows[np.argsort(-depth[rows], kind="stable")]
             self.overlapping[near.number[rows]] = True
             for pair, size, normal, a, b in zip(

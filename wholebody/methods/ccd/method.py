@@ -1,0 +1,208 @@
+"""The method ccd: reaches by cyclic coordinate descent, overlap removed by the loop of the avatar paper."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.assessment import Assessment, assess
+from wholebody.errors import InputError
+from wholebody.methods.ccd.reaching import Reach
+from wholebody.methods.ccd.remover import TOUCH, Remover
+from wholebody.methods.ccd.terms import read
+from wholebody.problem import Iterate, Problem, Solution, Status
+
+Array = NDArray[np.float64]
+
+LEAST_TOLERANCE = 1e-6
+DISTURBANCES = (0.0, 0.05, 0.2, 0.6)  # rad: of the first starts, from the posture at hand; later ones begin anywhere
+ROUNDS = 6  # reaching and leaving overlap by turns, from one start
+HALVINGS = 12  # of the way back to the start, which ends within a 4000th of it
+SHARE = 0.5  # of the tolerance: to what goals are met and overlap is removed, so that the judge agrees
+
+
+@dataclass
+class _Trial:
+    """A posture with its deepest overlap [m], the largest error of its goals, and whether its search came to rest."""
+
+    q: Array
+    overlap: float
+    error: float
+    rested: bool
+
+    def better(self, other: _Trial, touch: float) -> bool:
+        """Less overlap first, then the smaller error."""
+        mine, theirs = max(self.overlap, touch), max(other.overlap, touch)
+        return (mine, self.error) < (theirs, other.error)
+
+
+@dataclass
+class CCD:
+    """Cyclic coordinate descent: one joint at a time, each to its best, from the tip inwards.
+
+    Takes Point, Frame and Orientation goals. A goal on a chain of the figure moves the joints of that chain up to its
+    frame, any other goal all joints between its frame and the root; the root itself stays. Limits are kept always,
+    reach cones where the problem asks for `ReachCones`, clearances by the loop of Schmidl and Lin, which may turn
+    other chains too. `Hold` is taken where nothing that moves can move it, `Freeze` and `StepLimit` as they are.
+
+    Everything else (Balance, Plane, Axis, CenterOfMass, Relative, measures) is refused by name. There is no objective
+    beside the goals: a problem that gives no measures is taken as it is, although it then means `Effort()`, since the
+    descent begins at the start and stops at the first posture that serves. That is near to the start and not the
+    nearest; `assessment.measure` says what it costs.
+
+    Attributes:
+        tolerance: metres and radians to which goals are met.
+        iterations: most sweeps from one start.
+        restarts: most further starts, first near the posture at hand, then anywhere within the limits.
+        seed: of the restarts and of the order in which chains leave overlap.
+    """
+
+    tolerance: float = 1e-4
+    iterations: int = 400
+    restarts: int = 12
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the settings.
+
+        Raises:
+            InputError: a setting out of range.
+        """
+        if not LEAST_TOLERANCE <= self.tolerance <= 0.1:
+            raise InputError(f"tolerance is {self.tolerance}; give metres from {LEAST_TOLERANCE} to 0.1")
+        if self.iterations < 1 or self.restarts < 0:
+            raise InputError("iterations are at least 1, restarts at least 0")
+
+    @property
+    def name(self) -> str:
+        """Name for tables."""
+        return "ccd"
+
+    def solve(self, problem: Problem) -> Solution:
+        """Find a posture.
+
+        Goals out of reach and starts in penetration are answers, not errors.
+
+        Raises:
+            UnsupportedTermError: the problem has terms that this method cannot take.
+            InputError: the scene changed after the problem was stated.
+        """
+        began = time.perf_counter()
+        problem.check_fresh()
+        search = _Search(self, problem)
+        best = search.run()
+        judgement = assess(problem, best.q)
+        status = self._status(best, judgement)
+        return Solution(
+            q=best.q,
+            status=status,
+            seconds=time.perf_counter() - began,
+            iterations=search.sweeps,
+            assessment=judgement,
+            trace=tuple(search.trace),
+            method=self.name,
+            message=_message(status, judgement, len(search.trace)),
+        )
+
+    def _status(self, best: _Trial, judgement: Assessment) -> Status:
+        slack = 1.05 * self.tolerance + 1e-6
+        if not judgement.holds(slack):
+            return "infeasible" if best.rested else "stalled"
+        if judgement.met(slack):
+            return "solved"
+        return "unreachable" if best.rested else "stalled"
+
+
+class _Search:
+    """One solve: starts, and from each of them reaching and leaving overlap by turns."""
+
+    def __init__(self, method: CCD, problem: Problem) -> None:
+        self._method, self._problem = method, problem
+        request = read(problem)
+        self._reach = Reach(problem.scene.figure, request)
+        self._touch = min(TOUCH, SHARE * method.tolerance)
+        self._remover = Remover(
+            problem.scene, problem.clearances, fixed=request.fixed, cones=request.cones, touch=self._touch
+        )
+        self._rng = np.random.default_rng(method.seed)
+        self.sweeps = 0
+        self.trace: list[Iterate] = []
+
+    def run(self) -> _Trial:
+        """The best of all starts, or the first that serves."""
+        start = self._problem.scene.figure.clamp(self._problem.start)
+        self._remover.look(start)
+        free = start if self._remover.deepest <= self._touch else None
+        best: _Trial | None = None
+        for attempt in range(1 + self._method.restarts):
+            size = DISTURBANCES[attempt] if attempt < len(DISTURBANCES) else inf
+            q = start if attempt == 0 else self._reach.disturbed(start, size, self._rng)
+            trial = self._attempt(q, free, "" if attempt == 0 else "restart")
+            if best is None or trial.better(best, self._touch):
+                best = trial
+            if self._serves(best):
+                break
+        assert best is not None
+        return best
+
+    def _serves(self, trial: _Trial) -> bool:
+        return trial.error <= SHARE * self._method.tolerance and trial.overlap <= self._touch
+
+    def _attempt(self, q: Array, free: Array | None, note: str) -> _Trial:
+        """Reach, leave overlap, reach again: until both hold, or neither gains."""
+        best: _Trial | None = None
+        for turn in range(ROUNDS):
+            before = q
+            q, reached = self._reach.run(q, SHARE * self._method.tolerance, self._method.iterations)
+            self.sweeps += reached.sweeps
+            left = self._remover.look(q)
+            trial = _Trial(q, self._remover.deepest, reached.error, reached.rested)
+            if left:
+                q, left = self._remover.separate(q, self._rng)
+                trial = _Trial(q, self._remover.deepest, self._error(q), reached.rested)
+            if left and free is not None:
+                back = self._interpolate(free, q)
+                self._remover.look(back)
+                trial = _Trial(back, self._remover.deepest, self._error(back), True)
+            step = float(np.abs(pin.difference(self._problem.scene.model, before, q)).max(initial=0.0))
+            self.trace.append(Iterate(trial.error, trial.overlap, 0.0, step, note if turn == 0 else "overlap"))
+            gained = best is None or trial.better(best, self._touch)
+            if gained:
+                best = trial
+            if self._serves(trial) or not gained:
+                break
+        assert best is not None
+        return best
+
+    def _error(self, q: Array) -> float:
+        """Largest error of the goals at a posture q (nq,)."""
+        return self._reach.run(q, inf, 0)[1].error
+
+    def _interpolate(self, free: Array, q: Array) -> Array:
+        """The last posture without overlap on the way from a free one, by halving."""
+        model = self._problem.scene.model
+        inside, outside = 0.0, 1.0
+        for _ in range(HALVINGS):
+            middle = 0.5 * (inside + outside)
+            if self._remover.look(np.asarray(pin.interpolate(model, free, q, middle))):
+                outside = middle
+            else:
+                inside = middle
+        return np.asarray(pin.interpolate(model, free, q, inside))
+
+
+def _message(status: Status, judgement: Assessment, turns: int) -> str:
+    left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
+    if status == "solved":
+        return "solved from the start" if turns == 1 else f"solved at turn {turns}"
+    if status == "unreachable":
+        return f"no start led there: nothing is violated, {left}"
+    if status == "stalled":
+        return f"ran out of sweeps: {left}"
+    worst = max(judgement.clearance_lack, judgement.constraint_violation, judgement.limit_violation)
+    return f"what must hold could not all be met: missed by {worst:.3g} m or rad"

@@ -1,0 +1,170 @@
+"""What cyclic coordinate descent can take of a problem; everything else is refused by name before it starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
+from wholebody.figures.state import State, joint_support
+from wholebody.geometry.placement import placement
+from wholebody.methods.ccd.limbs import movable
+from wholebody.problem import Problem
+from wholebody.tasks.bounds import Freeze, StepLimit
+from wholebody.tasks.frame import Frame, Orientation
+from wholebody.tasks.hold import Hold
+from wholebody.tasks.inputs import target_rotation
+from wholebody.tasks.point import Point
+from wholebody.tasks.reach_cones import ReachCones
+
+HELD = 1e-6  # m, rad: a hold that is this near to its place at the start is kept by what does not move
+
+
+class UnsupportedTermError(InputError):
+    """A method cannot take some terms of a problem.
+
+    Attributes:
+        terms: one text for each term: what it is and why it cannot be taken.
+    """
+
+    def __init__(self, method: str, terms: list[str]) -> None:
+        """Build the sentence.
+
+        Args:
+            method: its name.
+            terms: texts such as "constraints[1], Balance".
+        """
+        self.terms = tuple(terms)
+        super().__init__(f"method {method!r} cannot take {'; '.join(terms)}; leave them out or use method='qp'")
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A frame, or a point of it, and where it should be.
+
+    Attributes:
+        frame: index in the model.
+        offset: the point in the frame, metres.
+        place: where in the world; None where only the orientation counts.
+        rotation: (3, 3) rotation in the world; None where only the place counts.
+        weight: factor on the squared error.
+    """
+
+    frame: int
+    offset: tuple[float, float, float]
+    place: tuple[float, float, float] | None
+    rotation: Any
+    weight: float
+
+
+@dataclass(frozen=True)
+class Request:
+    """A problem as cyclic coordinate descent sees it.
+
+    Attributes:
+        wishes: the goals.
+        joints: Pinocchio's indices of the joints that reach for them.
+        fixed: joints that must not move, also not to leave an overlap.
+        cones: names of the reach cones to keep.
+    """
+
+    wishes: tuple[Wish, ...]
+    joints: tuple[int, ...]
+    fixed: frozenset[int]
+    cones: tuple[str, ...]
+
+
+def read(problem: Problem) -> Request:
+    """Take a problem apart.
+
+    Raises:
+        UnsupportedTermError: it has terms that this method cannot take; all of them are listed.
+    """
+    figure = problem.scene.figure
+    refused: list[str] = []
+    fixed = {joint for bound in problem.bounds if isinstance(bound, Freeze) for joint in _frozen(figure, bound)}
+    wishes, joints = [], set[int]()
+    for number, goal in enumerate(problem.goals):
+        where = f"goals[{number}], {type(goal).__name__}"
+        if not isinstance(goal, (Point, Frame, Orientation)):
+            refused.append(where)
+            continue
+        path = [joint for joint in reaching(figure, goal.frame) if joint not in fixed]
+        if not path:
+            refused.append(f"{where}({goal.frame!r}), which no joint moves that may turn (the root stays)")
+        wishes.append(_wish(figure, goal))
+        joints.update(path)
+    cones: dict[str, None] = {}
+    moving = _dofs(figure, joints)
+    state = State(problem.scene.model).update(problem.start)
+    support = joint_support(problem.scene.model)
+    for number, term in enumerate(problem.constraints):
+        where = f"constraints[{number}], {type(term).__name__}"
+        if isinstance(term, ReachCones):
+            cones.update(dict.fromkeys(figure.cones if term.names is None else term.names))
+        elif isinstance(term, Hold):
+            carried = support[_joint(figure, term.frame)]
+            if term.relative_to is not None:
+                carried = carried - support[_joint(figure, term.relative_to)]
+            if carried[moving].any():
+                refused.append(f"{where}({term.frame!r}), which the joints that reach move too")
+            elif np.abs(term.value(state)).max() > HELD:
+                refused.append(f"{where}({term.frame!r}), which is elsewhere at the start")
+            held = {int(joint) for joint in range(1, problem.scene.model.njoints) if _moves(figure, joint, carried)}
+            fixed |= held
+        else:
+            refused.append(where)
+    for number, bound in enumerate(problem.bounds):
+        if not isinstance(bound, (Freeze, StepLimit)):
+            refused.append(f"bounds[{number}], {type(bound).__name__}")
+    if problem.measures_given:
+        refused += [f"measures[{number}], {type(term).__name__}" for number, term in enumerate(problem.measures)]
+    if refused:
+        raise UnsupportedTermError("ccd", refused)
+    return Request(tuple(wishes), tuple(sorted(joints)), frozenset(fixed), tuple(cones))
+
+
+def reaching(figure: Figure, frame: str) -> tuple[int, ...]:
+    """The joints that bring a frame to its goal.
+
+    Those of the chain that carries it, from the chain's beginning to the frame; where no chain does, all joints
+    between the frame and the root.
+    """
+    carrier = _joint(figure, frame)
+    for chain in figure.chains.values():
+        joints = [figure.joint_id(name) for name in chain.joints]
+        if carrier in joints:
+            return tuple(joint for joint in joints[: joints.index(carrier) + 1] if movable(figure.model, joint))
+    path = [int(joint) for joint in figure.model.supports[carrier]]
+    return tuple(joint for joint in path if joint > 0 and movable(figure.model, joint))
+
+
+def _joint(figure: Figure, frame: str) -> int:
+    return int(figure.model.frames[figure.frame_id(frame)].parentJoint)
+
+
+def _moves(figure: Figure, joint: int, carried: Any) -> bool:
+    made = figure.model.joints[joint]
+    return bool(carried[made.idx_v : made.idx_v + made.nv].any())
+
+
+def _dofs(figure: Figure, joints: set[int]) -> list[int]:
+    return [figure.model.joints[joint].idx_v for joint in sorted(joints)]
+
+
+def _frozen(figure: Figure, bound: Freeze) -> list[int]:
+    return [figure.joint_id(name) for name in figure.joint_names(bound.joints)]
+
+
+def _wish(figure: Figure, goal: Point | Frame | Orientation) -> Wish:
+    frame = figure.frame_id(goal.frame)
+    if isinstance(goal, Point):
+        offset, place = np.asarray(goal.offset, dtype=float), np.asarray(goal.target, dtype=float)
+        return Wish(frame, tuple(offset.tolist()), tuple(place.tolist()), None, goal.weight)
+    if isinstance(goal, Frame):
+        target = placement(goal.target)
+        return Wish(frame, (0.0, 0.0, 0.0), tuple(target.translation.tolist()), target.rotation, goal.weight)
+    return Wish(frame, (0.0, 0.0, 0.0), None, target_rotation(goal.target, "target").rotation, goal.weight)
