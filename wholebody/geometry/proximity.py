@@ -5,6 +5,7 @@ About 24 us for 760 pairs of which 47 survive, against 207 us for coal on every 
 
 from __future__ import annotations
 
+import time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,6 +45,9 @@ class Proximity:
     """Distances of every collision pair of a geometry model, re-used from posture to posture.
 
     The number of pieces and pairs is fixed; placements of fixed objects may change between queries.
+
+    Attributes:
+        seconds: what all calls of `near` have taken together.
     """
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel) -> None:
@@ -53,6 +57,7 @@ class Proximity:
             InputError: a geometry that is not a convex piece.
         """
         self.model, self.geometry = model, geometry
+        self.seconds = 0.0
         self.results = pin.GeometryData(geometry)
         self.cores = [core_of(piece.geometry) for piece in geometry.geometryObjects]
         count = geometry.ngeoms
@@ -104,9 +109,12 @@ class Proximity:
         Pairs farther apart are left out; nothing else is. Results of pairs that were culled are never read: coal
         leaves old numbers in them.
         """
+        began = time.perf_counter()
         pin.updateGeometryPlacements(self.model, data, self.geometry, self.results)
         index = self._cull(within)
-        return self._gather(index, within)
+        contacts = self._gather(index, within)
+        self.seconds += time.perf_counter() - began
+        return contacts
 
     def _cull(self, within: float) -> Indices:
         """Compute with coal all pairs whose bounding spheres are nearer than `within`; their indices."""

@@ -124,6 +124,12 @@ class Bodies:
             stage.place(path, piece.placement.homogeneous)
             stage.place(f"{root}{body.carrier}", data.oMi[body.joint].homogeneous)
 
+    def pose_ghost(self, moment: Moment, number: int, data: Any) -> None:
+        """Place a ghost that was drawn before where `data` has the joints."""
+        for path, joint in self.carriers.items():
+            if joint:
+                moment.transforms[f"{style.GHOST_NODE}/{number}{path}"] = data.oMi[joint].homogeneous
+
     def corners(self, data: Any, *, things: bool) -> Array:
         """Corners (n, 3) in the world of the boxes around the figure's pieces, or the things'; no plates, no glass."""
         solid = [index for index, body in enumerate(self.all) if not body.plate and body.color[3] == 1.0]

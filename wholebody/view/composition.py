@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.view import style
 from wholebody.view.aim import aim
@@ -80,6 +81,20 @@ class Composition:
         self._stage.remove(style.GHOST_NODE)
         for number, q in enumerate(postures):
             self.bodies.ghost(self._stage, number, self._state.update(q).data, color)
+
+    def moving_ghost(self, moments: Sequence[Moment], postures: Any, color: style.Color) -> list[Array]:
+        """Add a ghost that moves to a motion's moments; return where it begins.
+
+        Raises:
+            InputError: not as many postures as moments, or one has the wrong shape or is not finite.
+        """
+        checked = [self.checked(q) for q in postures]
+        if len(checked) != len(moments):
+            raise InputError(f"the ghost has {len(checked)} postures and the motion {len(moments)}; give as many")
+        self.ghosts(checked[:1], color)
+        for moment, q in zip(moments, checked, strict=True):
+            self.bodies.pose_ghost(moment, 0, self._state.update(q).data)
+        return checked[:1]
 
     def aim(self, postures: Iterable[Array]) -> Command:
         """Look at the figure so that it is in the picture at all of these postures, and the goals shown last too."""

@@ -104,13 +104,16 @@ class Viewer:
             self._stage.do(self._aim())
         self._stage.show(moment)
 
-    def play(self, motion: Any, dt: float | None = None, *, problem: Any = None, repeat: float = 1) -> None:
+    def play(
+        self, motion: Any, dt: float | None = None, *, problem: Any = None, ghost: Any = None, repeat: float = 1
+    ) -> None:
         """Let the page play a motion; returns at once. The page has a bar to pause and scrub.
 
         Args:
             motion: postures, (n, nq) or a list of (nq,), or a clip with `q` and `dt`.
             dt: seconds from posture to posture; the clip's own, or 1/30, when left out.
             problem: a `wholebody.Problem` whose goals are drawn.
+            ghost: as many postures more, shown transparent beside them; in place of the ghosts that were there.
             repeat: how often it is played; `math.inf` for ever.
 
         Raises:
@@ -123,6 +126,8 @@ class Viewer:
         if not (math.isfinite(step) and step > 0 and repeat > 0):
             raise InputError(f"dt and repeat are positive, not {step} s and {repeat}")
         moments = [self._composition.moment(q, problem) for q in postures]
+        if ghost is not None:
+            self._ghosts = self._composition.moving_ghost(moments, getattr(ghost, "q", ghost), style.GHOST)
         self._motion = (len(postures), step)
         chosen = np.unique(np.linspace(0, len(postures) - 1, AIMED_AT).astype(int))
         self._seen = [postures[index] for index in chosen]

@@ -1,0 +1,91 @@
+"""`wholebody interact` as people use it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wholebody.bench.interaction import FrameRow
+from wholebody.bench.tables import read_rows
+from wholebody.cli import main
+from wholebody.interaction import SCENES
+
+PAGE = """\
+before
+<!-- bench:interaction -->
+old
+<!-- /bench:interaction -->
+after
+"""
+
+
+def test_lists_the_scenes(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["interact", "--list"]) == 0
+    listed = capsys.readouterr().out
+    assert all(name in listed for name in SCENES)
+    assert main(["interact"]) == 2
+    assert "name a scene: hand_on_table" in capsys.readouterr().err
+
+
+def test_a_run_prints_tables_and_writes_numbers_chart_and_animation(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["interact", "hand_on_table", "--frames", "100", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert "hand_on_table" in printed
+    assert "paper" in printed
+    assert {path.suffix for path in tmp_path.iterdir()} == {".csv", ".html", ".md", ".png", ".svg"}
+    facts, rows = read_rows(tmp_path / "hand_on_table-qp.csv", FrameRow)
+    assert "processor" in facts
+    assert [row.frame for row in rows] == list(range(100))
+    assert max(row.tracked_depth_mm for row in rows) > 5.0
+    assert max(row.depth_mm for row in rows) < 0.1
+    page = (tmp_path / "hand_on_table-qp.html").read_text(encoding="utf-8")
+    assert "ghosts" in page
+
+
+def test_the_tables_go_into_the_documentation(tmp_path: Path) -> None:
+    (tmp_path / "results.md").write_text(PAGE)
+    command = ["interact", "hand_in_corner", "--frames", "40", "--out", str(tmp_path / "out")]
+    assert main([*command, "--update-docs", str(tmp_path)]) == 0
+    page = (tmp_path / "results.md").read_text()
+    assert "old" not in page
+    assert page.startswith("before")
+    assert page.rstrip().endswith("after")
+    assert "| hand in corner | qp | 40 |" in page
+    assert "| arm in corner | paper | 2146 | 20.49 |" in page
+    assert (tmp_path / "assets" / "interaction" / "hand_in_corner-qp.svg").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["hand_on_tabel"], "no scene is called 'hand_on_tabel'; did you mean hand_on_table"),
+        (["two_arms", "--overlap", "springs"], "--overlap: no way to remove overlap is called 'springs'"),
+        (["two_arms", "--frames", "0"], "give 1 or more"),
+    ],
+)
+def test_mistakes_are_said_in_one_sentence(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["interact", *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_the_ghost_moves(tmp_path: Path) -> None:
+    import wholebody as wb
+    from wholebody.view.style import GHOST_NODE
+
+    hand = wb.load("hand")
+    scene = wb.Scene(hand)
+    shown = np.tile(hand.neutral, (3, 1))
+    ghost = shown.copy()
+    ghost[:, 0] = 0.0, 0.1, 0.2
+    with wb.Viewer(scene) as viewer:
+        viewer.play(shown, 0.1, ghost=ghost)
+        tracks = viewer._stage.store.animation
+        assert GHOST_NODE in str(tracks)
+        with pytest.raises(wb.InputError, match="the ghost has 2 postures and the motion 3"):
+            viewer.play(shown, 0.1, ghost=ghost[:2])

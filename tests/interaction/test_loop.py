@@ -1,0 +1,165 @@
+"""The frame loop on a hand above a table: what is shown is never inside, and as near to the tracker as can be."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.interaction import FrameLoop, Track, follow
+from wholebody.interaction.nearest import CLEARANCE
+
+
+def at(hand: wb.Figure, x: float, z: float, posture: str = "relaxed") -> Any:
+    q = hand.posture(posture)
+    q[0], q[2] = x, z
+    return q
+
+
+def test_free_motion_is_followed_exactly(hand: wb.Figure, scene: wb.Scene) -> None:
+    q = np.array([at(hand, 0.01 * k, 0.5) for k in range(20)])
+    shown = follow(scene, Track.of(hand, q, 1 / 60), rigid=True)
+    np.testing.assert_allclose(shown.q, q, atol=1e-9)
+    assert not shown.pairs.any()
+    assert not shown.joints.any()
+    assert (shown.seconds >= shown.contact_seconds + shown.solve_seconds - 1e-6).all()
+
+
+@pytest.mark.parametrize("posture", ["relaxed", "grip"])
+def test_the_hand_slides_on_the_table_as_a_whole(hand: wb.Figure, scene: wb.Scene, least: Any, posture: str) -> None:
+    resting = hand.posture(posture)[2]  # of the wrist, with the lowest point at z = 0
+    heights = np.concatenate([np.linspace(0.15, -0.08, 25), np.full(25, -0.08)])
+    q = np.array([at(hand, 0.004 * k, z, posture) for k, z in enumerate(heights)])
+    recording = follow(scene, Track.of(hand, q, 1 / 60), rigid=True)
+    assert min(least(scene, shown) for shown in recording.q) > 0.0
+    last = recording.q[-1]
+    # The nearest place is straight above: the height at which the lowest point is one clearance over the table.
+    assert last[2] == pytest.approx(resting + CLEARANCE, abs=2e-4)
+    np.testing.assert_allclose(last[:2], q[-1, :2], atol=2e-3)
+    np.testing.assert_allclose(last[7:], q[-1, 7:], atol=2e-3)  # the fingers follow the glove
+
+
+def test_attraction_goes_on_at_rest(hand: wb.Figure, scene: wb.Scene) -> None:
+    loop = FrameLoop(scene, at(hand, 0.0, 0.3), rigid=True)
+    target = at(hand, 0.8, 0.3)
+    way = [float(np.linalg.norm(loop.frame(target).q[:3] - target[:3])) for _ in range(40)]
+    assert all(later < earlier or later < 1e-9 for earlier, later in pairwise(way))
+    assert way[-1] < 1e-9
+    assert way[0] > 0.7  # it does not jump there
+
+
+def test_what_is_released_is_back_within_thirty_frames(hand: wb.Figure, scene: wb.Scene) -> None:
+    down, up = at(hand, 0.0, -0.1), at(hand, 0.1, 0.3, "open")
+    loop = FrameLoop(scene, at(hand, 0.0, 0.2), rigid=True)
+    for _ in range(40):
+        loop.frame(down)
+    assert np.abs(pin.difference(hand.model, down, loop.shown)).max() > 0.1
+    for _ in range(30):
+        loop.frame(up)
+    assert np.abs(pin.difference(hand.model, up, loop.shown)).max() < 1e-3
+
+
+def test_nothing_is_jumped_over(hand: wb.Figure, least: Any) -> None:
+    scene = wb.Scene(hand).add(wb.Box((2.0, 2.0, 0.004)), name="sheet", at=(0.0, 0.0, 0.0))
+    loop = FrameLoop(scene, at(hand, 0.0, 0.4), rigid=True)
+    for _ in range(30):
+        before = loop.shown
+        frame = loop.frame(at(hand, 0.0, -0.4))
+        for share in np.linspace(0.0, 1.0, 6):
+            assert least(scene, pin.interpolate(hand.model, before, frame.q, share)) > -1e-4
+    assert loop.shown[2] > 0.0
+
+
+def test_the_same_seed_gives_the_same_frames(hand: wb.Figure) -> None:
+    q = np.array([at(hand, 0.005 * k, 0.1 - 0.01 * k) for k in range(20)])
+    runs = []
+    for _ in range(2):
+        scene = wb.Scene(hand).add(wb.HalfSpace(), name="table")
+        runs.append(follow(scene, Track.of(hand, q, 1 / 60), seed=5, rigid=True).q)
+    np.testing.assert_array_equal(runs[0], runs[1])
+
+
+def test_a_start_in_penetration_is_freed_and_noted(hand: wb.Figure, scene: wb.Scene, least: Any) -> None:
+    deep = at(hand, 0.0, 0.02)
+    recording = follow(scene, Track.of(hand, [deep, deep], 1 / 60), rigid=True)
+    assert recording.notes[0].startswith("frame 0: ")
+    assert "inside table" in recording.notes[0]
+    assert recording.notes[1] == ""
+    assert least(scene, recording.q[0]) > 0.0
+
+
+def test_a_start_that_cannot_be_freed_is_refused() -> None:
+    arm = wb.load("avatar").reduced(["right_wrist_flexion", "right_wrist_deviation"])
+    place = pin.neutral(arm.model)
+    scene = wb.Scene(arm)
+    data = arm.model.createData()
+    pin.framesForwardKinematics(arm.model, data, place)
+    wrist = data.oMf[arm.frame_id("right_hand")].translation
+    scene.add(wb.Box((0.8, 0.7, 0.6)), name="boulder", at=wrist + [0.03, -0.36, 0.05])
+    with pytest.raises(wb.InputError, match=r"frame 0: right_hand is .* mm inside boulder.*begin the track outside"):
+        follow(scene, Track.of(arm, [place], 1 / 60))
+
+
+def test_a_dropped_out_frame_is_held_and_noted(hand: wb.Figure, scene: wb.Scene) -> None:
+    loop = FrameLoop(scene, at(hand, 0.0, 0.3), rigid=True)
+    shown = loop.frame(at(hand, 0.01, 0.3)).q
+    lost = at(hand, 0.02, 0.3)
+    lost[9] = np.nan
+    for bad in (lost, lost[:-1]):
+        frame = loop.frame(bad)
+        np.testing.assert_array_equal(frame.q, shown)
+        assert f"frame {loop.count - 1}" in frame.note
+        assert "held" in frame.note
+    assert loop.frame(at(hand, 0.02, 0.3)).note == ""
+
+
+def test_tracked_angles_out_of_limits_are_shown_at_the_limit(hand: wb.Figure, scene: wb.Scene) -> None:
+    loop = FrameLoop(scene, at(hand, 0.0, 0.3), rigid=True)
+    bent = hand.with_joints(at(hand, 0.0, 0.3), {"right_index_pip_flexion": 3.5})
+    for _ in range(30):
+        shown = loop.frame(bent).q
+    assert hand.within_limits(shown)
+    np.testing.assert_allclose(shown, hand.clamp(bent), atol=1e-9)
+
+
+def test_settings_are_checked(hand: wb.Figure, scene: wb.Scene) -> None:
+    with pytest.raises(wb.UnknownNameError, match="overlap"):
+        FrameLoop(scene, hand.neutral, overlap="springs")
+    with pytest.raises(wb.InputError, match="dt"):
+        FrameLoop(scene, hand.neutral, dt=0.0)
+    for start in (hand.neutral[:-1], np.full(hand.model.nq, np.nan)):
+        with pytest.raises(wb.InputError, match="frame 0"):
+            FrameLoop(scene, start)
+
+
+def test_driven_objects_come_first(hand: wb.Figure, scene: wb.Scene) -> None:
+    """In every frame: the tracked posture within limits, then removal of overlap, then the check of the way."""
+    loop = FrameLoop(scene, at(hand, 0.0, 0.3), rigid=True)
+    order: list[str] = []
+
+    class Spy:
+        def remove(self, shown: Any, tracked: Any) -> Any:
+            order.append("remove")
+            assert hand.within_limits(tracked)
+            np.testing.assert_array_equal(shown, loop.shown)
+            return remover.remove(shown, tracked)
+
+    remover, loop._remover = loop._remover, Spy()
+    first_contact = scene.sweeper.first_contact
+
+    def sweep(*ways: Any, **options: Any) -> Any:
+        order.append("sweep")
+        return first_contact(*ways, **options)
+
+    scene.sweeper.first_contact = sweep  # type: ignore[method-assign]
+    done: list[int] = []
+    follow_track = [at(hand, 0.0, 0.3 - 0.02 * k) for k in range(3)]
+    for tracked in follow_track:
+        loop.frame(tracked)
+        done.append(loop.count)
+    assert order == ["remove", "sweep"] * 3
+    assert done == [1, 2, 3]

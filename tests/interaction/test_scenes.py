@@ -1,0 +1,91 @@
+"""Every scene around its first contact: judged pair by pair, and between the frames too."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.interaction import SCENES, Recording, build_scene, follow, gallery, judge
+from wholebody.interaction.judging import overlaps
+from wholebody.tasks import ReachCones
+
+BEFORE, AFTER = 8, 32
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_shown_figure_stays_outside(name: str, least: Any) -> None:
+    made = build_scene(name)
+    scene, track = made.scene, made.track
+    assert len(track) >= 600
+    coarse = np.arange(0, len(track), 6)
+    first = int(coarse[np.argmax(overlaps(scene, track.q[coarse])[0] > 5e-3)])
+    part = track.part(first - BEFORE, first + AFTER)
+    recording = follow(scene, part, rigid=made.rigid)
+    assert min(least(scene, q) for q in part.q) < -0.01  # the tracked one goes in
+    assert min(least(scene, q) for q in recording.q) > -1e-5
+    for a, b in zip(recording.q[:-1:2], recording.q[1::2], strict=True):
+        assert least(scene, pin.interpolate(scene.model, a, b, 0.5)) > -1e-4
+    assert all(scene.figure.within_limits(q) for q in recording.q)
+    if scene.figure.cones:
+        cones = ReachCones().resolve(scene, part.q[0])
+        assert min(cones.value(scene.state(q)).min() for q in recording.q) > -1e-6
+    free = judge(scene, recording).tracked_depth < 1e-5
+    apart = [np.abs(pin.difference(scene.model, *pair)).max() for pair in zip(part.q, recording.q, strict=True)]
+    assert max(np.array(apart)[free]) < 0.05  # the clearance is kept where the tracked posture only comes near
+    assert recording.notes == ("",) * len(part)
+
+
+def test_the_gallery_has_two_rooms_and_some_twenty_things() -> None:
+    figure = wb.load("avatar")
+    scene = gallery(figure)
+    assert 20 <= len(scene.objects) <= 25
+    owners = scene.piece_owner
+    assert owners.count("torus") > 5
+    q = figure.posture("standing")
+    q[0] = -2.5
+    assert not scene.contacts(q, within=-1e-6).distance.size  # there is room to stand
+    walls = [name for name in scene.objects if "wall" in name]
+    assert len(walls) == 6
+
+
+def test_frames_cut_or_repeat_the_script() -> None:
+    whole = build_scene("hand_on_table").track
+    np.testing.assert_array_equal(build_scene("hand_on_table", frames=30).track.q, whole.q[:30])
+    longer = build_scene("hand_on_table", frames=len(whole) + 5).track
+    np.testing.assert_array_equal(longer.q[-5:], whole.q[:5])
+    assert not np.array_equal(build_scene("hand_on_table", seed=1).track.q, whole.q)
+    with pytest.raises(wb.UnknownNameError, match="hand_on_table"):
+        build_scene("hand_on_tabel")
+
+
+def test_judging_finds_what_is_planted(hand: wb.Figure, scene: wb.Scene) -> None:
+    """A hand that is shown 5 mm deep, that jumps through the table, and that leaves a limit."""
+
+    def at(z: float) -> Any:
+        q = hand.posture("relaxed")
+        q[2] = z
+        return q
+
+    rest = hand.posture("relaxed")[2]  # the wrist when the lowest part is on the table
+    bent = hand.with_joints(at(rest + 0.2), {"right_index_pip_flexion": 3.0})
+    shown = [at(rest + 0.2), at(rest - 0.005), at(-0.8), bent, *[at(rest + 0.2)] * 40]
+    tracked = [at(rest + 0.2), at(rest - 0.03), at(-0.8), bent, *[at(rest + 0.2)] * 40]
+    count = len(shown)
+    zeros, none = np.zeros(count), np.zeros(count, dtype=np.intp)
+    judged = judge(
+        scene,
+        Recording(np.array(shown), np.array(tracked), 0.02, "qp", zeros, zeros, zeros, none, none, none, ("",) * count),
+    )
+    assert judged.depth[1] == pytest.approx(0.005, abs=1e-4)
+    assert judged.tracked_depth[1] == pytest.approx(0.03, abs=1e-4)
+    assert judged.tracked_pairs[1] >= 1
+    assert 2 in judged.passed
+    assert 3 in judged.passed
+    assert judged.limit_violation == pytest.approx(3.0 - hand.limits.upper.max(), abs=0.3)
+    assert judged.root_distance[1] == pytest.approx(0.025)
+    assert judged.distance[0] == 0.0
+    assert judged.returns == ((2, 0),)

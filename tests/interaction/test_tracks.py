@@ -1,0 +1,129 @@
+"""Tracks: what they hold, and what is refused with frame and place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.interaction import Track, posed, read_track, write_track
+from wholebody.interaction.scripts import script, smooth
+
+
+def track(hand: wb.Figure, frames: int = 5) -> Track:
+    return Track.of(hand, np.tile(hand.neutral, (frames, 1)), 0.02, "glove")
+
+
+def test_values_that_are_not_finite_are_named_by_frame_and_joint(hand: wb.Figure) -> None:
+    q = np.tile(hand.neutral, (5, 1))
+    q[3, 7] = np.nan
+    with pytest.raises(wb.InputError, match=r"glove: frame 3, joint right_index_mcp_flexion is nan"):
+        Track.of(hand, q, 0.02, "glove")
+    q = np.tile(hand.neutral, (5, 1))
+    q[2, 1] = np.inf
+    with pytest.raises(wb.InputError, match=r"frame 2, value 1 of the root"):
+        Track.of(hand, q, 0.02)
+
+
+def test_wrong_shapes_and_steps_are_refused(hand: wb.Figure) -> None:
+    for q in (np.zeros((0, hand.model.nq)), hand.neutral):
+        with pytest.raises(wb.InputError, match="at least one frame"):
+            Track.of(hand, q, 0.02)
+    with pytest.raises(wb.InputError, match="do not fit 18 joints"):
+        Track.of(hand, np.zeros((3, 20)), 0.02)
+    with pytest.raises(wb.InputError, match="dt is 0"):
+        Track.of(hand, [hand.neutral], 0.0)
+
+
+def test_a_track_of_another_figure_is_refused(hand: wb.Figure) -> None:
+    q = np.tile(hand.neutral, (4, 1))
+    renamed = ("index_curl", *hand.joints[1:])
+    with pytest.raises(wb.UnknownNameError, match="no joint is called 'index_curl'"):
+        Track(q, 0.02, renamed).check(hand)
+    with pytest.raises(wb.InputError, match="lacks right_index_mcp_flexion"):
+        Track(q[:, 1:], 0.02, hand.joints[1:]).check(hand)
+    with pytest.raises(wb.InputError, match="another order"):
+        Track(q, 0.02, hand.joints[::-1]).check(hand)
+    q[2, 3:7] *= 1.2
+    with pytest.raises(wb.InputError, match="frame 2, the root's quaternion"):
+        Track.of(hand, q, 0.02).check(hand)
+    track(hand).check(hand)
+
+
+def test_parts_and_repetitions(hand: wb.Figure) -> None:
+    q = np.tile(hand.neutral, (4, 1))
+    q[:, 0] = range(4)
+    whole = Track.of(hand, q, 0.02)
+    assert whole.part(1, 3).q[:, 0].tolist() == [1.0, 2.0]
+    assert whole.repeated(6).q[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 0.0, 1.0]
+    for bad in (lambda: whole.part(3, 3), lambda: whole.repeated(0)):
+        with pytest.raises(wb.InputError):
+            bad()
+
+
+def test_placements_and_glove_angles(hand: wb.Figure) -> None:
+    angles: dict[str, Any] = {"right_index_pip_flexion": [0.0, 0.1, 0.2], "right_thumb_ip_flexion": 0.3}
+    made = posed(hand, roots=[(0.1, 0.2, 0.3)] * 3, angles=angles, posture="open", dt=0.02)
+    assert [hand.joint_values(q)["right_index_pip_flexion"] for q in made.q] == [0.0, 0.1, 0.2]
+    assert all(hand.joint_values(q)["right_thumb_ip_flexion"] == 0.3 for q in made.q)
+    np.testing.assert_allclose(made.q[:, :7], [[0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0]] * 3)
+    with pytest.raises(wb.InputError, match=r"different length .*right_index_pip_flexion 3, root 2"):
+        posed(hand, roots=[(0.0, 0.0, 0.0)] * 2, angles=angles, dt=0.02)
+    with pytest.raises(wb.InputError, match="frame 1"):
+        posed(hand, roots=[(0.0, 0.0, 0.0), (0.0, np.nan, 0.0)], dt=0.02)
+    with pytest.raises(wb.UnknownNameError):
+        posed(hand, angles={"right_index_pip": [0.0]}, dt=0.02)
+
+
+def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> None:
+    written = track(hand)
+    path = write_track(written, tmp_path / "glove.csv")
+    read = read_track(path, hand)
+    np.testing.assert_array_equal(read.q, written.q)
+    assert read.dt == pytest.approx(written.dt)
+    lines = path.read_text().splitlines()
+    columns = [line.split(",") for line in lines]
+    path.write_text("\n".join(",".join(reversed(line)) for line in columns))
+    np.testing.assert_array_equal(read_track(path, hand).q, written.q)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda lines: [lines[0].replace("right_thumb_ip_flexion", "thumb"), *lines[1:]],
+            "line 1: no column .*'thumb'",
+        ),
+        (lambda lines: [line.rsplit(",", 1)[0] for line in lines], "line 1: the columns lack right_thumb_ip_flexion"),
+        (lambda lines: [*lines[:3], lines[3] + ",1.0", *lines[4:]], "line 4: 27 values for 26 columns"),
+        (lambda lines: [*lines[:2], lines[2].replace("0.5", "x", 1), *lines[3:]], "line 3: could not convert"),
+        (lambda lines: [*lines[:3], "9" + lines[3], *lines[4:]], "line 4: the time step changes"),
+        (lambda lines: lines[:2], "at least two frames"),
+    ],
+)
+def test_broken_files_are_named_by_line(hand: wb.Figure, tmp_path: Path, change: Any, message: str) -> None:
+    path = write_track(track(hand), tmp_path / "glove.csv")
+    path.write_text("\n".join(change(path.read_text().splitlines())))
+    with pytest.raises(wb.WholebodyError, match=message):
+        read_track(path, hand)
+
+
+def test_scripts_are_smooth_and_seeded(hand: wb.Figure) -> None:
+    assert [smooth(s) for s in (0.0, 0.5, 1.0)] == [0.0, 0.5, 1.0]
+    away = hand.posture("grip")
+    away[:3] = 0.3, 0.1, 0.5
+    keys = [(0.0, hand.neutral), (1.0, away), (0.5, away)]
+    made = script(hand, keys, dt=0.01, seed=3)
+    assert len(made) == 151
+    np.testing.assert_allclose(made.q[0], hand.neutral, atol=1e-12)
+    np.testing.assert_allclose(made.q[-1], away, atol=1e-12)
+    np.testing.assert_array_equal(made.q, script(hand, keys, dt=0.01, seed=3).q)
+    assert not np.array_equal(made.q, script(hand, keys, dt=0.01, seed=4).q)
+    speed = np.array([pin.difference(hand.model, a, b) for a, b in zip(made.q[:-1], made.q[1:], strict=True)]) / 0.01
+    farthest = np.linalg.norm(away[:3] - hand.neutral[:3])
+    assert np.linalg.norm(speed[:, :3], axis=1).max() == pytest.approx(1.875 * farthest, rel=0.1)
+    assert np.abs(np.diff(speed, axis=0)).max() < 0.2

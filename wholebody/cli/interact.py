@@ -1,0 +1,177 @@
+"""`wholebody interact`: a tracked figure goes into things frame by frame; the shown one does not."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from wholebody.bench.interaction import InteractionRow
+    from wholebody.interaction import InteractionScene, Judgement, Recording
+
+HELP = "follow a tracker frame by frame through a gallery without going into walls"
+DESCRIPTION = """\
+Run a scene: a scripted tracker moves a hand or an avatar into walls, tables and itself, and the figure that is shown
+follows as far as contact allows. Prints a table of times and of what is left of the overlap, judged independently, and
+writes per frame numbers (CSV), a chart of the frame times (PNG, SVG) and the animation with the tracked posture as a
+ghost (HTML, opens without a network)."""
+EPILOG = """\
+examples:
+  wholebody interact --list
+  wholebody interact two_arms
+  wholebody interact all --out out/interact
+exit code: 1 if a frame overlaps by more than is allowed, passes through something or leaves a joint limit"""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser("interact", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help="which scene, or all")
+    parser.add_argument("--list", action="store_true", help="list the scenes")
+    parser.add_argument("--overlap", default="qp", metavar="METHOD", help="how overlap is removed (default: qp)")
+    parser.add_argument("--frames", type=int, metavar="N", help="cut or repeat the script (default: all of it, once)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is random (default: 0)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/interact"), metavar="DIR", help="folder (default: out/interact)"
+    )
+    parser.add_argument(
+        "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
+        help="write the tables and charts into the documentation too (default folder: docs)",
+    )  # fmt: skip
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """List the scenes, or run one or all."""
+    from wholebody.bench.interaction import report
+    from wholebody.bench.machine import machine
+    from wholebody.bench.tables import write_text
+    from wholebody.errors import InputError, UnknownNameError
+    from wholebody.interaction import SCENES, build_scene
+    from wholebody.interaction.loop import OVERLAPS
+
+    if arguments.list:
+        for name, about in SCENES.items():
+            print(f"{name:18} {about}")
+        return 0
+    if arguments.scene is None:
+        raise InputError(f"name a scene: {', '.join(SCENES)}, or all; see wholebody interact --list")
+    names = list(SCENES) if arguments.scene == "all" else [arguments.scene]
+    chosen = list(OVERLAPS) if arguments.overlap == "all" else [arguments.overlap]
+    for overlap in chosen:
+        if overlap not in OVERLAPS:
+            raise UnknownNameError("way to remove overlap", overlap, OVERLAPS, "--overlap")
+    facts, rows = machine(), []
+    for name in names:
+        scene = build_scene(name, frames=arguments.frames, seed=arguments.seed)
+        rows += [_run_one(scene, overlap, arguments.seed, arguments.out, facts) for overlap in chosen]
+    text = report(rows, facts)
+    label = f"{arguments.scene}-{arguments.overlap}"
+    write_text(arguments.out / f"{label}.md", text + "\n")
+    _print(rows)
+    print(f"wrote {arguments.out}")
+    if arguments.update_docs is not None:
+        _update(arguments.update_docs, text, rows, arguments.out)
+    held = all(
+        row.depth_mm <= 1.0 and not row.passed and max(row.limit_rad, row.cone_rad) < 1e-6 for row in rows
+    )  # fmt: skip
+    return 0 if held else 1
+
+
+def _run_one(
+    scene: InteractionScene, overlap: str, seed: int, out: Path, facts: dict[str, str]
+) -> InteractionRow:  # fmt: skip
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from wholebody.bench.interaction import frame_chart, frame_rows, summary
+    from wholebody.bench.tables import write_rows
+    from wholebody.interaction import follow, judge
+
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
+        task = bar.add_task(f"{scene.name}, {overlap}", total=len(scene.track))
+        recording = follow(
+            scene.scene, scene.track, overlap=overlap, seed=seed, rigid=scene.rigid,
+            progress=lambda done: bar.update(task, completed=done),
+        )  # fmt: skip
+        bar.update(task, description="judging every pair of every frame")
+        judged = judge(scene.scene, recording)
+    rows = frame_rows(scene.name, recording, judged)
+    out.mkdir(parents=True, exist_ok=True)
+    write_rows(out / f"{scene.name}-{overlap}.csv", facts, rows)
+    frame_chart(rows, out / f"{scene.name}-{overlap}")
+    _animation(scene, recording, out / f"{scene.name}-{overlap}.html")
+    _notes(recording, judged)
+    return summary(scene.name, recording, judged)
+
+
+def _animation(scene: InteractionScene, recording: Recording, path: Path) -> None:
+    from wholebody.view import Viewer
+
+    with Viewer(scene.scene, see_through=scene.see_through, title=scene.name) as viewer:
+        viewer.look(eye=scene.eye, target=scene.target)
+        viewer.play(recording, ghost=recording.tracked, repeat=float("inf"))
+        viewer.save(path)
+
+
+def _notes(recording: Recording, judged: Judgement) -> None:
+    """Print the first notes: no frame is lost silently."""
+    noted = [note for note in recording.notes if note]
+    for note in noted[:5]:
+        print(note)
+    if len(noted) > 5:
+        print(f"... and {len(noted) - 5} frames more with a note; see the CSV file")
+    for frame in judged.passed[:5]:
+        print(f"frame {frame}: something passes through something on the way to it")
+
+
+def _print(rows: list[InteractionRow]) -> None:
+    from rich.console import Console
+
+    from wholebody.bench.interaction import PAPER
+    from wholebody.cli.tables import table
+
+    times = table(
+        "scene", "overlap", "frames", "mean ms", "p95", "p99", "max", "joints", "iter", "IK %", "pairs", "queries %",
+        title="per frame",
+    )  # fmt: skip
+    left = table(
+        "scene", "overlap", "left mm", "tracked mm", "passed", "limits", "cones", "off rad", "root mm", "jerk",
+        "tracked", "back after", "missed", title="what is left",
+    )  # fmt: skip
+    for row in rows:
+        times.add_row(
+            row.scene, row.overlap, str(row.frames), f"{row.mean_ms:.2f}", f"{row.p95_ms:.2f}", f"{row.p99_ms:.2f}",
+            f"{row.max_ms:.1f}", f"{row.joints:.0f}", f"{row.iterations:.1f}", f"{row.ik_percent:.0f}",
+            f"{row.tracked_pairs:.1f}", f"{row.query_percent:.0f}",
+        )  # fmt: skip
+        back = "never" if row.latest < 0 else f"{row.latest} frames" if row.returns else "no end"
+        left.add_row(
+            row.scene, row.overlap, f"{row.depth_mm:.4f}", f"{row.tracked_depth_mm:.0f}", str(row.passed),
+            f"{row.limit_rad:.0e}", f"{row.cone_rad:.0e}", f"{row.distance_rad:.3f}", f"{row.root_distance_mm:.1f}",
+            f"{row.jerk:.0f}", f"{row.tracked_jerk:.0f}", back, "; ".join(row.misses) or "nothing",
+        )  # fmt: skip
+    for scene, frames, ms, joints, turns, ik, pairs, queries in PAPER:
+        times.add_row(scene, "paper", frames, ms, "", "", "", joints, turns, ik, pairs, queries)
+    console = Console(width=max(120, Console().width))
+    console.print(times)
+    console.print(left)
+
+
+def _update(docs: Path, text: str, rows: list[InteractionRow], out: Path) -> None:
+    import shutil
+
+    from wholebody.bench.tables import replace_section
+
+    folder = docs / "assets" / "interaction"
+    folder.mkdir(parents=True, exist_ok=True)
+    pictures = []
+    for row in rows:
+        name = f"{row.scene}-{row.overlap}.svg"
+        shutil.copyfile(out / name, folder / name)
+        pictures.append(f"![Frame time of {row.scene.replace('_', ' ')}](assets/interaction/{name})")
+    replace_section(docs / "results.md", "interaction", "\n\n".join([text, *pictures]))
+    print(f"wrote {docs / 'results.md'}")

@@ -1,0 +1,26 @@
+"""Interaction: a figure that follows a tracker frame by frame among things, in contact and never inside them."""
+
+from wholebody.interaction.judging import Judgement, judge
+from wholebody.interaction.loop import FrameLoop, follow
+from wholebody.interaction.recording import Frame, Recording
+from wholebody.interaction.rooms import gallery
+from wholebody.interaction.scenes import SCENES, InteractionScene, build_scene
+from wholebody.interaction.track_files import read_track, write_track
+from wholebody.interaction.tracks import Track, posed
+
+__all__ = [
+    "SCENES",
+    "Frame",
+    "FrameLoop",
+    "InteractionScene",
+    "Judgement",
+    "Recording",
+    "Track",
+    "build_scene",
+    "follow",
+    "gallery",
+    "judge",
+    "posed",
+    "read_track",
+    "write_track",
+]

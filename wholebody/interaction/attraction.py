@@ -1,0 +1,63 @@
+"""What draws the shown posture to the tracked one, and how fast it may follow.
+
+Unlike other terms these two change between steps: they stand for the tracker, which is read in every frame.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.figures.state import State
+from wholebody.tasks.base import Bound, Measure
+from wholebody.tasks.distance import SquaredDistance
+
+Array = NDArray[np.float64]
+
+
+class Attraction(Measure):
+    """Weighted squared distance from the tracked posture: ``sum_i w_i d_i^2``, d the tangent vector from there.
+
+    Its unconstrained minimum is the tracked posture itself, which one program reaches in one step where nothing is in
+    the way; in contact the minimum is the nearest posture that touches. A goal would say something else: it is met at
+    any price in the other joints, and its pull does not grow with the distance.
+    """
+
+    def __init__(self, model: pin.Model, q: Array, weights: Array) -> None:
+        """Attract to q (nq,) with weights (nv,), 1/rad^2 and 1/m^2."""
+        self._distance = SquaredDistance.build(model, q, weights)
+
+    def toward(self, q: Array) -> None:
+        """Attract to another posture (nq,) from now on."""
+        self._distance.reference[:] = q
+
+    def value(self, state: State) -> float:
+        """The squared distance."""
+        return self._distance.value(state)
+
+    def gradient(self, state: State) -> Array:
+        """(nv,) its derivative."""
+        return self._distance.gradient(state)
+
+    def curvature(self, state: State) -> Array:
+        """(nv,) its second derivative; exact for joints of one degree of freedom."""
+        return self._distance.curvature
+
+
+class Pace(Bound):
+    """Bounds how far a whole frame moves, however many steps it takes."""
+
+    def __init__(self, model: pin.Model, limit: Array) -> None:
+        """Allow `limit` (nv,) a frame to either side, radians and metres."""
+        self._limit = limit
+        self._begin = pin.neutral(model)
+
+    def begin(self, q: Array) -> None:
+        """Count from the posture q (nq,)."""
+        self._begin = np.array(q)
+
+    def bounds(self, state: State, dt: float | None) -> tuple[Array, Array]:
+        """What is left of the frame's way."""
+        gone = np.asarray(pin.difference(state.model, self._begin, state.q))
+        return np.minimum(-self._limit - gone, 0.0), np.maximum(self._limit - gone, 0.0)

@@ -1,0 +1,208 @@
+"""The frame loop: driven objects first, each coupled to its tracker and freed of overlap; then what moves by itself.
+
+Schmidl and Lin, "Real-time physically-based interaction between avatars and virtual environments", figure 3. The figure
+(with what it carries) is the driven object, the things of the scene are fixed. In every frame, at rest too, the figure
+is attracted to the tracked posture as far as contact allows.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.interaction.attraction import Attraction
+from wholebody.interaction.nearest import CLEARANCE, NearestPosture, Removal, weights
+from wholebody.interaction.recording import Frame, Recording
+from wholebody.interaction.scripts import FRAME
+from wholebody.interaction.tracks import Track
+from wholebody.methods.qp.method import QP
+from wholebody.problem import Problem
+from wholebody.scene import Scene
+from wholebody.tasks import ReachCones
+
+Array = NDArray[np.float64]
+
+OVERLAPS = ("qp",)
+GRAZE = 5e-5
+"""Depth, metres, that the way from frame to frame may have on its course; coal's distances are good to 1e-6."""
+
+SHARES = (0.5, 0.25)
+"""Of the way, tried when all of it is not free: what keeps to a surface leaves it by the square of the share."""
+
+BEFORE = 0.9  # share of the free part of a way that is gone where nothing else is free: nothing is shown touching
+
+INSIDE = 1e-5  # m: deeper than this a posture is called inside of something
+
+
+class Remover(Protocol):
+    """A way to remove overlap."""
+
+    def remove(self, shown: Array, tracked: Array) -> Removal:
+        """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""
+
+
+class FrameLoop:
+    """Shows a figure that follows a tracker, frame by frame, and is never inside of things.
+
+    Attributes:
+        scene: the figure among things.
+        shown: (nq,) the posture that is shown now.
+        overlap: how overlap is removed.
+        count: frames so far.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        start: ArrayLike,
+        *,
+        overlap: str = "qp",
+        dt: float = FRAME,
+        seed: int = 0,
+        rigid: bool = False,
+    ) -> None:
+        """Begin.
+
+        Args:
+            scene: the figure among things.
+            start: (nq,) tracked posture of the beginning; where it overlaps something, the nearest posture that does
+                not is shown.
+            overlap: "qp": the nearest posture without overlap by programs.
+            dt: seconds from frame to frame.
+            seed: of what is done in random order.
+            rigid: whether the figure is displaced as a whole, as a hand is, while its joints follow the tracker.
+
+        Raises:
+            UnknownNameError: another overlap.
+            InputError: the start has the wrong shape, is not finite, or no posture near it is free of overlap.
+        """
+        if overlap not in OVERLAPS:
+            raise UnknownNameError("way to remove overlap", overlap, OVERLAPS, "overlap")
+        if not (np.isfinite(dt) and dt > 0.0):
+            raise InputError(f"dt is {dt!r}; give seconds from frame to frame, such as 1/60")
+        self.scene, self.overlap, self.count = scene, overlap, 0
+        q = np.array(start, dtype=float)
+        if q.shape != (scene.model.nq,) or not np.isfinite(q).all():
+            raise InputError(f"frame 0: a tracked posture is ({scene.model.nq},) finite numbers, not {q.shape}")
+        self.shown, self._note = free_start(scene, q, rigid)
+        self._remover = self._made(overlap, dt, seed, rigid)
+
+    def frame(self, tracked: ArrayLike) -> Frame:
+        """Show one frame.
+
+        A tracked posture that cannot be read (a sensor that dropped out) leaves the figure where it is; the note of the
+        frame says so.
+
+        Args:
+            tracked: (nq,) what the tracker says.
+        """
+        began = time.perf_counter()
+        goal = np.asarray(tracked, dtype=float)
+        if goal.shape != self.shown.shape or not np.isfinite(goal).all():
+            note = f"frame {self.count}: the tracked posture is not {len(self.shown)} finite numbers; held"
+            return self._shown(Removal((self.shown,), 0.0, 0.0, 0, 0, 0, note), began)
+        removal = self._remover.remove(self.shown, self._readable(goal))
+        # Simulated objects would move here, after the driven ones have found their places.
+        return self._shown(self._kept_from_passing(removal), began)
+
+    def _shown(self, removal: Removal, began: float) -> Frame:
+        note = "; ".join(part for part in (self._note, removal.note) if part)
+        self.shown, self._note, self.count = np.array(removal.ways[0]), "", self.count + 1
+        return Frame(
+            self.shown, time.perf_counter() - began, removal.contact_seconds, removal.solve_seconds,
+            removal.iterations, removal.joints, removal.pairs, note,
+        )  # fmt: skip
+
+    def _readable(self, goal: Array) -> Array:
+        """The tracked posture within limits and with a quaternion of unit length."""
+        return self.scene.figure.clamp(pin.normalize(self.scene.model, goal))
+
+    def _kept_from_passing(self, removal: Removal) -> Removal:
+        """The first posture whose way from the one shown is free; else a part of its way (algorithm 1, step 4)."""
+        began = time.perf_counter()
+        nearest = removal.ways[-1]
+        parts = (np.asarray(pin.interpolate(self.scene.model, self.shown, nearest, share)) for share in SHARES)
+        note, contact = removal.note, None
+        for q in itertools.chain(removal.ways, parts):
+            contact = self.scene.sweeper.first_contact(self.shown, q, tolerance=GRAZE)
+            if contact is None:
+                break
+        if contact is not None:
+            owners = " and ".join(self.scene.piece_owner[piece] for piece in contact.pair)
+            q = np.asarray(pin.interpolate(self.scene.model, self.shown, q, BEFORE * contact.fraction))
+            stop = f"frame {self.count}: the way is not free, {owners} would pass; held back"
+            note = "; ".join(part for part in (note, stop) if part)
+        spent = removal.contact_seconds + time.perf_counter() - began
+        return removal._replace(ways=(q,), contact_seconds=spent, note=note)
+
+    def _made(self, overlap: str, dt: float, seed: int, rigid: bool) -> Remover:
+        return NearestPosture(self.scene, self.shown, dt, rigid)
+
+
+def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
+    """The posture q, or the nearest one that is inside nothing, with a note of what was done.
+
+    Raises:
+        InputError: no posture near it is free of overlap.
+    """
+    q = scene.figure.clamp(pin.normalize(scene.model, q))
+    deepest = deepest_overlap(scene, q)
+    if not deepest:
+        return q, ""
+    attraction = Attraction(scene.model, q, weights(scene, rigid))
+    cones = [ReachCones()] if scene.figure.cones else []
+    solution = QP().solve(Problem(scene, q, constraints=cones, measures=[attraction], clearance=CLEARANCE))
+    if deepest_overlap(scene, solution.q):
+        raise InputError(
+            f"frame 0: {deepest}, and no posture near it is free of overlap; begin the track outside of things"
+        )
+    return solution.q, f"frame 0: {deepest}; the nearest posture without overlap is shown"
+
+
+def deepest_overlap(scene: Scene, q: Array) -> str:
+    """The deepest overlap at q in words, or "" where there is none."""
+    contacts = scene.contacts(q, within=-INSIDE)
+    if not len(contacts.distance):
+        return ""
+    first, second = (scene.piece_owner[piece] for piece in contacts.pair[0])
+    return f"{first} is {-1e3 * contacts.distance[0]:.1f} mm inside {second}"
+
+
+def follow(
+    scene: Scene,
+    track: Track,
+    *,
+    overlap: str = "qp",
+    seed: int = 0,
+    rigid: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> Recording:
+    """Follow a whole track.
+
+    Args:
+        scene: the figure among things.
+        track: what the tracker says; it may go into things.
+        overlap: how overlap is removed, see `FrameLoop`.
+        seed: of what is done in random order; the same seed gives the same frames.
+        rigid: whether the figure is displaced as a whole, see `FrameLoop`.
+        progress: called with the number of frames done after each.
+
+    Raises:
+        UnknownNameError, InputError: the track does not fit the figure, or its start cannot be freed of overlap; frame
+            and place are named, before anything is computed.
+    """
+    track.check(scene.figure)
+    loop = FrameLoop(scene, track.q[0], overlap=overlap, dt=track.dt, seed=seed, rigid=rigid)
+    frames = []
+    for number, tracked in enumerate(track.q):
+        frames.append(loop.frame(tracked))
+        if progress is not None:
+            progress(number + 1)
+    return Recording.of(frames, track.q, track.dt, overlap)

@@ -1,0 +1,119 @@
+"""overlap="qp": the nearest posture to the tracked one that is inside nothing, by a few programs a frame."""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.interaction.attraction import Attraction, Pace
+from wholebody.methods.qp.method import QP
+from wholebody.problem import Problem
+from wholebody.scene import Scene
+from wholebody.tasks import ReachCones
+
+Array = NDArray[np.float64]
+
+CLEARANCE = 1e-3
+"""Metres kept between pieces. A step is exact to first order only, and what it neglects must fit in here."""
+
+STEPS = 2
+"""Most programs a frame. One is enough in the open; the second mends what the first, exact to first order, neglected.
+More would settle limbs in fewer frames and take longer in each."""
+
+SETTLED = 1e-4
+"""Largest entry of a step, radians and metres, below which the frame is done."""
+
+SPEED = 8.0
+"""rad/s at which joints may follow: above what people do, so that what is released returns soon but not in a jump."""
+
+ROOT_SPEED = 3.0  # m/s
+ROOT_WEIGHT = 1000.0
+"""Attraction of the root against that of a joint, 1/m^2 to 1/rad^2: limbs give way before the whole body does."""
+
+RIGID_WEIGHT = 100.0
+"""Attraction of joints and of the root's turn against that of the root's place, for what gives way as a whole. A finger
+8 cm long then takes a ten-thousandth of a displacement."""
+
+
+class Removal(NamedTuple):
+    """How the overlap of one frame was removed; the other attributes are those of `wholebody.interaction.Frame`.
+
+    Attributes:
+        ways: postures (nq,) to show, the best one first; the next is taken if the way to one is not free.
+    """
+
+    ways: tuple[Array, ...]
+    contact_seconds: float
+    solve_seconds: float
+    iterations: int
+    joints: int
+    pairs: int
+    note: str
+
+
+class NearestPosture:
+    """Follows tracked postures by `QP.step`."""
+
+    def __init__(self, scene: Scene, start: Array, dt: float, rigid: bool) -> None:
+        """Set up for frames of `dt` seconds, from the overlap-free posture `start`, (nq,).
+
+        Args:
+            scene: the figure among things.
+            start: (nq,) where the figure is.
+            dt: seconds from frame to frame.
+            rigid: whether the figure is displaced as a whole while its joints follow the tracker.
+        """
+        self.scene, self.dt = scene, dt
+        self._pace = Pace(scene.model, pace(scene, dt))
+        self._attraction = Attraction(scene.model, start, weights(scene, rigid))
+        cones = [ReachCones()] if scene.figure.cones else []
+        self.problem = Problem(
+            scene, start, constraints=[self._pace, *cones], measures=[self._attraction], clearance=CLEARANCE
+        )
+        self._method = QP()
+
+    def remove(self, shown: Array, tracked: Array) -> Removal:
+        """One frame: from the posture that is shown towards the tracked one, as near as it can be.
+
+        Args:
+            shown: (nq,) of the frame before, overlap-free.
+            tracked: (nq,) what the tracker says.
+        """
+        proximity = self.scene.proximity
+        began, queried = time.perf_counter(), proximity.seconds
+        self._attraction.toward(tracked)
+        self._pace.begin(shown)
+        q = shown
+        ways: list[Array] = []
+        while len(ways) < STEPS:
+            step = self._method.step(self.problem, q, self.dt)
+            q = step.q
+            ways.append(q)
+            if np.abs(step.displacement).max() < SETTLED or not step.rows:
+                break
+        contacts = self.scene.contacts(q, within=1.01 * CLEARANCE)
+        pairs = int((contacts.distance < self.problem.clearances[contacts.number] + 0.01 * CLEARANCE).sum())
+        queried = proximity.seconds - queried
+        whole = time.perf_counter() - began
+        joints = len(ways) * self.scene.model.nv if pairs else 0
+        return Removal(tuple(ways[::-1]), queried, whole - queried, len(ways), joints, pairs, "")
+
+
+def weights(scene: Scene, rigid: bool) -> Array:
+    """Weights (nv,) of the attraction."""
+    result = np.full(scene.model.nv, RIGID_WEIGHT if rigid else 1.0)
+    if scene.figure.root == "free":
+        result[:3] = 1.0 if rigid else ROOT_WEIGHT
+        result[3:6] = RIGID_WEIGHT if rigid else ROOT_WEIGHT
+    return result
+
+
+def pace(scene: Scene, dt: float) -> Array:
+    """How far every degree of freedom may move in a frame, (nv,)."""
+    result = np.full(scene.model.nv, SPEED * dt)
+    if scene.figure.root == "free":
+        result[:3] = ROOT_SPEED * dt
+    return result

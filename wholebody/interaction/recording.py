@@ -1,0 +1,85 @@
+"""What was shown, frame by frame, and what it took."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.intp]
+
+
+class Frame(NamedTuple):
+    """One frame.
+
+    Attributes:
+        q: (nq,) the posture that is shown, free of overlap as far as the note does not say otherwise.
+        seconds: that the frame took, without drawing.
+        contact_seconds: of it, in collision queries.
+        solve_seconds: of it, in finding joint angles (or, for a rigid figure, its displacement).
+        iterations: programs solved, passes of CCD with a goal made anew, or displacements.
+        joints: degrees of freedom that were adjusted, counted once for each iteration that adjusted them.
+        pairs: pairs of pieces that were held off or taken apart.
+        note: "" or what was out of the ordinary.
+    """
+
+    q: Array
+    seconds: float
+    contact_seconds: float
+    solve_seconds: float
+    iterations: int
+    joints: int
+    pairs: int
+    note: str
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """All frames of a run, as arrays of n rows; `q` and `dt` as a clip has them.
+
+    Attributes:
+        q: (n, nq) what was shown.
+        tracked: (n, nq) what the tracker said.
+        dt: seconds from frame to frame.
+        overlap: "qp" or "ccd".
+        seconds, contact_seconds, solve_seconds: (n,) as in `Frame`.
+        iterations, joints, pairs: (n,) as in `Frame`.
+        notes: a note for each frame, mostly empty.
+    """
+
+    q: Array
+    tracked: Array
+    dt: float
+    overlap: str
+    seconds: Array
+    contact_seconds: Array
+    solve_seconds: Array
+    iterations: Counts
+    joints: Counts
+    pairs: Counts
+    notes: tuple[str, ...]
+
+    @classmethod
+    def of(cls, frames: Sequence[Frame], tracked: Array, dt: float, overlap: str) -> Recording:
+        """Collect frames."""
+        return cls(
+            q=np.array([frame.q for frame in frames]),
+            tracked=np.array(tracked),
+            dt=dt,
+            overlap=overlap,
+            seconds=np.array([frame.seconds for frame in frames]),
+            contact_seconds=np.array([frame.contact_seconds for frame in frames]),
+            solve_seconds=np.array([frame.solve_seconds for frame in frames]),
+            iterations=np.array([frame.iterations for frame in frames], dtype=np.intp),
+            joints=np.array([frame.joints for frame in frames], dtype=np.intp),
+            pairs=np.array([frame.pairs for frame in frames], dtype=np.intp),
+            notes=tuple(frame.note for frame in frames),
+        )
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.q)

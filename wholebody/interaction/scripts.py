@@ -1,0 +1,65 @@
+"""Scripted trackers: from posture to posture in given times, smoothly, with the tremor of a person who is tracked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.figures.figure import Figure
+from wholebody.interaction.tracks import Track
+
+Array = NDArray[np.float64]
+
+FRAME = 1.0 / 60.0  # s: of a display
+TREMOR = 2e-3  # rad: what a tracker's noise and a person's unrest come to in arms, fingers and neck
+STILL = ("hip", "knee", "ankle", "toe")
+"""In the names of joints without tremor: feet that stand on the floor."""
+TREMOR_BAND = (0.3, 2.0)  # Hz
+WAVES = 5
+
+
+def script(
+    figure: Figure, keys: Sequence[tuple[float, Array]], *, dt: float = FRAME, seed: int = 0, name: str = "script"
+) -> Track:
+    """Move through postures, at rest in each.
+
+    Between two keys the share of the way is ``10 s^3 - 15 s^4 + 6 s^5``, the straight movement of least jerk (Flash and
+    Hogan 1985, "The Coordination of Arm Movements", J. Neuroscience 5(7)). Two equal keys make a pause.
+
+    Args:
+        figure: who moves.
+        keys: seconds from the key before (the first one's are not used), and the posture (nq,).
+        dt: seconds from frame to frame.
+        seed: of the tremor.
+        name: what messages call the track.
+    """
+    frames = [keys[0][1]]
+    for (_, before), (seconds, after) in pairwise(keys):
+        count = max(1, round(seconds / dt))
+        for s in np.arange(1, count + 1) / count:
+            frames.append(np.asarray(pin.interpolate(figure.model, before, after, smooth(float(s)))))
+    return Track.of(figure, _trembling(figure, np.array(frames), dt, np.random.default_rng(seed)), dt, name)
+
+
+def smooth(s: float) -> float:
+    """Share of the way after the share s of the time."""
+    return s**3 * (10.0 + s * (6.0 * s - 15.0))
+
+
+def _trembling(figure: Figure, q: Array, dt: float, rng: np.random.Generator) -> Array:
+    """Add slow waves of small amplitude that begin and end at nothing."""
+    time = dt * np.arange(len(q))
+    size = np.zeros(figure.model.nv)
+    for joint in figure.joints:
+        size[figure.dofs(joint)] = 0.0 if any(part in joint for part in STILL) else TREMOR
+    shake = np.zeros((len(q), figure.model.nv))
+    for _ in range(WAVES):
+        rate = 2.0 * np.pi * rng.uniform(*TREMOR_BAND, figure.model.nv)
+        shake += np.sin(np.outer(time, rate) + rng.uniform(0.0, 2.0 * np.pi, figure.model.nv))
+    ramp = np.minimum(1.0, np.minimum(time, time[::-1]) / 0.5)
+    shake *= size / WAVES * ramp[:, None]
+    return np.array([figure.clamp(pin.integrate(figure.model, *pair)) for pair in zip(q, shake, strict=True)])

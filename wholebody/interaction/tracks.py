@@ -1,0 +1,185 @@
+"""Tracks: what a tracker says, frame by frame; recorded, computed, or scripted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures.figure import Figure
+from wholebody.geometry.placement import placement
+
+Array = NDArray[np.float64]
+
+UNIT_TOLERANCE = 1e-3  # of a quaternion's length, beyond which it is taken for a mistake
+ROOT_SIZE = 7
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Postures at a fixed time step, as a tracker gives them: they may be inside of things.
+
+    It has `q` and `dt` as a clip has, so that `Viewer.play` plays it.
+
+    Attributes:
+        q: (n, nq) a posture a frame.
+        dt: seconds from frame to frame.
+        joints: names of the joints in the order of q, without the free root.
+        name: what messages call it.
+
+    Raises:
+        InputError: no frame, a time step that is not positive, or a value that is not finite; the frame is named.
+    """
+
+    q: Array
+    dt: float
+    joints: tuple[str, ...]
+    name: str = "track"
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        q = np.array(self.q, dtype=float)
+        if q.ndim != 2 or not len(q):
+            raise InputError(f"{self.name}: a track is (frames, nq) with at least one frame, not {q.shape}")
+        if not (np.isfinite(self.dt) and self.dt > 0.0):
+            raise InputError(f"{self.name}: dt is {self.dt!r}; give seconds from frame to frame, such as 1/60")
+        if len(self.joints) not in (q.shape[1], q.shape[1] - ROOT_SIZE):
+            raise InputError(
+                f"{self.name}: {q.shape[1]} values a frame do not fit {len(self.joints)} joints; give one value "
+                "for each joint, after seven for a free root"
+            )
+        bad = np.argwhere(~np.isfinite(q))
+        if len(bad):
+            frame, column = (int(k) for k in bad[0])
+            raise InputError(
+                f"{self.name}: frame {frame}, {self._place(q.shape[1], column)} is {q[frame, column]}; {len(bad)} "
+                "values are not finite; mend or cut those frames"
+            )
+        q.setflags(write=False)
+        object.__setattr__(self, "q", q)
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.q)
+
+    @classmethod
+    def of(cls, figure: Figure, q: ArrayLike, dt: float, name: str = "track") -> Track:
+        """Track of a figure's own postures, (n, nq), in its order of joints."""
+        return cls(np.asarray(q, dtype=float), dt, figure.joints, name)
+
+    def part(self, first: int, last: int) -> Track:
+        """Frames `first` to `last`, without the last one.
+
+        Raises:
+            InputError: there is no frame among them.
+        """
+        if not 0 <= first < last <= len(self):
+            raise InputError(f"{self.name}: frames {first} to {last} of {len(self)}; give 0 <= first < last")
+        return Track(self.q[first:last], self.dt, self.joints, self.name)
+
+    def repeated(self, frames: int) -> Track:
+        """As many frames as asked for: the first ones, or all of them again and again.
+
+        Raises:
+            InputError: fewer than one frame is asked for.
+        """
+        if frames < 1:
+            raise InputError(f"{self.name}: {frames} frames are asked for; give 1 or more")
+        return Track(self.q[np.arange(frames) % len(self)], self.dt, self.joints, self.name)
+
+    def check(self, figure: Figure) -> None:
+        """See that the track fits a figure.
+
+        Raises:
+            UnknownNameError: it has a joint that the figure does not have.
+            InputError: it lacks joints, has them in another order, or has a quaternion that is not of unit length.
+        """
+        for joint in self.joints:
+            if joint not in figure.joints:
+                raise UnknownNameError("joint", joint, figure.joints, self.name)
+        missing = [joint for joint in figure.joints if joint not in self.joints]
+        if missing or self.q.shape[1] != figure.model.nq:
+            what = f"lacks {', '.join(missing[:4])}" if missing else f"has {self.q.shape[1]} values a frame"
+            raise InputError(f"{self.name} {what}; {figure.name} takes {figure.model.nq} values: {_order(figure)}")
+        if self.joints != figure.joints:
+            raise InputError(f"{self.name}: its joints are in another order than {figure.name}'s; use posed(...)")
+        if figure.root == "free":
+            off = np.abs(np.linalg.norm(self.q[:, 3:ROOT_SIZE], axis=1) - 1.0)
+            if off.max() > UNIT_TOLERANCE:
+                frame = int(np.argmax(off > UNIT_TOLERANCE))
+                raise InputError(
+                    f"{self.name}: frame {frame}, the root's quaternion is not of unit length; normalise it"
+                )
+
+    def _place(self, size: int, column: int) -> str:
+        root = size - len(self.joints)
+        return f"value {column} of the root" if column < root else f"joint {self.joints[column - root]}"
+
+
+def posed(
+    figure: Figure,
+    *,
+    roots: Sequence[Any] | None = None,
+    angles: Mapping[str, ArrayLike] | None = None,
+    posture: str | ArrayLike | None = None,
+    dt: float,
+    name: str = "track",
+) -> Track:
+    """Track from placements of the root and angles by joint name: a hand's placements and a glove's angles.
+
+    Args:
+        figure: whose postures these become.
+        roots: n placements of a free root, each as for `Scene.add`; where the posture has it if left out.
+        angles: joint name to n angles, radians, or one for all frames; other joints stay as in the posture.
+        posture: (nq,) or a name; the figure's first one if left out.
+        dt: seconds from frame to frame.
+        name: what messages call it.
+
+    Raises:
+        UnknownNameError: a joint that the figure does not have.
+        InputError: tracks of different length, a placement that cannot be read (the frame is named), roots for a fixed
+            figure.
+    """
+    base = _posture(figure, posture)
+    given = {joint: np.atleast_1d(np.asarray(values, dtype=float)) for joint, values in (angles or {}).items()}
+    frames = _frames(name, roots, given)
+    q = np.tile(base, (frames, 1))
+    for joint, values in given.items():
+        if joint not in figure.joints:
+            raise UnknownNameError("joint", joint, figure.joints, name)
+        q[:, figure.model.joints[figure.joint_id(joint)].idx_q] = values
+    if roots is not None:
+        if figure.root != "free":
+            raise InputError(f"{name}: {figure.name} is fixed to the world; leave roots out")
+        for frame, root in enumerate(roots):
+            try:
+                q[frame, :ROOT_SIZE] = pin.SE3ToXYZQUAT(placement(root))
+            except InputError as error:
+                raise InputError(f"{name}: frame {frame}: {error}") from None
+    return Track.of(figure, q, dt, name)
+
+
+def _posture(figure: Figure, posture: str | ArrayLike | None) -> Array:
+    if posture is None:
+        return figure.neutral
+    return figure.posture(posture) if isinstance(posture, str) else np.asarray(posture, dtype=float)
+
+
+def _frames(name: str, roots: Sequence[Any] | None, angles: Mapping[str, Array]) -> int:
+    sizes = {joint: len(values) for joint, values in angles.items() if len(values) != 1}
+    if roots is not None:
+        sizes["root"] = len(roots)
+    if len(set(sizes.values())) > 1:
+        listed = ", ".join(f"{joint} {size}" for joint, size in list(sizes.items())[:5])
+        raise InputError(f"{name}: tracks of different length ({listed} frames); cut them to the same")
+    return next(iter(sizes.values()), 1)
+
+
+def _order(figure: Figure) -> str:
+    root = "seven of the root, then " if figure.root == "free" else ""
+    return f"{root}{', '.join(figure.joints[:3])}, ..."
