@@ -156,8 +156,9 @@ class Lineariser:
     def _box(self, state: State) -> tuple[Array, Array]:
         lower, upper = self.scene.figure.tangent_bounds(state.q)
         for bound in self.bounds:
+            # a joint out of its limits comes back no faster than the bound lets it
             low, high = bound.bounds(state, self.dt)
-            lower, upper = np.maximum(lower, low), np.minimum(upper, high)
+            lower, upper = np.clip(lower, low, high), np.clip(upper, low, high)
         return lower, upper
 
     def _measure(self, state: State) -> tuple[float, Array, Array]:

@@ -85,6 +85,7 @@ class Problem:
             term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
         )
         self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
+        self._check_frozen()
         self._check_terms()
         self.touching = tuple(_owner_pair(scene, pair) for pair in touching)
         self.clearances = self._clearances()
@@ -113,6 +114,20 @@ class Problem:
         """Raise InputError if objects came to or left the scene after the problem was stated (moving them is fine)."""
         if self.scene.revision != self._revision:
             raise InputError("objects came to or left the scene after the problem was stated; state the problem anew")
+
+    def _check_frozen(self) -> None:
+        """Raise InputError if a bound keeps a joint where its limits do not let it be."""
+        figure, state = self.scene.figure, State(self.scene.model).update(self.start)
+        least, most = figure.tangent_bounds(self.start)
+        for bound in self.bounds:
+            low, high = bound.bounds(state, None)
+            wrong = np.flatnonzero((high < least) | (low > most))
+            if len(wrong):
+                joint = next(j for j in self.scene.model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
+                name = self.scene.model.names[joint.id]
+                raise InputError(
+                    f"{type(bound).__name__} keeps {name} where it starts, out of its limits; start it within them"
+                )
 
     def _check_terms(self) -> None:
         """Evaluate every term once at the start, so that one written wrongly is named before anything is computed."""

@@ -16,12 +16,12 @@ from wholebody.figures.state import State
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import Contacts, Proximity
+from wholebody.geometry.shapes import Shape
 from wholebody.scene_geometry import SceneGeometry, SceneObject, assemble
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.geometry.penetration import ObjectPenetration
-    from wholebody.geometry.shapes import Shape
     from wholebody.geometry.sweep import FirstContact, Sweep
 
 Array = NDArray[np.float64]
@@ -194,6 +194,9 @@ class Scene:
         return self
 
     def _put(self, thing: SceneObject) -> Scene:
+        if not isinstance(thing.shape, Shape):
+            kind = type(thing.shape).__name__
+            raise InputError(f"{thing.name!r} is a {kind}, not a shape; give wb.Box, wb.Sphere, wb.Mesh or another")
         self._objects[thing.name] = thing
         self._changed()
         return self

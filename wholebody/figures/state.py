@@ -12,6 +12,8 @@ from wholebody.errors import InputError
 
 Array = NDArray[np.float64]
 
+UNIT_TOLERANCE = 1e-3  # how far a quaternion's length may be from 1 before it is taken for a mistake
+
 
 class Wrench(NamedTuple):
     """Rows of a Jacobian, as wrenches in the world frame.
@@ -59,6 +61,10 @@ class State:
         if not np.isfinite(q).all():
             raise InputError(
                 f"posture entry {int(np.flatnonzero(~np.isfinite(q))[0])} is not finite; give finite numbers"
+            )
+        if not pin.isNormalized(self.model, q, UNIT_TOLERANCE):
+            raise InputError(
+                "the posture's quaternion is not of unit length; normalise it with pin.normalize(model, q)"
             )
         pin.computeJointJacobians(self.model, self.data, q)
         self.q = q

@@ -1,4 +1,4 @@
-"""The ends of contact patches as one compiled loop: what `ContactRowBuilder` does in array code, 20 times as fast.
+"""Exact face normals and the ends of contact patches as compiled loops: what `ContactRowBuilder` does in array code.
 
 Needs numba (the extra "fast"), which compiles it at the first use and keeps the result beside this file. Both ways give
 the same rows to rounding; the array code is the reference.
@@ -12,6 +12,64 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def snap_normals(
+    wide: Indices,
+    pair: Indices,
+    distance: Array,
+    normal: Array,
+    placement: Array,
+    points: Array,
+    point_start: Indices,
+    point_count: Indices,
+    faces: Array,
+    face_start: Indices,
+    face_count: Indices,
+    radius: Array,
+    near: float,
+    accuracy: float,
+) -> None:
+    """Put the exact normal of a face where coal's is that normal but for rounding; `normal` is changed in place."""
+    direction = np.empty(3)
+    for c in wide:
+        found = False
+        for side in range(2):
+            own, other = pair[c, side], pair[c, 1 - side]
+            if found or radius[own] > 0.0 or point_count[other] == 0:
+                continue
+            sign = 1.0 if side == 0 else -1.0
+            for f in range(face_start[own], face_start[own] + face_count[own]):
+                for k in range(3):
+                    direction[k] = (
+                        faces[f, 0] * placement[own, 0, k]
+                        + faces[f, 1] * placement[own, 1, k]
+                        + faces[f, 2] * placement[own, 2, k]
+                    )
+                along = direction[0] * normal[c, 0] + direction[1] * normal[c, 1] + direction[2] * normal[c, 2]
+                if sign * along < near:
+                    continue
+                base = (
+                    faces[f, 3]
+                    + direction[0] * placement[own, 3, 0]
+                    + direction[1] * placement[own, 3, 1]
+                    + direction[2] * placement[own, 3, 2]
+                )
+                least = np.inf
+                for number in range(point_start[other], point_start[other] + point_count[other]):
+                    height = -base
+                    for k in range(3):
+                        place = placement[other, 3, k]
+                        for i in range(3):
+                            place += points[number, i] * placement[other, i, k]
+                        height += direction[k] * place
+                    least = min(least, height)
+                if least - radius[other] >= distance[c] - accuracy:
+                    for k in range(3):
+                        normal[c, k] = sign * direction[k]
+                    found = True
+                    break
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]

@@ -34,6 +34,7 @@ SLOW = 0.1  # share of the violation that must go in PATIENCE iterations, else o
 PATIENCE = 6
 RENEWALS = 2  # times that a descent with small steps begins anew with long ones before it is taken for settled
 MENDABLE = 0.03  # m, rad: violation that the next step is trusted to mend
+DULL, FLAT = 1e-3, 1e-7  # shares of the violation that a step must be foreseen to gain, with measures and without
 LAST_STRETCH = 2e-3  # violation foreseen to go, below which steps may be extrapolated
 NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
 
@@ -96,6 +97,9 @@ class Descent:
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
         self._radius, self._damping, self._measures = FIRST_RADIUS, 0.0, self.measures
+        self._stretch = (
+            1.0  # goals that conflict stay far while steps get short: then all of their errors are asked for
+        )
         self._anchor: _Visit | None = None  # where to go back to if a step that broke a rule is not mended
         self._memory = Anderson()
 
@@ -110,12 +114,13 @@ class Descent:
         while count < self.iterations and time.perf_counter() < self.deadline:
             count += 1
             program = self.subproblem.program(
-                here.at, here.rows, self._radius, self._damping, self._shift, self._measures
+                here.at, here.rows, self._radius, self._pull, self._damping, self._shift, self._measures
             )
             answer = working_set.solve(program, here.rows.key)
             outlook = Outlook(
                 here.violation.total - self.subproblem.violation(here.rows, answer.x).total,
-                -float(program.linear @ answer.x + 0.5 * (program.diagonal * answer.x) @ answer.x),
+                -float(program.linear @ answer.x + 0.5 * (program.diagonal * answer.x) @ answer.x)
+                / self.subproblem.scale,
             )
             if self._settled(here, answer, outlook):
                 if self._radius < FIRST_RADIUS and renewals:  # small steps alone are no sign of an optimum
@@ -142,11 +147,15 @@ class Descent:
             here = self._anchor
         return Local(here.at.q, here.violation, here.at.measure, converged, count)
 
+    @property
+    def _pull(self) -> float:
+        return PULL * self._radius * self._stretch
+
     def _settled(self, here: _Visit, answer: QPSolution, outlook: Outlook) -> bool:
         """Whether nothing worth having is foreseen."""
         violation = here.violation
         held = max(violation.hold, violation.elastic) <= self.tolerance
-        worth = max(0.05 * self.tolerance, 1e-3 * violation.total if held else 0.0)
+        worth = max(0.05 * self.tolerance, (DULL if self._measures else FLAT) * violation.total if held else 0.0)
         if violation.worst > self.tolerance and outlook.gain > worth:
             return False
         if not self._measures:
@@ -183,6 +192,7 @@ class Descent:
             self._shift = np.zeros_like(self._shift)
             return there
         if not verdict.accepted:
+            self._stretch = 1.0
             self._radius = 0.3 * min(step, self._radius)
             self._damping = max(0.3, 2.0 * self._damping) if verdict.by != "rejected measure" else self._damping
             self._shift = np.zeros_like(self._shift)
@@ -191,6 +201,8 @@ class Descent:
         if verdict.by == "goal":
             self._memory.forget()
             self._funnel.narrow(here.violation.total, there.violation.total)
+        if here.violation.left > self._pull and step < 0.25 * self._radius:
+            self._stretch *= 2.0
         if verdict.good:
             self._damping *= 0.3
             if step > 0.5 * self._radius or here.violation.left > PULL * self._radius:

@@ -16,7 +16,7 @@ from wholebody.methods.qp.starts import bent, restarts
 from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.problem import Iterate, Problem
 
-ALIKE = 1e-3  # share of a goal's error by which two descents may differ and count as equally near
+ALIKE = 1e-5  # share of a goal's error by which two descents may differ and count as equally near
 STAGES = (0.25, 0.5, 0.75)  # of the way to the goals, when the straight attempt ends in a local minimum
 
 
@@ -90,8 +90,7 @@ class Search:
         """Where the goals are not reached, come as near as goes, then improve the measures from there."""
         if self.best.violation.left <= self.settings.tolerance:
             return
-        deadline = time.perf_counter() + self.settings.budget
-        self._accept(self._descend(self.best.q, deadline, None, "nearest", measures=False), self.how)
+        self._accept(self._descend(self.best.q, np.inf, None, "nearest", measures=False), self.how)
         best = self.best
         if best.violation.left > self.settings.tolerance and self.problem.measures:
             local = self._stay(best)
@@ -104,8 +103,7 @@ class Search:
     def _stay(self, local: Local) -> Local:
         """Descend with the goals' errors to stay as they are: what must hold is mended, then the measures improve."""
         nearest = self._goal_errors(local.q)
-        deadline = time.perf_counter() + self.settings.budget
-        stayed = self._descent(deadline, nearest, "nearest").run(local.q)
+        stayed = self._descent(np.inf, nearest, "nearest").run(local.q)
         self.spent += stayed.iterations
         left = float(np.linalg.norm(self._goal_errors(stayed.q)))
         violation = stayed.violation._replace(goal=left, left=left)
@@ -145,7 +143,7 @@ def _held(local: Local, tolerance: float) -> bool:
 
 def _better(one: Local, other: Local, tolerance: float) -> bool:
     """Whether one descent ended better: in what must hold, then in the goals, then in the measures."""
-    for left, right in ((_broken(one), _broken(other)), (one.violation.left, other.violation.left)):
+    for left, right in ((_broken(one), _broken(other)), (one.violation.goal, other.violation.goal)):
         left, right = max(left, tolerance), max(right, tolerance)
         if abs(left - right) > max(tolerance, ALIKE * min(left, right)):
             return left < right

@@ -24,6 +24,8 @@ PULL = 0.4  # m per rad of radius: of a goal farther away, or a deeper overlap, 
 BOX = 2.0  # radii: the box around a step, which seldom holds it; asking for little keeps programs easy instead
 HOLD_SHARE = 3.0  # what a metre of hold counts against a metre of goal when a step is judged
 ELASTIC_SHARE = 10.0  # and a metre of overlap; above any ratio at which overlap could buy goal
+LEAST_SHARE = 1e-3  # of the largest goal weight: goals that weigh less count as this much, or they would not be met
+HEAVIEST_CURVATURE = 5e3  # 1/rad^2: heavier measures are scaled to this; above it they would hold goals back
 MOST_ROWS = 4096  # more than one contact ever has
 LEVER = 1.0  # m: of a limb; larger = more damping of every joint while a goal is out of reach
 LEAST_CURVATURE = 1e-3  # share of the largest curvature that a degree of freedom has which no measure speaks for
@@ -96,8 +98,13 @@ class Subproblem:
             weight.append(np.full(np.atleast_1d(goal.error(state)).shape, goal.weight))
         self._lower = np.concatenate(lower) if lower else np.zeros(0)
         self._upper = np.concatenate(upper) if upper else np.zeros(0)
-        self._goal_weight = np.concatenate(weight) if weight else np.zeros(0)
-        self._goal_share = self._goal_weight / self._goal_weight.max(initial=1e-300)
+        goal_weight = np.concatenate(weight) if weight else np.zeros(0)
+        self._goal_share = np.maximum(goal_weight / goal_weight.max(initial=1e-300), LEAST_SHARE)
+        self.scale = 1.0
+        """What measures are multiplied by, so that heavy ones do not outweigh goals."""
+        heaviest = sum((m.weight * m.curvature(state) for m in problem.measures), np.zeros(state.model.nv))
+        if heaviest.max(initial=0.0) > HEAVIEST_CURVATURE:
+            self.scale = HEAVIEST_CURVATURE / float(heaviest.max())
         self._equal = np.flatnonzero(self._lower == self._upper)
         self._low = np.flatnonzero((self._lower != self._upper) & np.isfinite(self._lower))
         self._high = np.flatnonzero((self._lower != self._upper) & np.isfinite(self._upper))
@@ -109,7 +116,7 @@ class Subproblem:
         error = np.concatenate([at.goal_error, at.value[self._equal] - self._lower[self._equal]])
         distance = float(np.linalg.norm(at.goal_error))
         pull = min(max(GOAL_FORCE / max(distance, 1e-12), GOAL_WEIGHTS[0]), GOAL_WEIGHTS[1])
-        weight = np.concatenate([pull * self._goal_weight, np.full(len(self._equal), HOLD_WEIGHT)])
+        weight = np.concatenate([pull * self._goal_share, np.full(len(self._equal), HOLD_WEIGHT)])
         low, high = self._low, self._high
         elastic = np.vstack([at.value_jacobian[low], -at.value_jacobian[high], at.gap_jacobian])
         lack = np.concatenate(
@@ -140,7 +147,14 @@ class Subproblem:
         )
 
     def program(
-        self, at: Linearisation, rows: Rows, radius: float, damping: float, shift: Array, measures: bool
+        self,
+        at: Linearisation,
+        rows: Rows,
+        radius: float,
+        pull: float,
+        damping: float,
+        shift: Array,
+        measures: bool,
     ) -> QuadraticProgram:
         """The program of one step.
 
@@ -148,24 +162,25 @@ class Subproblem:
             at: where.
             rows: its rows.
             radius: about the largest entry that the displacement should have, radians and metres.
+            pull: of goals farther away only so much is asked for, metres and radians.
             damping: how much of the goals' neglected second derivative to add, bounded by |pull| times lever.
             shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
             measures: whether the measures count; without them the nearest posture to the goals is sought.
         """
-        floor = float(at.curvature.max(initial=0.0)) * LEAST_CURVATURE or 1.0
-        diagonal = np.maximum(at.curvature, floor)
-        linear = at.gradient if measures else np.zeros_like(at.gradient)
+        curvature = self.scale * at.curvature
+        floor = float(curvature.max(initial=0.0)) * LEAST_CURVATURE or 1.0
+        diagonal = np.maximum(curvature, floor)
+        linear = self.scale * at.gradient if measures else np.zeros_like(at.gradient)
         diagonal = np.maximum(diagonal if measures else ALOOF * diagonal, np.abs(linear) / radius)
         error = rows.soft_error.copy()
         farthest = float(np.abs(error[: rows.goals]).max(initial=0.0))
-        if farthest > PULL * radius:
-            error[: rows.goals] *= PULL * radius / farthest
+        if farthest > pull:
+            error[: rows.goals] *= pull / farthest
         if damping > 0.0:
-            pull = rows.soft_weight[: rows.goals] * np.abs(error[: rows.goals])
-            diagonal = diagonal + damping * LEVER * float(pull.max(initial=0.0))
+            force = rows.soft_weight[: rows.goals] * np.abs(error[: rows.goals])
+            diagonal = diagonal + damping * LEVER * float(force.max(initial=0.0))
         box = BOX * radius
-        lower = np.minimum(np.maximum(at.lower, -box), box)
-        upper = np.maximum(np.minimum(at.upper, box), -box)
+        lower, upper = np.clip(at.lower, -box, box), np.clip(at.upper, -box, box)
         return QuadraticProgram(
             diagonal=diagonal,
             linear=linear,
@@ -175,6 +190,6 @@ class Subproblem:
             elastic=rows.elastic,
             least=np.minimum(rows.lack, PULL * radius),
             elastic_weight=np.full(len(rows.lack), ELASTIC_WEIGHT),
-            lower=np.minimum(lower, upper),
-            upper=np.maximum(lower, upper),
+            lower=lower,
+            upper=upper,
         )

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.errors import InputError
-from wholebody.methods.qp.quadratic_program import Array
+from wholebody.linearisation import Linearisation
+from wholebody.methods.qp.quadratic_program import Array, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import Subproblem
+from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 
@@ -18,6 +20,8 @@ LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
 LARGEST_WITHIN = 0.5
 HEADROOM = 2.5  # pairs within this many times the last step's motion get rows, so that the next may be longer
 RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
+UNSEEN = 1e-4  # m: by which turning may bring things nearer than the linearisation says without being looked after
+CUTS = 6  # times that a step is halved before it is given up
 DAMPING = (
     0.3  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at what is in the way
 )
@@ -76,23 +80,67 @@ class Tracker:
 
     def step(self, q: Array) -> Step:
         """One step from q, shape (nq,); a posture out of limits is brought back first."""
-        scene = self.problem.scene
         self.problem.check_fresh()
         if self.problem.goals is not self._lineariser.goals:
             self._retarget()
         at = self._lineariser.at(q, self._within)
         rows = self._subproblem.rows(at)
-        program = self._subproblem.program(at, rows, RADIUS, DAMPING, np.zeros(len(rows.soft_error)), True)
+        program = self._subproblem.program(
+            at, rows, RADIUS, PULL * RADIUS, DAMPING, np.zeros(len(rows.soft_error)), True
+        )
         answer = self._working_set.solve(program, rows.key)
-        motion = self._motion(answer.x)
+        motion, turn = self._motion(answer.x)
         share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
-        self._within = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
         displacement = answer.x if share == 1.0 else share * answer.x
-        following = pin.integrate(scene.model, at.q, displacement)
+        if 0.5 * share**2 * motion * turn > UNSEEN:
+            displacement, share = self._looked_after(at, rows, program, displacement, share)
+        self._within = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
+        following = pin.integrate(self.problem.scene.model, at.q, displacement)
         return Step(
             following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
             answer.iterations, answer.by, share,
         )  # fmt: skip
+
+    def _looked_after(
+        self, at: Linearisation, rows: Rows, program: QuadraticProgram, displacement: Array, share: float
+    ) -> tuple[Array, float]:
+        """A step that turns far is looked at where it ends: what turning brought nearer is asked for, or the step cut.
+
+        Args:
+            at: where the step begins.
+            rows: its rows.
+            program: its program.
+            displacement: (nv,) of the step.
+            share: of the program's own displacement.
+
+        Returns:
+            The displacement (nv,) and its share.
+        """
+        short = self._shortfall(at, displacement)
+        if short.max(initial=0.0) <= UNSEEN:
+            return displacement, share
+        groups = np.zeros(rows.groups)
+        groups[rows.groups - len(short) :] = short
+        again = self._working_set.solve(replace(program, least=program.least + groups[rows.group]), rows.key)
+        motion, _ = self._motion(again.x)
+        share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
+        displacement = share * again.x
+        for _ in range(CUTS):
+            if self._shortfall(at, displacement).max(initial=0.0) <= UNSEEN:
+                return displacement, share
+            displacement, share = 0.5 * displacement, 0.5 * share
+        return 0.0 * displacement, 0.0
+
+    def _shortfall(self, at: Linearisation, displacement: Array) -> Array:
+        """By how much each contact (k,) is nearer after a displacement (nv,) than it was and than is asked."""
+        scene, count = self.problem.scene, len(at.contacts.distance)
+        state = self._lineariser.state.update(pin.integrate(scene.model, at.q, displacement))
+        near = scene.proximity.near(state.data, float(at.clearance.max(initial=0.0)) + UNSEEN)
+        after = np.full(len(scene.proximity.pairs), np.inf)
+        after[near.number] = near.distance
+        kept = np.minimum(at.contacts.distance, at.clearance[:count])
+        short: Array = np.maximum(kept - after[at.contacts.number], 0.0)
+        return short
 
     def _retarget(self) -> None:
         """Take the problem's new goals; what was set up stays where they have the same kinds and weights."""
@@ -102,8 +150,8 @@ class Tracker:
             self._subproblem = Subproblem(self.problem)
             self._working_set.forget()
 
-    def _motion(self, displacement: Array) -> float:
-        """Longest way of any point of any piece, metres, to first order in the displacement (nv,)."""
+    def _motion(self, displacement: Array) -> tuple[float, float]:
+        """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,)."""
         twist = (self._support * displacement) @ self._lineariser.state.jacobian.T
         center = self.problem.scene.proximity.placements[self._moving, 3]
         turn = twist[:, 3:]
@@ -111,5 +159,6 @@ class Tracker:
         shift[:, 0] += turn[:, 1] * center[:, 2] - turn[:, 2] * center[:, 1]
         shift[:, 1] += turn[:, 2] * center[:, 0] - turn[:, 0] * center[:, 2]
         shift[:, 2] += turn[:, 0] * center[:, 1] - turn[:, 1] * center[:, 0]
-        way = np.sqrt(np.einsum("ij,ij->i", shift, shift)) + np.sqrt(np.einsum("ij,ij->i", turn, turn)) * self._reach
-        return float(way.max(initial=0.0))
+        angle = np.sqrt(np.einsum("ij,ij->i", turn, turn))
+        way = np.sqrt(np.einsum("ij,ij->i", shift, shift)) + angle * self._reach
+        return float(way.max(initial=0.0)), float(angle.max(initial=0.0))
