@@ -147,7 +147,6 @@ def test_mistakes_are_answered_before_anything_changes(scene):
     assert (scene.revision, list(scene.objects)) == (revision, ["table"])
 
 
-@pytest.mark.xfail(reason="a shape is only looked at when the geometry is built", strict=True)
 def test_what_is_no_shape_is_refused_when_it_is_added(scene):
     with pytest.raises(wb.InputError):
         scene.add("box", name="thing")

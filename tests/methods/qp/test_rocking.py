@@ -43,6 +43,12 @@ def distances(scene, q):
     return np.array([result.min_distance for result in placed.distanceResults])
 
 
+@pytest.fixture(autouse=True)
+def not_looked_after(monkeypatch):
+    """What is tested here is the rows alone: steps that turn are not looked at where they end."""
+    monkeypatch.setattr("wholebody.methods.qp.tracking.UNSEEN", np.inf)
+
+
 @pytest.mark.parametrize("push", PUSHES.values(), ids=PUSHES.keys())
 def test_a_box_pushed_onto_a_table_does_not_rock_into_it(free_bodies, push):
     assert least_distance_while_pushed(free_bodies, push) >= 0.9 * CLEARANCE

@@ -90,13 +90,12 @@ def test_clearance_is_kept_at_the_speeds_people_move_with(jumping, dt, solver, l
     sweep = Sweep(case.scene.model, case.scene.geometry)
 
     def check(q, step):
-        assert least_distance(case.scene, step.q) >= 0.85 * CLEARANCE
+        assert least_distance(case.scene, step.q) >= 0.9 * CLEARANCE
         assert sweep.first_contact(q, step.q) is None
 
     follow(case.problem, wb.QP(solver), dt, case.targets(150), check)
 
 
-@pytest.mark.xfail(reason="steps are not looked at after they are made: turning limbs end inside", strict=True)
 def test_a_person_whose_goals_jump_enters_nothing(least_distance):
     """Two hands sent somewhere else every 20 steps, standing, among a table, a sheet, a ball and a bar."""
     rng = np.random.default_rng(0)
