@@ -1,0 +1,21 @@
+"""The reference has every public name."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from pathlib import Path
+
+import wholebody
+
+WHOLE_MODULES = ("wholebody.geometry.shapes", "wholebody.errors")
+
+
+def test_the_reference_has_every_public_name(root: Path) -> None:
+    text = (root / "docs/reference.md").read_text(encoding="utf-8")
+    paths = set(re.findall(r"^::: ([\w.]+)$", text, re.MULTILINE))
+    named = {path.rpartition(".")[2] for path in paths}
+    for module in WHOLE_MODULES:
+        assert module in paths
+        named |= set(vars(import_module(module)))
+    assert set(wholebody.__all__) - {"__version__"} <= named
