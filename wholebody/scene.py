@@ -194,8 +194,9 @@ class Scene:
         return self
 
     def _put(self, thing: SceneObject) -> Scene:
-        if not isinstance(thing.shape, Shape):
-            kind = type(thing.shape).__name__
+        shape: object = thing.shape
+        if not isinstance(shape, Shape):
+            kind = type(shape).__name__
             raise InputError(f"{thing.name!r} is a {kind}, not a shape; give wb.Box, wb.Sphere, wb.Mesh or another")
         self._objects[thing.name] = thing
         self._changed()
