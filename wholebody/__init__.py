@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.newton.assembly import Assembly
+    from wholebody.methods.newton.method import Newton
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
     from wholebody.problem import Problem, Solution
@@ -88,6 +89,7 @@ __all__ = [
     "Measure",
     "Mesh",
     "MissingPackageError",
+    "Newton",
     "Orientation",
     "Plane",
     "Point",
@@ -118,6 +120,7 @@ _MODULES = {
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
     "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.newton.assembly": "Assembly",
+    "wholebody.methods.newton.method": "Newton",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
     "wholebody.problem": "Problem Solution",

@@ -7,7 +7,7 @@ from typing import Protocol
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.problem import Problem, Solution
 
-METHODS = ("qp", "ccd")
+METHODS = ("qp", "ccd", "newton")
 
 
 class Method(Protocol):
@@ -35,6 +35,10 @@ def method_named(name: str) -> Method:
         from wholebody.methods.ccd.method import CCD
 
         return CCD()
+    if name == "newton":
+        from wholebody.methods.newton.method import Newton
+
+        return Newton()
     raise UnknownNameError("method", name, METHODS)
 
 
@@ -43,7 +47,7 @@ def solve(problem: Problem, method: str | Method = "qp") -> Solution:
 
     Args:
         problem: what is asked.
-        method: "qp", "ccd", or a configured method such as `QP(solver="daqp", tolerance=1e-8)`.
+        method: "qp", "ccd", "newton", or a configured method such as `QP(solver="daqp", tolerance=1e-8)`.
 
     Returns:
         The posture with its status and the independent assessment. Goals out of reach and starts in penetration are

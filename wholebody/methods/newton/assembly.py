@@ -17,7 +17,7 @@ from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
 from wholebody.methods.newton.quaternions import axes_with_z
-from wholebody.methods.newton.reaching import reach
+from wholebody.methods.newton.reaching import Course, reach
 from wholebody.methods.newton.system import System
 from wholebody.tasks.inputs import direction, numbers, point
 
@@ -235,7 +235,9 @@ class Assembly:
             self._prepared = (algebra, system, linear_algebra(system.pattern, algebra))
             self.structures += 1
         _, system, factor = self._prepared
-        found = reach(system, self.variables(), factor, tolerance=tolerance, iterations=iterations, kind=inequalities)
+        found = reach(
+            Course(system, factor), self.variables(), tolerance=tolerance, iterations=iterations, kind=inequalities
+        )
         self._places = list(found.x.reshape(-1, 7))
         return answer(list(self._names), system, found, tolerance, factor.name)
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.methods.newton.batches import Angle, Batch, Coincide, Slide, Turn, Unit
+from wholebody.methods.newton.batches import Angle, Batch, Coincide, Key, Slide, Turn, Unit
 from wholebody.methods.newton.quaternions import relative_forms
 from wholebody.methods.newton.system import System
 
@@ -27,15 +27,19 @@ class EquationSet:
     """Groups of equations by type and by whether they may be missed or are one-sided."""
 
     def __init__(self) -> None:
-        self.rows: dict[tuple[str, bool, bool], list[Row]] = {}
+        self.rows: dict[Key, list[Row]] = {}
 
-    def coincide(self, a: int, b: int, label: str, first: Array, second: Array, *, goal: bool = False) -> None:
+    def coincide(
+        self, a: int, b: int, label: str, first: Array, second: Array, *, goal: bool = False, weight: float = 1.0
+    ) -> None:
         """A point (3,) of one body at a point of the other."""
-        self._add("coincide", a, b, label, first, second, goal=goal)
+        self._add("coincide", a, b, label, first, second, goal=goal, weight=weight)
 
-    def turn(self, a: int, b: int, label: str, first: Any, second: Any, size: int, *, goal: bool = False) -> None:
+    def turn(
+        self, a: int, b: int, label: str, first: Any, second: Any, size: int, *, goal: bool = False, weight: float = 1.0
+    ) -> None:
         """Axes (pin.Quaternion) of two bodies agree: in z (size 2) or wholly (size 3)."""
-        self._add(f"turn{size}", a, b, label, first.coeffs(), second.coeffs(), goal=goal)
+        self._add(f"turn{size}", a, b, label, first.coeffs(), second.coeffs(), goal=goal, weight=weight)
 
     def slide(
         self, a: int, b: int, label: str, normal: Array, place: Array, height: float, *, above: bool = False
@@ -51,31 +55,49 @@ class EquationSet:
                 parts = (first.coeffs(), second.coeffs(), center, bound, sign)
                 self._add("angle", a, b, label, *parts, one_sided=True)
 
-    def angle(self, a: int, b: int, label: str, first: Any, second: Any, value: float, *, goal: bool = False) -> None:
+    def angle(
+        self,
+        a: int,
+        b: int,
+        label: str,
+        first: Any,
+        second: Any,
+        value: float,
+        *,
+        goal: bool = False,
+        weight: float = 1.0,
+    ) -> None:
         """The angle about z of two axes (pin.Quaternion) has a value."""
-        self._add("angle", a, b, label, first.coeffs(), second.coeffs(), value, value, 1.0, goal=goal)
+        self._add("angle", a, b, label, first.coeffs(), second.coeffs(), value, value, 1.0, goal=goal, weight=weight)
 
     def without_goals(self) -> EquationSet:
         """A copy that has none."""
         result = EquationSet()
-        result.rows = {key: list(rows) for key, rows in self.rows.items() if not key[1]}
+        result.rows = {key: list(rows) for key, rows in self.rows.items() if not key.goal}
         return result
 
     def system(self, count: int, names: list[str], weight: Array) -> System:
         """All of it for `count` bodies."""
         units = [f"the Euler parameters of {name!r}" for name in names]
-        batches: list[Batch] = [Unit(np.arange(count)[:, None], units)]
-        goals, one_sided = [False], [False]
-        for (kind, goal, sided), rows in self.rows.items():
-            batches.append(_batch(kind, rows, count))
-            goals.append(goal)
-            one_sided.append(sided)
-        return System(count, batches, goals, one_sided, weight)
+        first = (Unit(np.arange(count)[:, None], units), Key("unit", False, False, 1.0))
+        return System(count, [first, *self.batches(count)], weight)
+
+    def batches(self, count: int) -> list[tuple[Batch, Key]]:
+        """The groups of `count` bodies in batches."""
+        return [(_batch(key.kind, rows, count), key) for key, rows in self.rows.items()]
 
     def _add(
-        self, kind: str, a: int, b: int, label: str, *numbers: Any, goal: bool = False, one_sided: bool = False
+        self,
+        kind: str,
+        a: int,
+        b: int,
+        label: str,
+        *numbers: Any,
+        goal: bool = False,
+        one_sided: bool = False,
+        weight: float = 1.0,
     ) -> None:
-        self.rows.setdefault((kind, goal, one_sided), []).append(Row(a, b, label, numbers))
+        self.rows.setdefault(Key(kind, goal, one_sided, weight), []).append(Row(a, b, label, numbers))
 
 
 def _batch(kind: str, rows: list[Row], count: int) -> Batch:

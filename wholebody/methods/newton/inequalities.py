@@ -21,6 +21,7 @@ FREE = 1e12  # diagonal of an inequality that is not at work: it takes part in t
 RELEASE = 1e-12  # multiplier below which an active inequality is let go; larger = held longer
 CROSSED = 1e-9  # m or rad: predicted values below minus this make an inequality active
 TOGETHER = 0.01  # of a step: inequalities that are met this much after the first become active with it
+STAYS = 1e-2  # m or rad: an active inequality that finds itself farther away than this is free
 FRACTION = 0.95  # of the way to the edge that a barrier step may go; larger = faster and nearer to the edge
 LEAST_BARRIER = 1e-11  # m: product of slack and multiplier at which the barrier has done its work
 BARRIER_FALL = 0.15  # factor of the barrier from step to step; smaller = fewer steps, less centred
@@ -105,7 +106,8 @@ class SquaredSlacks:
 
     def accept(self, share: float, phi: Array) -> None:
         """Slacks away from zero follow their values."""
-        self.slack = np.where(self.slack == 0.0, 0.0, np.sqrt(np.maximum(phi, 0.0)))
+        active = (self.slack == 0.0) & (phi < STAYS)
+        self.slack = np.where(active, 0.0, np.sqrt(np.maximum(phi, 0.0)))
 
     def finished(self) -> bool:
         """Always."""

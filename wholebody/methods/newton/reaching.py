@@ -35,8 +35,38 @@ NARROW = 0.7  # what is left of the funnel after a step that only mended
 WORTH = 0.05  # share of the promised progress that a step must make
 STAGNANT = 1e-6  # relative progress below which steps count as none
 PATIENCE = 12  # such steps in a row before the nearest point counts as found
+REFUSALS = 6  # times in a row that a step is made anew before it is taken as it is
 SYSTEMS = 25  # most linear systems a step, while inequalities come and go
+NEAR = 1e-2  # m or rad: errors below which the damping of equations is made good by the last multipliers
 MENDING = 30  # most steps that only mend what must hold, where the goals were not met
+
+
+class Course:
+    """What an iteration moves through: the equations, which may change on the way.
+
+    Attributes:
+        system: the equations.
+        algebra: for the system's pattern.
+        longest: metres that any part of a body may move in a step.
+    """
+
+    longest = np.inf
+
+    def __init__(self, system: System, algebra: LinearAlgebra) -> None:
+        """Take equations that do not change."""
+        self.system, self.algebra = system, algebra
+
+    def retract(self, x: Array) -> Array:
+        """The variables (7 n,) after a step, put in order."""
+        return unit(x)
+
+    def admits(self, x: Array) -> bool:
+        """Whether the step may end at x; if not, the equations have changed and the step is made anew."""
+        return True
+
+    def arrive(self, x: Array) -> bool:
+        """Renew the equations at x, where a step ended; whether their number or pattern changed."""
+        return False
 
 
 class Reached(NamedTuple):
@@ -67,23 +97,25 @@ class Reached(NamedTuple):
 
 
 def reach(
-    system: System, x: Array, algebra: LinearAlgebra, *, tolerance: float, iterations: int, kind: Kind = "slack"
+    course: Course, x: Array, *, tolerance: float, iterations: int, kind: Kind = "slack", mend: bool = True
 ) -> Reached:
     """Meet all equations from x (7 n,), or come as near as goes.
 
     Args:
-        system: the equations.
+        course: the equations.
         x: where to begin.
-        algebra: for the system's pattern.
         tolerance: metres and radians.
         iterations: most of them.
         kind: how inequalities are dealt with.
+        mend: whether to end with what must hold, where the goals were not met.
     """
-    run = _Run(system, x, algebra, tolerance, kind)
-    run.iterate(iterations, goals=True)
-    if run.hard > tolerance and system.goal.any():
+    run = _Run(course, x, tolerance, kind)
+    run.iterate(iterations, goals=True, pulls=True)
+    if run.stationary and max(run.hard, run.goal) > tolerance and len(run.objective):
+        run.iterate(iterations, goals=True, pulls=False)
+    if mend and run.hard > tolerance and len(run.goal_rows):
         stationary = run.stationary
-        run.iterate(MENDING, goals=False)
+        run.iterate(MENDING, goals=False, pulls=False)
         run.stationary = stationary if run.hard <= tolerance else run.stationary
     met = max(run.hard, run.goal) <= tolerance
     return Reached(run.x, met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)
@@ -92,14 +124,22 @@ def reach(
 class _Run:
     """State of one iteration."""
 
-    def __init__(self, system: System, x: Array, algebra: LinearAlgebra, tolerance: float, kind: Kind) -> None:
-        self.system, self.algebra, self.tolerance = system, algebra, tolerance
-        self.goal_rows = np.flatnonzero(system.goal)
-        self.one_sided = np.flatnonzero(system.inequality)
-        self._move(unit(x), None)
-        self.state: Inequalities = inequalities(kind, self.residual[self.one_sided])
+    def __init__(self, course: Course, x: Array, tolerance: float, kind: Kind) -> None:
+        self.course, self.tolerance, self.kind = course, tolerance, kind
+        self._begin(course.retract(x))
         self.residuals = [max(self.hard, self.goal)]
         self.systems, self.stationary = 0, False
+
+    def _begin(self, x: Array) -> None:
+        """Take the equations as they are now, at x."""
+        self.course.arrive(x)
+        self.system, self.algebra = self.course.system, self.course.algebra
+        self.goal_rows = np.flatnonzero(self.system.goal)
+        self.objective = np.flatnonzero(self.system.objective)
+        self.one_sided = np.flatnonzero(self.system.inequality)
+        self._move(x, None)
+        self.multiplier = np.zeros(len(self.residual))
+        self.state: Inequalities = inequalities(self.kind, self.residual[self.one_sided])
 
     def _move(self, x: Array, residual: Array | None) -> None:
         self.x = x
@@ -113,13 +153,15 @@ class _Run:
     def _error(self, residual: Array) -> Array:
         error: Array = residual.copy()
         error[self.one_sided] = np.minimum(residual[self.one_sided], 0.0)
+        error[self.objective] = 0.0
         return error
 
-    def iterate(self, iterations: int, goals: bool) -> None:
+    def iterate(self, iterations: int, *, goals: bool, pulls: bool) -> None:
         """Step until everything holds, nothing moves any more, or the iterations are spent."""
         damping, share, pull, stagnant = 0.0, 1.0, PULL, 0
         self.stationary = False
         least = sum(self._norms(self.residual))
+        refused = 0
         funnel = max(min(FUNNEL * self._norms(self.residual)[1], WIDEST), self.tolerance)
         for _ in range(iterations):
             if max(self.hard, self.goal * goals) <= self.tolerance and self.state.finished():
@@ -127,11 +169,21 @@ class _Run:
             before = self._norms(self.residual)
             try:
                 mend = not goals or (self.goal > self.tolerance and before[0] > MEND * funnel)
-                step = self._step(damping, share, 0.0 if mend else min(1.0, pull / max(self.goal, 1e-300)), goals)
+                step = self._step(
+                    damping, share, 0.0 if mend else min(1.0, pull / max(self.goal, 1e-300)), goals, pulls
+                )
             except SingularSystemError:
                 step = np.zeros_like(self.x)
             length = min(1.0, LARGEST_TURN / max(_largest_turn(step), 1e-300)) * self.state.share()
-            trial = unit(self.x + length * step)
+            if np.isfinite(self.course.longest):
+                length = min(length, self.course.longest / max(self._motion(step), 1e-300))
+            trial = self.course.retract(self.x + length * step)
+            if refused < REFUSALS and not self.course.admits(trial):
+                refused += 1  # what was run into is an equation now: the step is made anew from where it began
+                self.residuals.append(self.residuals[-1])
+                self._begin(self.x)
+                continue
+            refused = 0
             found = self.system.residual(trial)
             after = self._norms(found)
             promised = self._norms(self.residual + length * self.system.pattern.times(self.values, step))
@@ -148,8 +200,11 @@ class _Run:
             nearer = sum(after) < (1.0 - STAGNANT) * least
             least = min(least, sum(after))
             stagnant = 0 if nearer or not self.state.finished() else stagnant + 1
-            self._move(trial, found)
-            self.state.accept(length, found[self.one_sided])
+            if self.course.arrive(trial):
+                self._begin(trial)
+            else:
+                self._move(trial, None)
+                self.state.accept(length, self.residual[self.one_sided])
             self.residuals.append(max(self.hard, self.goal))
             damping = damping * DAMPING_DOWN if damping > FIRST_DAMPING else 0.0
             share, pull = min(1.0, 2.0 * share), min(PULL, 2.0 * pull)
@@ -157,12 +212,18 @@ class _Run:
                 self.stationary = True
                 return
 
-    def _step(self, damping: float, share: float, pull: float, goals: bool) -> Array:
+    def _step(self, damping: float, share: float, pull: float, goals: bool, pulls: bool) -> Array:
         """The step of one iteration; inequalities come and go until the linear solution agrees with them."""
         asked = self.residual * share
         asked[self.goal_rows] = self.residual[self.goal_rows] * min(pull, share)
         diagonal = np.full(len(asked), HARD_DAMPING + HARD_SHARE * damping * damping)
-        diagonal[self.goal_rows] = (GOAL_DAMPING if pull else MENDING_DAMPING) + damping if goals else FREE
+        softness = (GOAL_DAMPING if pull else MENDING_DAMPING) + damping if goals else FREE
+        diagonal[self.goal_rows] = softness / self.system.share[self.goal_rows] ** 2
+        asked[self.objective] = pulls * self.residual[self.objective] / (1.0 + damping / FIRST_DAMPING)
+        if damping == 0.0 and goals and max(self.hard, self.goal) < NEAR:
+            base = np.where(self.system.goal, GOAL_DAMPING, HARD_DAMPING)
+            asked -= np.where(self.system.objective | self.system.inequality, 0.0, base) * self.multiplier
+        diagonal[self.objective] = 1.0 / self.system.stiffness[self.objective]
         gradient = np.zeros_like(self.x)
         rows, phi = self.one_sided, self.residual[self.one_sided]
         base = diagonal[rows]
@@ -174,6 +235,7 @@ class _Run:
             system = LinearSystem(self.values, self.system.weight, diagonal, gradient, asked)
             step, y = self.algebra.solve(system)
             self.systems += 1
+            self.multiplier = y
             if not len(rows):
                 return step
             change = self.system.pattern.times(self.values, step)[rows]
@@ -186,9 +248,14 @@ class _Run:
     def _norms(self, residual: Array) -> tuple[float, float]:
         """Norms of the errors of what must hold, and of the goals."""
         error = self._error(residual)
-        goal = error[self.goal_rows]
-        square = float(goal @ goal)
-        return sqrt(max(float(error @ error) - square, 0.0)), sqrt(square)
+        goal = error[self.goal_rows] * self.system.share[self.goal_rows]
+        error[self.goal_rows] = 0.0
+        return sqrt(float(error @ error)), sqrt(float(goal @ goal))
+
+    def _motion(self, step: Array) -> float:
+        """About the longest way of any part of a body in a step, metres: the weights of turns are squared sizes."""
+        bodies = (step * np.sqrt(self.system.weight)).reshape(-1, 7)
+        return float(np.sqrt((bodies * bodies).sum(axis=1).max(initial=0.0)))
 
     def _better(
         self, before: tuple[float, float], after: tuple[float, float], promised: tuple[float, float], funnel: float

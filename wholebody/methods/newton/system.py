@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.methods.newton.batches import Batch
+from wholebody.methods.newton.batches import Batch, Key
 from wholebody.methods.newton.linear_algebra.base import Pattern
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
+OBJECTIVE = "objective"
 WORLD = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
 
 
@@ -25,29 +25,37 @@ class System:
         pattern: where the Jacobian (m, 7 n) can be other than zero.
         goal: (m,) rows that may be missed where they cannot be met.
         inequality: (m,) rows that are to be at least zero.
+        share: (m,) root of each goal's weight, as a share of the greatest; 1 for what must hold.
+        objective: (m,) rows whose squares are to be small, the pluggable part of the objective.
+        stiffness: (m,) their factors.
         weight: (7 n,) weight of each variable in the least motion.
     """
 
     def __init__(
-        self, count: int, batches: Sequence[Batch], goals: Sequence[bool], inequalities: Sequence[bool], weight: Array
+        self, count: int, batches: Sequence[tuple[Batch, Key]], weight: Array, stiffness: Array | None = None
     ) -> None:
         """Lay out rows and pattern.
 
         Args:
             count: bodies, without the world.
             batches: equations; those without members are left out.
-            goals: for each batch, whether it may be missed.
-            inequalities: for each batch, whether its rows are to be at least zero.
             weight: (7 count,).
+            stiffness: (k,) factors of the rows of batches of the kind "objective", in their order.
         """
-        kept = [index for index, batch in enumerate(batches) if len(batch)]
+        keys = [key for batch, key in batches if len(batch)]
         self.count = count
-        self.batches = [batches[index] for index in kept]
+        self.batches = [batch for batch, _ in batches if len(batch)]
         self.weight = weight
         sizes = [len(batch) * batch.size for batch in self.batches]
         self.starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
-        self.goal = _spread(sizes, [goals[index] for index in kept])
-        self.inequality = _spread(sizes, [inequalities[index] for index in kept])
+        self.goal = np.repeat([key.goal for key in keys], sizes).astype(bool)
+        self.inequality = np.repeat([key.one_sided for key in keys], sizes).astype(bool)
+        self.objective = np.repeat([key.kind == OBJECTIVE for key in keys], sizes).astype(bool)
+        self.stiffness = np.ones(len(self.objective))
+        if stiffness is not None:
+            self.stiffness[self.objective] = stiffness
+        weights = np.repeat([key.weight if key.goal else 0.0 for key in keys], sizes)
+        self.share = np.where(self.goal, np.sqrt(weights / weights.max(initial=1e-300)), 1.0)
         rows, columns = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
         self._masks = []
         for batch, start in zip(self.batches, self.starts, strict=False):
@@ -110,7 +118,3 @@ class System:
 def _columns(batch: Batch) -> Indices:
     """(k, 7 b) columns of the variables of each equation; those of the world come after all others."""
     return (7 * batch.bodies[:, :, None] + np.arange(7)).reshape(len(batch), -1)
-
-
-def _spread(sizes: list[int], flags: list[bool]) -> Mask:
-    return np.repeat(np.array(flags, dtype=bool), np.array(sizes, dtype=np.intp))

@@ -1,0 +1,129 @@
+"""Whole problems by Newton's method: against the qp method, and against what must hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.methods.newton.figure_bodies import FigureBodies
+
+
+@pytest.fixture(scope="module")
+def human() -> wb.Figure:
+    return wb.load("human")
+
+
+def _standing(scene: wb.Scene, *goals: Any, **more: Any) -> wb.Problem:
+    holds = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    return wb.Problem(scene, "standing", goals=goals, constraints=holds, **more)
+
+
+def _honest(problem: wb.Problem, solution: wb.Solution, tolerance: float = 1e-5) -> None:
+    judged, slack = wb.assess(problem, solution.q), 1.1 * tolerance + 2e-6
+    assert np.isfinite(solution.q).all()
+    assert problem.scene.figure.within_limits(solution.q)
+    if solution.status in ("solved", "unreachable"):
+        assert judged.holds(slack)
+    assert judged.met(slack) == (solution.status == "solved")
+
+
+@pytest.mark.parametrize("name", ["human", "avatar", "hand"])
+def test_postures_go_in_and_out(name: str) -> None:
+    figure = wb.load(name)
+    bodies, rng = FigureBodies(figure), np.random.default_rng(0)
+    for _ in range(5):
+        lower, upper = figure.tangent_bounds(figure.neutral)
+        move = rng.uniform(np.maximum(lower, -1.0), np.minimum(upper, 1.0))
+        q = figure.clamp(pin.integrate(figure.model, figure.neutral, move))
+        again = bodies.posture(bodies.variables(q))
+        assert pin.difference(figure.model, q, again) == pytest.approx(np.zeros(figure.model.nv), abs=1e-9)
+
+
+def test_every_joint_of_the_human_holds_at_any_posture(human: wb.Figure) -> None:
+    bodies = FigureBodies(human)
+    system = bodies.equations.system(bodies.count, bodies.names, bodies.weight)
+    for name in human.postures:
+        assert np.abs(system.residual(bodies.variables(human.posture(name)))).max() < 1e-12
+
+
+@pytest.mark.parametrize("goal", [(0.45, -0.25, 0.95), (0.5, 0.2, 0.8), (0.3, -0.3, 1.9)])
+def test_it_finds_what_the_qp_method_finds(human: wb.Figure, goal: tuple[float, float, float]) -> None:
+    problem = _standing(wb.Scene(human), wb.Point("right_index_tip", goal))
+    ours, theirs = wb.Newton().solve(problem), wb.QP().solve(problem)
+    _honest(problem, ours)
+    assert ours.status == theirs.status == "solved"
+    # two methods that share no code end at the same effort, which is the global one or the same local one
+    assert ours.assessment.measure == pytest.approx(theirs.assessment.measure, rel=0.02)
+
+
+def test_slacks_and_barrier_agree(human: wb.Figure) -> None:
+    problem = _standing(wb.Scene(human), wb.Point("right_index_tip", (0.3, -0.3, 1.9)))
+    measures = []
+    for kind in ("slack", "barrier"):
+        solution = wb.Newton(inequalities=kind).solve(problem)
+        _honest(problem, solution)
+        assert solution.solved
+        measures.append(solution.assessment.measure)
+    assert measures[0] == pytest.approx(measures[1], rel=0.01)
+
+
+def test_things_in_the_way_are_not_entered(human: wb.Figure, least_distance: Callable[..., float]) -> None:
+    scene = wb.Scene(human).add(wb.Box((1.2, 0.7, 0.04)), name="table", at=(0.75, 0, 0.72))
+    problem = _standing(scene, wb.Point("right_index_tip", (0.5, 0.2, 0.8)), clearance=0.005)
+    solution = wb.solve(problem, method="newton")
+    assert solution.solved
+    _honest(problem, solution)
+    assert least_distance(scene, solution.q) >= problem.clearances.min() - 1e-5
+
+
+def test_two_hands_on_one_box_close_a_loop(human: wb.Figure) -> None:
+    scene = wb.Scene(human)
+    q = human.posture("arms_forward")
+    problem = wb.Problem(
+        scene,
+        q,
+        goals=[wb.Point("left_palm", scene.state(q).frame(human.frame_id("left_palm")).translation + (0, 0, 0.1))],
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Hold("right_palm", relative_to="left_palm")],
+    )
+    ours, theirs = wb.Newton(tolerance=1e-6).solve(problem), wb.QP(tolerance=1e-6).solve(problem)
+    assert ours.status == theirs.status == "solved"
+    assert ours.assessment.constraint_violation < 1e-6
+    assert ours.assessment.measure == pytest.approx(theirs.assessment.measure, rel=0.02)
+
+
+def test_a_goal_out_of_reach_is_approached_and_said_to_be(human: wb.Figure) -> None:
+    problem = _standing(wb.Scene(human), wb.Point("right_index_tip", (3.0, 0.0, 1.0)))
+    solution = wb.Newton().solve(problem)
+    assert solution.status in ("unreachable", "stalled")
+    assert solution.assessment.holds(1.2e-5)
+    reached = wb.QP().solve(problem).assessment.goal_error
+    assert solution.assessment.goal_error < reached + 0.1
+
+
+def test_frozen_joints_stay(human: wb.Figure) -> None:
+    problem = wb.Problem(
+        wb.Scene(human),
+        "standing",
+        goals=[wb.Point("right_index_tip", (0.4, -0.3, 1.1))],
+        constraints=[wb.Freeze("root", "left_leg", "right_leg")],
+    )
+    solution = wb.Newton().solve(problem)
+    assert solution.solved
+    still = human.dofs(["root", "left_leg", "right_leg"])
+    assert np.abs(pin.difference(human.model, problem.start, solution.q)[still]).max() < 1e-5
+
+
+def test_what_it_has_no_equations_for_is_refused_by_name(human: wb.Figure) -> None:
+    with pytest.raises(wb.InputError, match=r"goals\[0\], CenterOfMass"):
+        wb.Newton().solve(_standing(wb.Scene(human), wb.CenterOfMass((0, 0, 1.0))))
+    with pytest.raises(wb.InputError, match="tolerance"):
+        wb.Newton(tolerance=0.0)
+    with pytest.raises(wb.UnknownNameError):
+        wb.Newton(algebra="cholesky")
+    problem = _standing(wb.Scene(human), wb.Point("right_palm", (0.3, -0.3, 1.0)), measures=[wb.Discomfort()])
+    assert "Discomfort is reported, not minimised" in wb.Newton().solve(problem).message

@@ -1,0 +1,213 @@
+"""A figure in full coordinates: its joints as equations, and postures in and out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
+from wholebody.geometry.memory_views import placement_view
+from wholebody.methods.newton.batches import Angle
+from wholebody.methods.newton.equations import EquationSet
+from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+SMALLEST = 0.1  # m: size of a body without anything on it; smaller = turns of such bodies cost less
+
+
+class FigureBodies:
+    """Bodies of a figure: one for each joint, at the joint's place. Body k moves with Pinocchio's joint k + 1.
+
+    Attributes:
+        count: bodies.
+        weight: (7 count,) weight of each variable in the least motion.
+        names: of the joints.
+        equations: the joints.
+    """
+
+    def __init__(self, figure: Figure) -> None:
+        """Read the joints.
+
+        Raises:
+            InputError: a joint of a type that has no equations here.
+        """
+        self.figure, self.model = figure, figure.model
+        self.count = self.model.njoints - 1
+        self.names = list(self.model.names)[1:]
+        self.data = self.model.createData()
+        self.equations = EquationSet()
+        self._turning: list[tuple[int, int, Array, Array]] = []  # joint, parent, axes in the parent, axes in the child
+        self._others: list[int] = []
+        for joint in range(1, self.model.njoints):
+            self._add(joint)
+        pin.forwardKinematics(self.model, self.data, pin.neutral(self.model))
+        self._placements = placement_view(self.data.oMi)
+        first, second = (np.array([row[k] for row in self._turning]).reshape(-1, 4) for k in (2, 3))
+        pairs = np.array([(row[1] - 1, row[0] - 1) for row in self._turning], dtype=np.intp).reshape(-1, 2)
+        pairs[pairs < 0] = self.count
+        limits = figure.limits
+        low, high = np.full(self.model.nq, -np.inf), np.full(self.model.nq, np.inf)
+        low[limits.idx_q], high[limits.idx_q] = limits.lower, limits.upper
+        self._places: Indices = np.array([self.model.joints[row[0]].idx_q for row in self._turning], dtype=np.intp)
+        self.low, self.high = low[self._places], high[self._places]
+        finite = np.isfinite(self.low + self.high)
+        center = np.zeros(len(pairs))
+        center[finite] = 0.5 * (self.low + self.high)[finite]
+        labels = [f"the limit of {self.names[row[0] - 1]!r}" for row in self._turning]
+        forms = relative_forms(first, second)[:, 2:]
+        self.angles = Angle(pairs, labels, forms, center, np.zeros(len(pairs)), np.ones(len(pairs)))
+        self.weight = self._weight()
+
+    def limits(self) -> Angle:
+        """One row for each limited joint, the nearer of its two limits; `aim` chooses which."""
+        limited = np.flatnonzero(np.isfinite(self.low) | np.isfinite(self.high))
+        part = self.angles
+        labels = [part.labels[k] for k in limited]
+        bound, sign = self.low[limited].copy(), np.ones(len(limited))
+        self._limited = limited
+        return Angle(part.bodies[limited], labels, part.forms[limited], part.center[limited], bound, sign)
+
+    def distance(self, q: Array) -> tuple[Angle, Indices]:
+        """One row for each turning joint, its angle from that at q (nq,); and the joints' tangent places."""
+        part = self.angles
+        tangent = np.array([self.model.joints[row[0]].idx_v for row in self._turning], dtype=np.intp)
+        bound, sign = q[self._places].copy(), np.ones(len(part))
+        return Angle(part.bodies, part.labels, part.forms, part.center, bound, sign), tangent
+
+    def aim(self, limits: Angle, q: Array) -> None:
+        """Turn the rows of `limits` to the limits that are nearer at q (nq,)."""
+        value = q[self._places[self._limited]]
+        low, high = self.low[self._limited], self.high[self._limited]
+        upper = high - value < value - low
+        limits.bound = np.where(upper, high, low)
+        limits.sign = np.where(upper, -1.0, 1.0)
+
+    def variables(self, q: Array) -> Array:
+        """The bodies (7 count,) at the posture q (nq,)."""
+        pin.forwardKinematics(self.model, self.data, q)
+        if self._placements is None:
+            places = np.array([[*M.rotation.T, M.translation] for M in self.data.oMi])
+        else:
+            places = self._placements
+        bodies = np.empty((self.count, 7))
+        bodies[:, :3] = places[1:, 3]
+        bodies[:, 3:] = _quaternions(places[1:, :3])
+        result: Array = bodies.ravel()
+        return result
+
+    def posture(self, x: Array) -> Array:
+        """The posture (nq,), within limits, of the bodies x (7 count,): each joint read off its own two bodies."""
+        bodies = np.concatenate([x, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)]).reshape(-1, 7)
+        q = pin.neutral(self.model)
+        q[self._places] = self.angles.angle(bodies)
+        for joint in self._others:
+            kind = self.model.joints[joint]
+            parent = pin.XYZQUATToSE3(_unit(bodies[self.model.parents[joint] - 1]))
+            place = (parent * self.model.jointPlacements[joint]).actInv(pin.XYZQUATToSE3(_unit(bodies[joint - 1])))
+            if kind.nq == 7:
+                q[kind.idx_q : kind.idx_q + 7] = pin.SE3ToXYZQUAT(place)
+            elif kind.nq == 4:
+                q[kind.idx_q : kind.idx_q + 4] = pin.Quaternion(place.rotation).coeffs()
+            elif kind.nq == 2:
+                axes = axes_with_z(_axis(kind)[None])[0]
+                turn = pin.Quaternion(axes).toRotationMatrix().T @ place.rotation @ pin.Quaternion(axes).matrix()
+                q[kind.idx_q : kind.idx_q + 2] = np.array((turn[0, 0], turn[1, 0])) / np.hypot(turn[0, 0], turn[1, 0])
+            else:
+                q[kind.idx_q] = place.translation @ _axis(kind)
+        result: Array = self.figure.clamp(q)
+        return result
+
+    def _add(self, joint: int) -> None:
+        model, equations = self.model, self.equations
+        kind, parent, placement = model.joints[joint], int(model.parents[joint]), model.jointPlacements[joint]
+        name, label = kind.shortname(), f"the joint {model.names[joint]!r}"
+        a, b = parent - 1, joint - 1
+        place, turn = np.array(placement.translation), pin.Quaternion(placement.rotation)
+        if name == "JointModelFreeFlyer":
+            self._others.append(joint)
+        elif name == "JointModelSpherical":
+            equations.coincide(a, b, label, place, np.zeros(3))
+            self._others.append(joint)
+        elif name.startswith("JointModelR") and kind.nv == 1:
+            basis = pin.Quaternion(axes_with_z(_axis(kind)[None])[0])
+            equations.coincide(a, b, label, place, np.zeros(3))
+            equations.turn(a, b, label, turn * basis, basis, 2)
+            if kind.nq == 1:
+                self._turning.append((joint, parent, (turn * basis).coeffs(), basis.coeffs()))
+            else:
+                self._others.append(joint)
+        elif name.startswith("JointModelP") and kind.nq == kind.nv == 1:
+            axis = _axis(kind)
+            basis = pin.Quaternion(axes_with_z(axis[None])[0])
+            equations.turn(a, b, label, turn * basis, basis, 3)
+            for side in (turn * basis).toRotationMatrix().T[:2]:
+                equations.slide(a, b, label, side, np.zeros(3), float(side @ place))
+            along = turn * axis
+            low, high = model.lowerPositionLimit[kind.idx_q], model.upperPositionLimit[kind.idx_q]
+            for bound, sign in ((low, 1.0), (high, -1.0)):
+                if np.isfinite(bound):
+                    height = sign * float(along @ place + bound)
+                    equations.slide(a, b, f"the limit of {label[4:]}", sign * along, np.zeros(3), height, above=True)
+            self._others.append(joint)
+        else:
+            raise InputError(
+                f"newton has no equations for {label}, a {name}; use method='qp', or lock it with figure.reduced(...)"
+            )
+
+    def _weight(self) -> Array:
+        """Turning a body costs what moving the farthest thing on it does."""
+        size = np.full(self.count, SMALLEST)
+        for joint in range(1, self.model.njoints):
+            parent = int(self.model.parents[joint])
+            if parent:
+                reach = float(np.linalg.norm(self.model.jointPlacements[joint].translation))
+                size[parent - 1] = max(size[parent - 1], reach)
+        for frame in self.model.frames:
+            if frame.parentJoint:
+                reach = float(np.linalg.norm(frame.placement.translation))
+                size[frame.parentJoint - 1] = max(size[frame.parentJoint - 1], reach)
+        result: Array = np.concatenate([np.ones((self.count, 3)), np.tile((2.0 * size)[:, None] ** 2, 4)], axis=1)
+        return result.ravel()
+
+
+def _axis(kind: Any) -> Array:
+    name = kind.shortname()
+    if name.endswith("Unaligned"):
+        return np.array(kind.extract().axis)
+    return np.array(AXES[name[-1]])
+
+
+def _unit(body: Array) -> Array:
+    result: Array = body.copy()
+    result[3:] /= np.linalg.norm(result[3:])
+    return result
+
+
+def _quaternions(columns: Array) -> Array:
+    """Quaternions (k, 4) of rotations whose columns are [k, j]: the largest component by its square, then the others.
+
+    Shepperd 1978, "Quaternion from rotation matrix", Journal of Guidance and Control 1.
+    """
+    m = columns.transpose(0, 2, 1)
+    x, y, z = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
+    four = np.empty((len(m), 4, 4))  # 4 e e'
+    four[:, 0, 0], four[:, 1, 1], four[:, 2, 2] = 1 + x - y - z, 1 - x + y - z, 1 - x - y + z
+    four[:, 3, 3] = 1 + x + y + z
+    four[:, 0, 1] = four[:, 1, 0] = m[:, 0, 1] + m[:, 1, 0]
+    four[:, 0, 2] = four[:, 2, 0] = m[:, 0, 2] + m[:, 2, 0]
+    four[:, 1, 2] = four[:, 2, 1] = m[:, 1, 2] + m[:, 2, 1]
+    four[:, 0, 3] = four[:, 3, 0] = m[:, 2, 1] - m[:, 1, 2]
+    four[:, 1, 3] = four[:, 3, 1] = m[:, 0, 2] - m[:, 2, 0]
+    four[:, 2, 3] = four[:, 3, 2] = m[:, 1, 0] - m[:, 0, 1]
+    k = np.arange(len(m))
+    largest = np.argmax(four[:, np.arange(4), np.arange(4)], axis=1)
+    row = four[k, largest]
+    result: Array = row / np.sqrt((row * row).sum(axis=1, keepdims=True))
+    return result

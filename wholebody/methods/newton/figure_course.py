@@ -1,0 +1,113 @@
+"""The equations of a problem on its way: joints, constraints and goals stay, limits and contacts are renewed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.methods.newton.batches import Batch, Key, Unit
+from wholebody.methods.newton.contacts import ContactSet
+from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.linear_algebra.choice import linear_algebra
+from wholebody.methods.newton.reaching import Course
+from wholebody.methods.newton.system import OBJECTIVE, System
+from wholebody.methods.newton.terms import constraint_equations, goal_equations
+from wholebody.problem import Problem
+from wholebody.tasks import Effort
+
+Array = NDArray[np.float64]
+
+STIFFNESS = 10.0  # m^2 a unit of effort [rad^2]: what bodies' motion counts against it; larger = nearer to least effort
+LEAST_STIFFNESS = 0.03  # units of effort that every joint has
+LONGEST = 0.08  # m: longest way of a body in a step where there are pairs that can touch; larger = faster, less seen
+HARD = Key("", False, False, 1.0)
+ONE_SIDED = Key("", False, True, 1.0)
+
+
+class FigureCourse(Course):
+    """A problem's equations, at one posture after the other.
+
+    After every step the posture is read off the bodies and the bodies are put where it has them, so that joints never
+    drift, limits always hold, and what is reached is a posture.
+
+    Attributes:
+        structures: how often the pattern was laid out and analysed.
+    """
+
+    def __init__(self, problem: Problem, algebra: str) -> None:
+        """State the equations.
+
+        Raises:
+            InputError: a term or a joint that has no equations here.
+        """
+        self.problem, self._name = problem, algebra
+        self.bodies = FigureBodies(problem.scene.figure)
+        self.contacts = ContactSet(problem) if len(problem.scene.proximity.pairs) else None
+        self.longest = LONGEST if self.contacts else np.inf
+        count = self.bodies.count
+        unit = Unit(np.arange(count)[:, None], [f"the Euler parameters of {name!r}" for name in self.bodies.names])
+        self._limits = self.bodies.limits()
+        self._fixed: list[tuple[Batch, Key]] = [(unit, HARD), (self._limits, ONE_SIDED)]
+        self._fixed += self.bodies.equations.batches(count)
+        self._fixed += constraint_equations(problem).batches(count)
+        self._goals = goal_equations(problem, problem.goals).batches(count)
+        self._stiffness = self._objective(problem)
+        self.q = problem.start
+        self.structures = 0
+        self._laid: tuple[object, ...] = ()
+        self.arrive(self.variables(problem.start))
+
+    def _objective(self, problem: Problem) -> Array:
+        """Joint angles that measures ask to be near others, and their factors; how far the joints move otherwise."""
+        nv = self.bodies.model.nv
+        weight, target = np.zeros(nv), problem.start
+        self.reported = []
+        for term in problem.measures:
+            if isinstance(term, Effort):
+                weight = weight + term.weight * problem.scene.figure.effort_weights
+            else:
+                self.reported.append(type(term).__name__)
+        self.angles, tangent = self.bodies.distance(target)
+        self._fixed.append((self.angles, Key(OBJECTIVE, False, False, 1.0)))
+        return STIFFNESS * np.maximum(weight[tangent], LEAST_STIFFNESS)
+
+    def variables(self, q: Array) -> Array:
+        """The bodies at the posture q (nq,)."""
+        return self.bodies.variables(q)
+
+    def retarget(self) -> None:
+        """Take the problem's new goals."""
+        self._goals = goal_equations(self.problem, self.problem.goals).batches(self.bodies.count)
+
+    def retract(self, x: Array) -> Array:
+        """The bodies of the nearest posture."""
+        self.q = self.bodies.posture(x)
+        return self.bodies.variables(self.q)
+
+    def admits(self, x: Array) -> bool:
+        """Whether nothing but the pairs that are inequalities overlaps at x, where `retract` has just been."""
+        return self.contacts is None or not self.contacts.runs_into(self.bodies.data)
+
+    def arrive(self, x: Array) -> bool:
+        """Renew limits and contacts at x; whether the pattern changed."""
+        self.q = self.bodies.posture(x)
+        x = self.bodies.variables(self.q)
+        self.bodies.aim(self._limits, self.q)
+        batches = [*self._fixed, *self._goals]
+        pairs: bytes = b""
+        if self.contacts is not None:
+            world = self.bodies.count
+            everything = np.concatenate([x, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)]).reshape(-1, 7)
+            rows, _ = self.contacts.renew(self.bodies.data, everything, world)
+            pairs = self.contacts.pairs.tobytes()
+            if len(rows):
+                batches.append((rows, ONE_SIDED))
+        laid = (pairs, *((type(batch), batch.size, batch.bodies.tobytes(), key) for batch, key in self._goals))
+        if laid != self._laid:
+            self._laid = laid
+            self.system = System(self.bodies.count, batches, self.bodies.weight, self._stiffness)
+            self.algebra = linear_algebra(self.system.pattern, self._name)
+            self.structures += 1
+            return True
+        self.system.batches = [batch for batch, _ in batches if len(batch)]
+        return False

@@ -1,0 +1,115 @@
+"""Goals and constraints of a problem as equations of bodies; what has none is refused by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.errors import InputError
+from wholebody.methods.newton.equations import EquationSet
+from wholebody.methods.newton.quaternions import axes_with_z
+from wholebody.problem import Problem
+from wholebody.tasks import Axis, Frame, Freeze, Hold, Orientation, Plane, Point, Relative, StepLimit
+from wholebody.tasks.base import Goal
+from wholebody.tasks.residuals import PlacementResidual
+
+CAN = "Point, Frame, Orientation, Relative, Axis(direction=...), Hold, Plane, Freeze"
+
+
+def goal_equations(problem: Problem, goals: Sequence[Goal]) -> EquationSet:
+    """Equations of goals.
+
+    Raises:
+        InputError: a goal that has none here.
+    """
+    result = EquationSet()
+    for number, goal in enumerate(goals):
+        label = f"goals[{number}], {type(goal).__name__}"
+        if isinstance(goal, Point):
+            place = goal._place
+            point = _local(problem, place.frame).act(goal._offset)
+            result.coincide(place.joint - 1, -1, label, point, goal._target, goal=True, weight=goal.weight)
+        elif isinstance(goal, (Frame, Orientation, Relative)):
+            _placement(result, problem, goal._residual, label, goal=True, weight=goal.weight)
+        elif isinstance(goal, Axis) and goal.toward is None:
+            local = _local(problem, goal._place.frame)
+            ours = pin.Quaternion(axes_with_z((local.rotation @ goal._basis[2])[None])[0])
+            wanted = pin.Quaternion(axes_with_z(goal._wanted[None])[0])
+            result.turn(goal._place.joint - 1, -1, label, ours, wanted, 2, goal=True, weight=goal.weight)
+        else:
+            raise _refused(label)
+    return result
+
+
+def constraint_equations(problem: Problem) -> EquationSet:
+    """Equations of constraints and bounds.
+
+    Raises:
+        InputError: one that has none here.
+    """
+    result = EquationSet()
+    for number, term in enumerate(problem.constraints):
+        label = f"constraints[{number}], {type(term).__name__}"
+        if isinstance(term, Hold):
+            _placement(result, problem, term._residual, label)
+        elif isinstance(term, Plane):
+            place = np.array(_local(problem, term._place.frame).translation)
+            above = term.side == "above"
+            result.slide(-1, term._place.joint - 1, label, term._normal, place, term._height, above=above)
+        else:
+            raise _refused(label)
+    for bound in problem.bounds:
+        if isinstance(bound, Freeze):
+            _frozen(result, problem, bound)
+        elif not isinstance(bound, StepLimit):  # a solve is not tied to time, so a step limit bounds nothing
+            raise _refused(type(bound).__name__)
+    return result
+
+
+def _placement(
+    equations: EquationSet,
+    problem: Problem,
+    residual: PlacementResidual,
+    label: str,
+    *,
+    goal: bool = False,
+    weight: float = 1.0,
+) -> None:
+    """The residual of one frame in another: a point that coincides, and axes that agree."""
+    base, local = _local(problem, residual.base.frame), _local(problem, residual.place.frame)
+    a, b = residual.base.joint - 1, residual.place.joint - 1
+    if residual.position:
+        point = base.act(residual.target)
+        equations.coincide(a, b, label, point, np.array(local.translation), goal=goal, weight=weight)
+    if residual.orientation:
+        wanted = pin.Quaternion(base.rotation @ residual.undo.rotation.T)
+        equations.turn(a, b, label, wanted, pin.Quaternion(local.rotation), 3, goal=goal, weight=weight)
+
+
+def _frozen(equations: EquationSet, problem: Problem, bound: Freeze) -> None:
+    """Joints that keep their placement to their parent."""
+    figure, model = problem.scene.figure, problem.scene.model
+    state = problem.scene.state(problem.start)
+    for name in figure.joint_names(bound.joints):
+        joint = figure.joint_id(name)
+        parent = int(model.parents[joint])
+        here = state.data.oMi[parent].actInv(state.data.oMi[joint])
+        label = f"Freeze, {name!r}"
+        if model.joints[joint].nv == 1 and model.joints[joint].shortname().startswith("JointModelR"):
+            # the joint's own equations leave only this turn: one of the three rows, the others tolerated as redundant
+            equations.turn(parent - 1, joint - 1, label, pin.Quaternion(here.rotation), pin.Quaternion.Identity(), 3)
+        else:
+            equations.coincide(parent - 1, joint - 1, label, np.array(here.translation), np.zeros(3))
+            equations.turn(parent - 1, joint - 1, label, pin.Quaternion(here.rotation), pin.Quaternion.Identity(), 3)
+
+
+def _local(problem: Problem, frame: int) -> Any:
+    """Placement of a frame in its body."""
+    return problem.scene.model.frames[frame].placement
+
+
+def _refused(label: str) -> InputError:
+    return InputError(f"newton has no equations for {label}; it takes {CAN}; use method='qp' for the others")
