@@ -24,11 +24,16 @@ from wholebody.scene import Scene
 Array = NDArray[np.float64]
 
 STEP = 0.03  # m: farthest that a chain's tip is drawn at once; half of a forearm's width
+SMALL_STEP = 0.006  # m: where steps of that length lead around a bulge that the straight way cuts
 STEPS = 8  # most steps of one frame
 MOST_GOALS = 40  # after so many the next frame goes on: some 5 ms
 HALVINGS = 7  # of an interpolation: a step of 3 cm to a quarter of a millimetre
 LEAST_GAIN = 1e-7  # rad^2: a chain that gets no nearer than this to the tracked posture stays where it is
 HELD_UP = 0.4  # a part that gains less than this share of what drawing alone would have is held up (2 is all of it)
+SHAKES = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things came upon and that no joint's best value frees
+APART = 0.02  # m: how far a tip moves between two looks at the straight way from one shown posture to the next
+MOST_LOOKS = 9
+DIP = 1e-3  # m: how deep it may go in there
 ARRIVED = 1e-12  # rad^2: a chain this near is there
 
 
@@ -113,23 +118,34 @@ class Frames:
         wanted = remover.into_cones(self._figure.clamp(q_wanted))
         self._fell_back = False
         q, overlaps = remover.separate(q_free, rng)
+        for size in SHAKES if overlaps else ():
+            shaken, still = remover.separate(self._shaken(q_free, size, rng), rng)
+            if not still:
+                q, overlaps = shaken, still
+                break
         before = self._proximity.placements.copy()
         left = remover.deepest
         if not overlaps:
             if not remover.look(wanted) and not self._jumps(before, q, wanted):
-                return self._result(wanted, remover.deepest)
-            q, left = self._approach(q, wanted, before, rng, steps)
+                touching = remover.deepest
+                if self._dip(q, wanted) < DIP:
+                    return self._result(wanted, touching)
+            for self._step in (STEP, SMALL_STEP):
+                way = self._approach(q, left, wanted, before, rng, steps)
+                shown = self._straight(way)
+                if shown is not None:
+                    return self._result(*shown)
         elif not remover.look(wanted):
             return self._result(wanted, remover.deepest)
         return self._result(q, left)
 
     def _approach(
-        self, q: Array, wanted: Array, before: Array, rng: np.random.Generator, steps: int
-    ) -> tuple[Array, float]:
-        """From a free posture towards the wanted one, step by step; the posture and its deepest overlap."""
+        self, q: Array, left: float, wanted: Array, before: Array, rng: np.random.Generator, steps: int
+    ) -> list[tuple[Array, float]]:
+        """From a free posture towards the wanted one, step by step: the postures and their deepest overlaps."""
         remover = self._remover
         settled = [False] * len(self._parts)
-        left = 0.0
+        way = [(q, left)]
         for _ in range(steps):
             if remover.tally.iterations > MOST_GOALS:
                 break
@@ -142,9 +158,33 @@ class Frames:
             if self._jumps(before, q, trial):
                 trial = self._interpolate(q, self._hit)
             q = self._keep_gains(q, trial, wanted, drawn[1], settled)
-            left = remover.deepest
+            way.append((q, remover.deepest))
             before = self._proximity.placements.copy()
-        return q, left
+        return way
+
+    def _straight(self, way: list[tuple[Array, float]]) -> tuple[Array, float] | None:
+        """The last posture of the way to which the first can go straight, as it will be shown, without dipping in."""
+        for q, left in way[:0:-1]:
+            if self._dip(way[0][0], q) < DIP:
+                return q, left
+        return None
+
+    def _dip(self, q0: Array, q1: Array) -> float:
+        """Deepest overlap at some postures between two, metres."""
+        way = np.abs(np.asarray(pin.difference(self._model, q0, q1)))
+        length = max(float(way[dofs] @ reach) for dofs, reach in self._parts)
+        looks = min(int(length / APART), MOST_LOOKS)
+        deepest = 0.0
+        for k in range(looks):
+            self._remover.look(np.asarray(pin.interpolate(self._model, q0, q1, (k + 1) / (looks + 1))))
+            deepest = max(deepest, self._remover.deepest)
+        return deepest
+
+    def _shaken(self, q: Array, size: float, rng: np.random.Generator) -> Array:
+        """Copy of a posture q (nq,) with its joints moved at random: a straight arm pushed along itself must bend."""
+        step = size * rng.normal(size=self._model.nv)
+        step[self._parts[-1][0]] = 0.0
+        return self._remover.into_cones(self._figure.clamp(np.asarray(pin.integrate(self._model, q, step))))
 
     def _draw(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
         """Draw every part that is not settled a step towards the wanted posture; None where none is left to draw.
@@ -158,7 +198,7 @@ class Frames:
             part = way[dofs]
             length = float(np.abs(part) @ reach)
             if not settled[k] and float(part @ part) >= ARRIVED:
-                shares[k] = min(1.0, STEP / length)
+                shares[k] = min(1.0, self._step / length)
             way[dofs] = part * shares[k]
         if not shares.any():
             return None
@@ -200,7 +240,7 @@ class Frames:
             if way * way < LEAST_GAIN:
                 continue
             step = np.zeros(self._model.nv)
-            step[dof] = min(max(way, -STEP / reach), STEP / reach)
+            step[dof] = min(max(way, -self._step / reach), self._step / reach)
             trial = np.asarray(pin.integrate(self._model, q, step))
             if not self._remover.look(trial):
                 q, gained = trial, True

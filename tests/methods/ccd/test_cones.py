@@ -1,0 +1,52 @@
+"""Cones on floats against the figure's own, and limbs that stay in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.methods.ccd.cones import Polygon, guards
+from wholebody.methods.ccd.limbs import Limbs
+
+
+@pytest.mark.parametrize("name", ["right_shoulder", "left_hip"])
+def test_a_polygon_is_the_figures_cone(name: str, human: wb.Figure) -> None:
+    cone = human.cones[name].cone
+    polygon = Polygon(cone)
+    rows = np.random.default_rng(4).normal(size=(3000, 3))
+    rows /= np.linalg.norm(rows, axis=1)[:, None]
+    inside = cone.contains(rows)
+    assert [polygon.contains(tuple(row)) for row in rows.tolist()] == inside.tolist()
+    nearest = np.array([polygon.nearest(tuple(row)) for row in rows[~inside].tolist()])
+    assert nearest == pytest.approx(cone.project(rows[~inside]), abs=2e-6)
+    assert cone.contains(nearest).all()
+
+
+@pytest.mark.parametrize("chain", ["right_arm", "left_leg"])
+def test_a_limb_that_left_its_cone_is_brought_back(
+    chain: str, human: wb.Figure, random_joints: Callable[..., Any], outside: Callable[..., float]
+) -> None:
+    limbs = Limbs(human.model, map(human.joint_id, human.chains[chain].joints))
+    cones = guards(human, limbs)
+    data, rng, left = human.model.createData(), np.random.default_rng(7), 0
+    for _ in range(150):
+        start, q = human.neutral, random_joints(human, human.chains[chain].joints, rng)
+        pin.forwardKinematics(human.model, data, start)
+        limbs.read(start, data)
+        limbs.forward()
+        for cone in cones:
+            cone.read(data)
+        pin.forwardKinematics(human.model, data, q)
+        limbs.read(q, data)
+        limbs.forward()
+        left += outside(human, q) > 1e-9
+        assert all(cone.keep() for cone in cones)
+        limbs.write(q)
+        assert outside(human, q) <= 1e-9
+        assert human.within_limits(q)
+    assert left > 5

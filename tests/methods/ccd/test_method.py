@@ -1,0 +1,135 @@
+"""Whole solves: random reaches, honest statuses, and refusals by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.methods.ccd.terms import UnsupportedTermError
+
+
+def _target(figure: wb.Figure, frame: str, q: Any) -> Any:
+    data = figure.model.createData()
+    pin.framesForwardKinematics(figure.model, data, q)
+    return data.oMf[figure.frame_id(frame)].copy()
+
+
+@pytest.mark.parametrize("kind", ["point", "frame"])
+@pytest.mark.parametrize("coned", [False, True])
+def test_reachable_targets_are_reached(
+    kind: str,
+    coned: bool,
+    human: wb.Figure,
+    random_joints: Callable[..., Any],
+    deepest: Callable[..., float],
+    outside: Callable[..., float],
+) -> None:
+    scene, rng, solved, tried = wb.Scene(human), np.random.default_rng(11), 0, 0
+    while tried < 25:
+        q = random_joints(human, human.chains["right_arm"].joints, rng)
+        if deepest(scene, q) > 0.0 or (coned and outside(human, q) > 0.0):
+            continue
+        place = _target(human, "right_index_tip", q)
+        goal = wb.Frame("right_index_tip", place) if kind == "frame" else wb.Point("right_index_tip", place.translation)
+        problem = wb.Problem(scene, goals=[goal], constraints=[wb.ReachCones()] if coned else [])
+        solution = wb.CCD().solve(problem)
+        assert human.within_limits(solution.q)
+        assert deepest(scene, solution.q) <= 1.1e-4
+        if coned:
+            assert outside(human, solution.q) <= 1e-9
+        if solution.solved:
+            found = _target(human, "right_index_tip", solution.q)
+            assert np.linalg.norm(found.translation - place.translation) <= 1.1e-4
+            if kind == "frame":
+                assert np.linalg.norm(pin.log3(found.rotation.T @ place.rotation)) <= 1.1e-4
+        solved += solution.solved
+        tried += 1
+    assert solved >= 0.95 * tried
+
+
+def test_two_hands_and_the_spine_at_once(human: wb.Figure, random_joints: Callable[..., Any]) -> None:
+    names = human.chains["right_arm"].joints + human.chains["left_arm"].joints + human.chains["spine"].joints
+    moved = random_joints(human, names, np.random.default_rng(2))
+    q = np.asarray(pin.interpolate(human.model, human.posture("arms_forward"), moved, 0.25))
+    goals = [wb.Point(frame, _target(human, frame, q).translation) for frame in ("right_index_tip", "left_index_tip")]
+    goals.append(wb.Orientation("thorax", _target(human, "thorax", q).rotation))
+    problem = wb.Problem(wb.Scene(human), "arms_forward", goals=goals)
+    assert wb.CCD().solve(problem).solved
+
+
+def test_a_target_behind_a_plate_is_reached_without_touching_it(
+    human: wb.Figure, deepest: Callable[..., float]
+) -> None:
+    scene = wb.Scene(human).add(wb.Box((0.5, 1.0, 0.03)), name="table", at=(0.55, 0.0, 0.75))
+    problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.4, -0.2, 0.80))], clearance=0.002)
+    solution = wb.solve(problem, method="ccd")
+    assert solution.solved, solution.message
+    assert deepest(scene, solution.q) == 0.0
+
+
+def test_a_target_inside_a_thing_is_unreachable_and_nothing_is_violated(
+    human: wb.Figure, deepest: Callable[..., float]
+) -> None:
+    scene = wb.Scene(human).add(wb.Box((0.4, 2.0, 0.8)), name="block", at=(0.7, 0.0, 1.0))
+    solution = wb.CCD(restarts=3).solve(wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.7, -0.2, 1.0))]))
+    assert solution.status in ("unreachable", "stalled")
+    assert deepest(scene, solution.q) <= 1.1e-4
+    assert solution.assessment.goal_error > 0.1
+
+
+def test_a_start_inside_a_thing_is_left(human: wb.Figure, deepest: Callable[..., float]) -> None:
+    scene = wb.Scene(human).add(wb.Box((0.2, 0.2, 0.2)), name="box", at=_target(human, "right_palm", human.neutral))
+    assert deepest(scene, human.neutral) > 0.05
+    problem = wb.Problem(scene, goals=[wb.Point("left_index_tip", (0.3, 0.25, 1.0))])
+    solution = wb.CCD().solve(problem)
+    assert solution.status == "solved", solution.message
+    assert deepest(scene, solution.q) <= 1.1e-4
+
+
+def test_the_same_seed_gives_the_same_posture(human: wb.Figure) -> None:
+    problem = wb.Problem(wb.Scene(human), goals=[wb.Point("right_index_tip", (-0.1, -0.25, 1.2))])
+    first, again = wb.CCD(seed=4).solve(problem), wb.CCD(seed=4).solve(problem)
+    assert (first.q == again.q).all()
+
+
+def test_frozen_joints_and_held_feet_stay(human: wb.Figure) -> None:
+    fixed = ("right_clavicle_protraction", "right_clavicle_elevation")
+    problem = wb.Problem(
+        wb.Scene(human),
+        goals=[wb.Point("right_index_tip", (0.4, -0.3, 1.2))],
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Freeze(*fixed), wb.StepLimit(1.0)],
+    )
+    solution = wb.CCD().solve(problem)
+    assert solution.solved
+    dofs = human.dofs([*fixed, "left_leg", "right_leg", "root"])
+    assert not np.asarray(pin.difference(human.model, problem.start, solution.q))[dofs].any()
+
+
+def test_what_cannot_be_taken_is_named(human: wb.Figure) -> None:
+    problem = wb.Problem(
+        wb.Scene(human),
+        goals=[
+            wb.Point("right_index_tip", (0.4, -0.3, 1.2)),
+            wb.CenterOfMass((0.0, 0.0, 1.0)),
+            wb.Point("pelvis", (0, 0, 1)),
+        ],
+        constraints=[wb.Balance(), wb.Hold("right_hand"), wb.Hold("left_foot", (0.0, 0.0, 0.0))],
+        measures=[wb.Effort(), wb.Discomfort()],
+    )
+    with pytest.raises(UnsupportedTermError) as caught:
+        wb.CCD().solve(problem)
+    assert isinstance(caught.value, wb.InputError)
+    for part in ("goals[1], CenterOfMass", "pelvis", "Balance", "right_hand", "left_foot", "Effort", "Discomfort"):
+        assert part in str(caught.value)
+    assert len(caught.value.terms) == 7
+
+
+@pytest.mark.parametrize("settings", [{"tolerance": 0.0}, {"tolerance": np.nan}, {"iterations": 0}, {"restarts": -1}])
+def test_settings_out_of_range(settings: dict[str, Any]) -> None:
+    with pytest.raises(wb.InputError):
+        wb.CCD(**settings)

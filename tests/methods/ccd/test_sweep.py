@@ -1,0 +1,107 @@
+"""The best value of one joint, against scans of all its values; sweeps, against plane trigonometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import wholebody as wb
+from wholebody.methods.ccd.limbs import Limbs
+from wholebody.methods.ccd.sweep import Aims, sweep, within
+
+
+def _one_joint(made: Any, low: float, high: float) -> tuple[Any, Limbs]:
+    model = pin.Model()
+    bounds = [np.array([value]) for value in (1.0, 1.0, low, high)]
+    model.addJoint(0, made, pin.SE3(pin.exp3(np.array([0.3, -0.2, 0.5])), np.array([0.1, 0.2, 0.3])), "joint", *bounds)
+    limbs, data = Limbs(model, [1]), model.createData()
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    limbs.read(pin.neutral(model), data)
+    limbs.forward()
+    return model, limbs
+
+
+@given(seed=st.integers(0, 10_000), low=st.floats(-7.0, 0.0), high=st.floats(0.0, 7.0), slides=st.booleans())
+def test_a_joint_takes_the_best_of_all_its_values(seed: int, low: float, high: float, slides: bool) -> None:
+    rng = np.random.default_rng(seed)
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    made = pin.JointModelPrismaticUnaligned(axis) if slides else pin.JointModelRevoluteUnaligned(axis)
+    model, limbs = _one_joint(made, low, high)
+    kinds = [False, False, False] if slides else [False, True, False, True]
+    here, there = rng.normal(size=(len(kinds), 3)), rng.normal(size=(len(kinds), 3))
+    weights = rng.uniform(0.1, 2.0, len(kinds))
+    aims = Aims()
+    for k, direction in enumerate(kinds):
+        aims.add(0, tuple(here[k]), tuple(there[k]), weight=float(weights[k]), direction=direction)
+    sweep(limbs, aims, aims.plan(limbs))
+    assert low <= limbs.values[0] <= high
+
+    data = model.createData()
+
+    def left(value: float) -> float:
+        pin.forwardKinematics(model, data, np.zeros(1))
+        start = data.oMi[1].copy()
+        pin.forwardKinematics(model, data, np.array([value]))
+        motion = data.oMi[1] * start.inverse()
+        total = 0.0
+        for k, direction in enumerate(kinds):
+            now = motion.rotation @ here[k] if direction else motion.act(here[k])
+            total += weights[k] * float(np.sum((now - there[k]) ** 2))
+        return total
+
+    found = left(limbs.values[0])
+    assert aims.distance() ** 2 == pytest.approx(found, abs=1e-9)
+    assert found <= min(left(float(value)) for value in np.linspace(low, high, 300)) + 1e-9
+
+
+def test_the_nearest_allowed_angle_is_found_across_half_a_turn() -> None:
+    assert within(3.0, -3.0, 2.0) == -3.0  # beyond the upper limit, but nearer to the lower one on the circle
+    assert within(2.5, -3.0, 2.0) == 2.0
+    assert within(-6.0, -1.0, 1.0) == pytest.approx(2.0 * np.pi - 6.0)
+    assert within(7.0, -np.inf, 1.0) == pytest.approx(7.0 - 2.0 * np.pi)
+
+
+@given(radius=st.floats(0.15, 0.65), angle=st.floats(-2.0, 2.0))
+def test_two_links_reach_where_the_triangle_says(radius: float, angle: float, planar_arm: Callable[..., Any]) -> None:
+    figure = planar_arm((0.4, 0.3))
+    target = (radius * np.cos(angle), radius * np.sin(angle), 0.0)
+    problem = wb.Problem(wb.Scene(figure), goals=[wb.Point("tip", target)])
+    solution = wb.CCD(tolerance=1e-5).solve(problem)
+    assert solution.solved
+    bend = np.arccos((radius**2 - 0.4**2 - 0.3**2) / (2.0 * 0.4 * 0.3))
+    assert abs(solution.q[1]) == pytest.approx(bend, abs=2e-3)
+
+
+def test_an_orientation_in_the_plane_makes_three_links_unique(planar_arm: Callable[..., Any]) -> None:
+    figure = planar_arm((0.4, 0.3, 0.2))
+    heading = 0.9
+    wrist = np.array([0.35, 0.3])
+    tip = wrist + 0.2 * np.array([np.cos(heading), np.sin(heading)])
+    target = pin.SE3(pin.exp3(np.array([0.0, 0.0, heading])), np.array([*tip, 0.0]))
+    solution = wb.CCD(tolerance=1e-5).solve(wb.Problem(wb.Scene(figure), goals=[wb.Frame("tip", target)]))
+    assert solution.solved
+    assert solution.q.sum() == pytest.approx(heading, abs=1e-4)
+    bend = np.arccos((wrist @ wrist - 0.4**2 - 0.3**2) / (2.0 * 0.4 * 0.3))
+    assert abs(solution.q[1]) == pytest.approx(bend, abs=1e-3)
+
+
+@pytest.mark.parametrize("reach", [0.2, 0.5, 0.89])
+def test_a_straight_arm_leaves_the_line_to_its_target(reach: float, planar_arm: Callable[..., Any]) -> None:
+    """The classical trap: joint, tip and target on one line, where no single joint gains anything."""
+    figure = planar_arm((0.4, 0.3, 0.2))
+    problem = wb.Problem(wb.Scene(figure), np.zeros(3), goals=[wb.Point("tip", (reach, 0.0, 0.0))])
+    assert wb.CCD().solve(problem).solved
+
+
+def test_a_target_out_of_reach_is_said_to_be_so(planar_arm: Callable[..., Any]) -> None:
+    figure = planar_arm((0.4, 0.3))
+    solution = wb.CCD().solve(wb.Problem(wb.Scene(figure), goals=[wb.Point("tip", (0.6, 0.6, 0.0))]))
+    assert solution.status == "unreachable"
+    assert solution.assessment.goal_error == pytest.approx(np.hypot(0.6, 0.6) - 0.7, abs=1e-4)
