@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
     from wholebody.methods.ccd.method import CCD
+    from wholebody.methods.drag import Drag, pull
     from wholebody.methods.newton.assembly import Assembly
     from wholebody.methods.newton.method import Newton
     from wholebody.methods.qp.method import QP
@@ -75,6 +76,7 @@ __all__ = [
     "Constraint",
     "Discomfort",
     "Displacement",
+    "Drag",
     "Effort",
     "Ellipsoid",
     "Figure",
@@ -110,6 +112,7 @@ __all__ = [
     "__version__",
     "assess",
     "load",
+    "pull",
     "read_task",
     "solve",
 ]
@@ -119,6 +122,7 @@ _MODULES = {
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
     "wholebody.methods.ccd.method": "CCD",
+    "wholebody.methods.drag": "Drag pull",
     "wholebody.methods.newton.assembly": "Assembly",
     "wholebody.methods.newton.method": "Newton",
     "wholebody.methods.qp.method": "QP",

@@ -37,6 +37,8 @@ class ContactSet:
         self._forced: Indices = np.zeros(0, dtype=np.intp)
         self._largest = float(problem.clearances.max(initial=0.0))
         proximity = problem.scene.proximity
+        self._names = problem.scene.piece_names
+        self._labels: list[str] = []
         self._joint = proximity.joint[proximity.pairs].reshape(-1, 2)
 
     def renew(self, data: Any, bodies: Array, world: int) -> tuple[Coincide, bool]:
@@ -49,20 +51,29 @@ class ContactSet:
         """
         contacts = self.scene.proximity.near(data, (FAR if len(self._forced) else LEAVE) + self._largest)
         spare = contacts.distance - self.clearances[contacts.number]
-        kept = np.isin(contacts.number, self.pairs) & (spare < LEAVE)
-        wanted = contacts.number[(spare < ENTER) | kept | np.isin(contacts.number, self._forced)]
+        member = np.zeros(len(self.clearances), dtype=bool)
+        member[self.pairs] = True
+        keep = (spare < ENTER) | (member[contacts.number] & (spare < LEAVE))
+        if len(self._forced):
+            keep |= np.isin(contacts.number, self._forced)
+        wanted = contacts.number[keep]
         self._forced = self._forced[:0]
         changed = not np.array_equal(wanted, self.pairs)
         if changed:
-            self.pairs = wanted
+            self.pairs, self._labels = wanted, []
             self.structures += 1
+            names = self._names
+            for a, b in self.scene.proximity.pairs[wanted]:
+                self._labels += [f"the distance of {names[a]!r} and {names[b]!r}"] * SLOTS
         return self._rows(contacts, bodies, world), changed
 
     def runs_into(self, data: Any) -> bool:
         """Whether a pair that is no inequality overlaps; the nearest are inequalities from now on."""
         contacts = self.scene.proximity.near(data, self._largest)
         lack = self.clearances[contacts.number] - contacts.distance
-        new = contacts.number[(lack > OVERLAP) & ~np.isin(contacts.number, self.pairs)]
+        new = contacts.number[lack > OVERLAP]
+        if len(new):
+            new = np.setdiff1d(new, self.pairs)
         if not len(new):
             return False
         self._forced = new
@@ -94,8 +105,5 @@ class ContactSet:
         first, second = (
             quat.rotate(quat.conjugate(bodies[side, 3:]), place - bodies[side, :3]) for side in (pair[:, 0], pair[:, 1])
         )
-        names = self.scene.piece_names
-        labels = [f"the distance of {names[a]!r} and {names[b]!r}" for a, b in self.scene.proximity.pairs[self.pairs]]
         directions, height = normal[:, None], -gap[:, None]
-        named = [label for label in labels for _ in range(SLOTS)]
-        return Coincide(pair, named, first, second, directions, height)
+        return Coincide(pair, self._labels, first, second, directions, height)

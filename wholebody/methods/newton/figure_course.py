@@ -54,6 +54,7 @@ class FigureCourse(Course):
         self._stiffness = self._objective(problem)
         self.q = problem.start
         self.structures = 0
+        self._ordered = np.zeros(0)
         self._laid: tuple[object, ...] = ()
         self.arrive(self.variables(problem.start))
 
@@ -79,10 +80,15 @@ class FigureCourse(Course):
         """Take the problem's new goals."""
         self._goals = goal_equations(self.problem, self.problem.goals).batches(self.bodies.count)
 
+    def anchor(self, q: Array) -> None:
+        """Take the posture q (nq,) for what the effort is counted from: the last state of a drag."""
+        self.angles.bound = self.bodies.distance(q)[0].bound
+
     def retract(self, x: Array) -> Array:
         """The bodies of the nearest posture."""
         self.q = self.bodies.posture(x)
-        return self.bodies.variables(self.q)
+        self._ordered = self.bodies.variables(self.q)
+        return self._ordered
 
     def admits(self, x: Array) -> bool:
         """Whether nothing but the pairs that are inequalities overlaps at x, where `retract` has just been."""
@@ -90,8 +96,8 @@ class FigureCourse(Course):
 
     def arrive(self, x: Array) -> bool:
         """Renew limits and contacts at x; whether the pattern changed."""
-        self.q = self.bodies.posture(x)
-        x = self.bodies.variables(self.q)
+        if x is not self._ordered:
+            x = self.retract(x)
         self.bodies.aim(self._limits, self.q)
         batches = [*self._fixed, *self._goals]
         pairs: bytes = b""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,25 @@ from wholebody.problem import Iterate, Problem, Solution, Status
 Array = NDArray[np.float64]
 
 SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessment adds the rows of a goal up
+
+FRAME_TOLERANCE = 1e-4  # m, rad: on the way of a drag; its end is solved to the method's own
+FRAME_ITERATIONS = 12  # most of one frame; a goal that asks for more is followed over the next frames
+
+
+class NewtonStep(NamedTuple):
+    """Answer of one frame.
+
+    Attributes:
+        q: (nq,) the next posture.
+        iterations: Newton iterations.
+        systems: linear systems solved.
+        structures: how often the pattern has been laid out since the problem was first seen.
+    """
+
+    q: Array
+    iterations: int
+    systems: int
+    structures: int
 
 
 @dataclass
@@ -79,12 +99,7 @@ class Newton:
             InputError: the problem has a term that this method has no equations for.
         """
         began = time.perf_counter()
-        problem.check_fresh()
-        course = self._course
-        if course is None or course.problem is not problem:
-            course = self._course = FigureCourse(problem, self.algebra)
-        else:
-            course.retarget()
+        course = self._prepared(problem)
         found = reach(
             course,
             course.variables(q),
@@ -105,6 +120,35 @@ class Newton:
             method=f"newton/{course.algebra.name}",
             message=_message(status, judgement, found, course) + _reported(course),
         )
+
+    def step(self, problem: Problem, q: Array, tolerance: float = FRAME_TOLERANCE) -> NewtonStep:
+        """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
+
+        What was laid out for the same problem is kept.
+
+        Raises:
+            InputError: the problem has a term that this method has no equations for.
+        """
+        course = self._prepared(problem)
+        course.anchor(q)
+        found = reach(
+            course,
+            course.variables(q),
+            tolerance=tolerance,
+            iterations=FRAME_ITERATIONS,
+            kind=self.inequalities,
+        )
+        return NewtonStep(course.bodies.posture(found.x), found.iterations, found.systems, course.structures)
+
+    def _prepared(self, problem: Problem) -> FigureCourse:
+        """The equations of the problem with its present goals; laid out anew where they are others."""
+        problem.check_fresh()
+        course = self._course
+        if course is None or course.problem is not problem:
+            course = self._course = FigureCourse(problem, self.algebra)
+        course.retarget()
+        course.anchor(problem.start)
+        return course
 
 
 def _status(found: Reached, judgement: Assessment, tolerance: float) -> Status:
