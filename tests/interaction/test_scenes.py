@@ -17,18 +17,19 @@ BEFORE, AFTER = 8, 32
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_the_shown_figure_stays_outside(name: str, least: Any) -> None:
+@pytest.mark.parametrize(("overlap", "allowed"), [("qp", 1e-5), ("ccd", 1e-3)])
+def test_the_shown_figure_stays_outside(name: str, overlap: str, allowed: float, least: Any) -> None:
     made = build_scene(name)
     scene, track = made.scene, made.track
     assert len(track) >= 600
     coarse = np.arange(0, len(track), 6)
     first = int(coarse[np.argmax(overlaps(scene, track.q[coarse])[0] > 5e-3)])
     part = track.part(first - BEFORE, first + AFTER)
-    recording = follow(scene, part, rigid=made.rigid)
+    recording = follow(scene, part, overlap=overlap, rigid=made.rigid)
     assert min(least(scene, q) for q in part.q) < -0.01  # the tracked one goes in
-    assert min(least(scene, q) for q in recording.q) > -1e-5
+    assert min(least(scene, q) for q in recording.q) > -allowed
     for a, b in zip(recording.q[:-1:2], recording.q[1::2], strict=True):
-        assert least(scene, pin.interpolate(scene.model, a, b, 0.5)) > -1e-4
+        assert least(scene, pin.interpolate(scene.model, a, b, 0.5)) > -max(allowed, 1e-4)
     assert all(scene.figure.within_limits(q) for q in recording.q)
     if scene.figure.cones:
         cones = ReachCones().resolve(scene, part.q[0])
@@ -36,7 +37,7 @@ def test_the_shown_figure_stays_outside(name: str, least: Any) -> None:
     free = judge(scene, recording).tracked_depth < 1e-5
     apart = [np.abs(pin.difference(scene.model, *pair)).max() for pair in zip(part.q, recording.q, strict=True)]
     assert max(np.array(apart)[free]) < 0.05  # the clearance is kept where the tracked posture only comes near
-    assert recording.notes == ("",) * len(part)
+    assert sum(bool(note) for note in recording.notes) <= (0 if overlap == "qp" else 6)
 
 
 def test_the_gallery_has_two_rooms_and_some_twenty_things() -> None:

@@ -21,7 +21,9 @@ from wholebody.tasks import ReachCones
 Array = NDArray[np.float64]
 Counts = NDArray[np.intp]
 
-PASSING = 1e-4  # m: deeper than this on the way between two frames counts as passing
+PASSING = {"qp": 1e-4, "ccd": 1e-3}
+"""Depth on the way between two frames that counts as passing, metres: what may be left in the frames themselves."""
+
 OVERLAPS = 1e-5  # m: deeper than this a tracked posture counts as in contact
 BACK = 1e-3  # rad, m: nearer than this to the tracked posture the shown one is back
 IN_TIME = 30  # frames after the end of contact in which it should be back
@@ -37,7 +39,7 @@ class Judgement:
         tracked_pairs: (n,) overlapping pairs of pieces in the tracked posture.
         limit_violation: how far the worst joint of any shown posture is out of its limits, radians.
         cone_violation: how far the worst limb is out of its reach cone, radians.
-        passed: frames on the way to which some pair went deeper than 0.1 mm.
+        passed: frames on the way to which some pair went deeper than 0.1 mm (qp) or 1 mm (ccd).
         distance: (n,) root of the mean square of joint angles between shown and tracked posture, radians.
         root_distance: (n,) distance between the two places of a free root, metres.
         jerk: (n - 3,) the root of the mean square of the third difference of the shown joint angles, rad/s^3.
@@ -70,14 +72,14 @@ def judge(scene: Scene, recording: Recording) -> Judgement:
     limits = scene.figure.limits
     values = recording.q[:, limits.idx_q]
     sweep = Sweep(model, scene.geometry)
-    pairs = enumerate(pairwise(recording.q), start=1)
+    ways, passing = enumerate(pairwise(recording.q), start=1), PASSING[recording.overlap]
     return Judgement(
         depth=depth,
         tracked_depth=tracked_depth,
         tracked_pairs=tracked_pairs,
         limit_violation=float(np.maximum(limits.lower - values, values - limits.upper).max(initial=0.0)),
         cone_violation=_cone_violation(scene, recording.q),
-        passed=tuple(frame for frame, (a, b) in pairs if sweep.first_contact(a, b, tolerance=PASSING) is not None),
+        passed=tuple(frame for frame, (a, b) in ways if sweep.first_contact(a, b, tolerance=passing) is not None),
         distance=_root_mean_square(apart[:, joints]),
         root_distance=np.linalg.norm(recording.q[:, :3] - recording.tracked[:, :3], axis=1)
         if scene.figure.root == "free"

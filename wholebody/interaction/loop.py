@@ -10,7 +10,6 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -18,8 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.interaction.attraction import Attraction
-from wholebody.interaction.nearest import CLEARANCE, NearestPosture, Removal, weights
+from wholebody.interaction.nearest import CLEARANCE, NearestPosture, weights
 from wholebody.interaction.recording import Frame, Recording
+from wholebody.interaction.removal import Removal, Remover
 from wholebody.interaction.scripts import FRAME
 from wholebody.interaction.tracks import Track
 from wholebody.methods.qp.method import QP
@@ -29,23 +29,12 @@ from wholebody.tasks import ReachCones
 
 Array = NDArray[np.float64]
 
-OVERLAPS = ("qp",)
-GRAZE = 5e-5
-"""Depth, metres, that the way from frame to frame may have on its course; coal's distances are good to 1e-6."""
+OVERLAPS = ("qp", "ccd")
 
 SHARES = (0.5, 0.25)
 """Of the way, tried when all of it is not free: what keeps to a surface leaves it by the square of the share."""
 
-BEFORE = 0.9  # share of the free part of a way that is gone where nothing else is free: nothing is shown touching
-
 INSIDE = 1e-5  # m: deeper than this a posture is called inside of something
-
-
-class Remover(Protocol):
-    """A way to remove overlap."""
-
-    def remove(self, shown: Array, tracked: Array) -> Removal:
-        """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""
 
 
 class FrameLoop:
@@ -74,7 +63,8 @@ class FrameLoop:
             scene: the figure among things.
             start: (nq,) tracked posture of the beginning; where it overlaps something, the nearest posture that does
                 not is shown.
-            overlap: "qp": the nearest posture without overlap by programs.
+            overlap: "qp": the nearest posture without overlap, by programs; "ccd": limb by limb by cyclic coordinate
+                descent, and what is rigid by its global penetration depth, as Schmidl and Lin do.
             dt: seconds from frame to frame.
             seed: of what is done in random order.
             rigid: whether the figure is displaced as a whole, as a hand is, while its joints follow the tracker.
@@ -106,7 +96,7 @@ class FrameLoop:
         began = time.perf_counter()
         goal = np.asarray(tracked, dtype=float)
         if goal.shape != self.shown.shape or not np.isfinite(goal).all():
-            note = f"frame {self.count}: the tracked posture is not {len(self.shown)} finite numbers; held"
+            note = f"the tracked posture is not {len(self.shown)} finite numbers; the figure stays"
             return self._shown(Removal((self.shown,), 0.0, 0.0, 0, 0, 0, note), began)
         removal = self._remover.remove(self.shown, self._readable(goal))
         # Simulated objects would move here, after the driven ones have found their places.
@@ -114,6 +104,7 @@ class FrameLoop:
 
     def _shown(self, removal: Removal, began: float) -> Frame:
         note = "; ".join(part for part in (self._note, removal.note) if part)
+        note = f"frame {self.count}: {note}" if note else ""
         self.shown, self._note, self.count = np.array(removal.ways[0]), "", self.count + 1
         return Frame(
             self.shown, time.perf_counter() - began, removal.contact_seconds, removal.solve_seconds,
@@ -125,25 +116,37 @@ class FrameLoop:
         return self.scene.figure.clamp(pin.normalize(self.scene.model, goal))
 
     def _kept_from_passing(self, removal: Removal) -> Removal:
-        """The first posture whose way from the one shown is free; else a part of its way (algorithm 1, step 4)."""
+        """The first posture whose way from the one shown is free; else a part of its way, or the one shown.
+
+        This is the interpolation with the last posture without overlap of algorithm 1, step 4. What is free for the
+        whole length of a share is taken, and never what is free up to a contact: that would creep into it.
+        """
         began = time.perf_counter()
         nearest = removal.ways[-1]
         parts = (np.asarray(pin.interpolate(self.scene.model, self.shown, nearest, share)) for share in SHARES)
         note, contact = removal.note, None
         for q in itertools.chain(removal.ways, parts):
-            contact = self.scene.sweeper.first_contact(self.shown, q, tolerance=GRAZE)
+            contact = self.scene.sweeper.first_contact(self.shown, q, tolerance=self._remover.graze)
             if contact is None:
                 break
         if contact is not None:
             owners = " and ".join(self.scene.piece_owner[piece] for piece in contact.pair)
-            q = np.asarray(pin.interpolate(self.scene.model, self.shown, q, BEFORE * contact.fraction))
-            stop = f"frame {self.count}: the way is not free, {owners} would pass; held back"
+            q = self.shown
+            stop = f"{owners} would pass through each other on the way; the figure stays"
             note = "; ".join(part for part in (note, stop) if part)
         spent = removal.contact_seconds + time.perf_counter() - began
         return removal._replace(ways=(q,), contact_seconds=spent, note=note)
 
     def _made(self, overlap: str, dt: float, seed: int, rigid: bool) -> Remover:
-        return NearestPosture(self.scene, self.shown, dt, rigid)
+        if overlap == "qp":
+            return NearestPosture(self.scene, self.shown, dt, rigid)
+        if rigid:
+            from wholebody.interaction.displacing import AsAWhole
+
+            return AsAWhole(self.scene)
+        from wholebody.interaction.chains import LimbByLimb
+
+        return LimbByLimb(self.scene, seed)
 
 
 def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
@@ -163,7 +166,7 @@ def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
         raise InputError(
             f"frame 0: {deepest}, and no posture near it is free of overlap; begin the track outside of things"
         )
-    return solution.q, f"frame 0: {deepest}; the nearest posture without overlap is shown"
+    return solution.q, f"{deepest}; the nearest posture without overlap is shown"
 
 
 def deepest_overlap(scene: Scene, q: Array) -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.interaction.attraction import Attraction, Pace
+from wholebody.interaction.removal import Removal
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene import Scene
@@ -38,24 +38,10 @@ RIGID_WEIGHT = 100.0
 8 cm long then takes a ten-thousandth of a displacement."""
 
 
-class Removal(NamedTuple):
-    """How the overlap of one frame was removed; the other attributes are those of `wholebody.interaction.Frame`.
-
-    Attributes:
-        ways: postures (nq,) to show, the best one first; the next is taken if the way to one is not free.
-    """
-
-    ways: tuple[Array, ...]
-    contact_seconds: float
-    solve_seconds: float
-    iterations: int
-    joints: int
-    pairs: int
-    note: str
-
-
 class NearestPosture:
     """Follows tracked postures by `QP.step`."""
+
+    graze = 5e-5
 
     def __init__(self, scene: Scene, start: Array, dt: float, rigid: bool) -> None:
         """Set up for frames of `dt` seconds, from the overlap-free posture `start`, (nq,).

@@ -1,0 +1,37 @@
+"""What the ways to remove overlap have in common."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Removal(NamedTuple):
+    """How the overlap of one frame was removed; the other attributes are those of `wholebody.interaction.Frame`.
+
+    Attributes:
+        ways: postures (nq,) to show, the best one first; the next is taken if the way to one is not free.
+    """
+
+    ways: tuple[Array, ...]
+    contact_seconds: float
+    solve_seconds: float
+    iterations: int
+    joints: int
+    pairs: int
+    note: str
+
+
+class Remover(Protocol):
+    """A way to remove overlap."""
+
+    @property
+    def graze(self) -> float:
+        """Depth, metres, to which the way from frame to frame may go in: less than what its postures may keep."""
+
+    def remove(self, shown: Array, tracked: Array) -> Removal:
+        """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""
