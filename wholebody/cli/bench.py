@@ -54,7 +54,14 @@ def add_bench_parsers(commands: argparse._SubParsersAction[argparse.ArgumentPars
     solve.add_argument("--count", type=int, default=30, metavar="N", help="solves of each kind (default: 30)")
     solve.add_argument("--solver", nargs="+", default=list(SOLVERS), metavar="NAME", help="QP solvers (default: both)")
     solve.set_defaults(run=run_solve)
-    for parser in (step, reaches, solve):
+    newton = commands.add_parser(
+        "newton",
+        help="sparse Newton by size, shape and factorisation",
+        description="Chains, trees, rings and stars by every factorisation, the paper's size, and drags of the human.",
+    )
+    newton.add_argument("--repeats", type=int, default=15, metavar="N", help="timed systems each (default: 15)")
+    newton.set_defaults(run=run_newton)
+    for parser in (step, reaches, solve, newton):
         parser.add_argument("--quick", action="store_true", help="a short run that shows whether all works")
         parser.add_argument(
             "--out", type=Path, default=Path("out/bench"), metavar="DIR", help="folder (default: out/bench)"
@@ -149,6 +156,27 @@ def run_solve(arguments: argparse.Namespace) -> int:
     write_rows(arguments.out / "solve.csv", facts, rows)
     write_rows(arguments.out / "memory.csv", facts, [peak])
     _publish("solve", solve_report(rows, peak, facts), {}, {}, arguments)
+    return 0
+
+
+def run_newton(arguments: argparse.Namespace) -> int:
+    """Measure sparse Newton."""
+    from wholebody.bench import newton
+    from wholebody.bench.machine import machine
+    from wholebody.bench.tables import write_rows
+
+    repeats, sizes, frames = (3, (10, 30), 20) if arguments.quick else (arguments.repeats, newton.SIZES, 1000)
+    _check(repeats, "--repeats")
+    facts = machine()
+    solves, drift = [newton.paper_row(10 * repeats)], []
+    for contacts in (False, True):
+        row, worst = newton.drag_row(frames, contacts)
+        solves.append(row)
+        drift.append(worst)
+    linear = list(newton.linear_rows(sizes, repeats))
+    write_rows(arguments.out / "newton-linear.csv", facts, linear)
+    write_rows(arguments.out / "newton-solves.csv", facts, solves)
+    _publish("newton", newton.report(linear, solves, drift, facts), {}, {}, arguments)
     return 0
 
 

@@ -7,7 +7,6 @@ last row is the world, which does not move. Each batch has k equations groups of
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +21,6 @@ PLACE, TURN = slice(0, 3), slice(3, 7)
 OTHER_PLACE, OTHER_TURN = slice(7, 10), slice(10, 14)
 
 
-class Key(NamedTuple):
-    """What a batch has in common: its type, whether it may be missed or is one-sided, and its weight."""
-
-    kind: str
-    goal: bool
-    one_sided: bool
-    weight: float
-
-
 class Batch(ABC):
     """Equations of one type.
 
@@ -39,6 +29,8 @@ class Batch(ABC):
         size: rows of each.
         pattern: (size, 7 b) where the Jacobian can be other than zero.
         labels: (k,) what each is called in messages.
+
+    Residual and Jacobian at one array of bodies share their work, so such an array is not to be changed in place.
     """
 
     size: int
@@ -47,6 +39,7 @@ class Batch(ABC):
     def __init__(self, bodies: Indices, labels: list[str]) -> None:
         self.bodies = np.asarray(bodies, dtype=np.intp)
         self.labels = labels
+        self._seen: tuple[Array, Array, Array] | None = None
 
     def __len__(self) -> int:
         """Number of equation groups."""
@@ -100,35 +93,44 @@ class Coincide(Batch):
         """Take points (k, 3) in each body, directions (k, size, 3) in the world and heights (k, size)."""
         super().__init__(bodies, labels)
         self.size = directions.shape[1]
-        self.first, self.second, self.directions, self.height = first, second, directions, height
-        self._axes = self.size == 3 and bool((directions == np.eye(3)).all())
+        self.directions, self.height = directions, height
         self.pattern = np.ones((self.size, 14), dtype=bool)
-        if self._axes:
+        if self.size == 3 and bool((directions == np.eye(3)).all()):
             self.pattern[:, PLACE] = self.pattern[:, OTHER_PLACE] = np.eye(3, dtype=bool)
+        # n . R(e) c = e' Q e / 2 for either body, with the sign of its side
+        k = len(self)
+        along = directions.reshape(-1, 3)
+        self._forms = np.empty((k, self.size, 2, 4, 4))
+        for side, point, sign in ((0, first, 2.0), (1, second, -2.0)):
+            forms = quat.rotate_form(np.repeat(point, self.size, axis=0), along)
+            self._forms[:, :, side] = sign * forms.reshape(k, self.size, 4, 4)
+        self._sides = np.concatenate([directions, -directions], axis=2).reshape(k, self.size, 2, 3)
+
+    def _slopes(self, x: Array) -> tuple[Array, Array]:
+        """The two bodies (k, 2, 7), and the derivatives (k, size, 2, 4) by their quaternions."""
+        if self._seen is None or self._seen[0] is not x:
+            pair = x[self.bodies]
+            self._seen = (x, pair, np.einsum("kisab,ksb->kisa", self._forms, pair[:, :, 3:]))
+        return self._seen[1], self._seen[2]
 
     def residual(self, x: Array) -> Array:  # noqa: D102
-        a, b = x[self.bodies[:, 0]], x[self.bodies[:, 1]]
-        way = a[:, :3] + quat.rotate(a[:, 3:], self.first) - b[:, :3] - quat.rotate(b[:, 3:], self.second)
-        result: Array = (way if self._axes else np.einsum("kij,kj->ki", self.directions, way)) - self.height
+        pair, slopes = self._slopes(x)
+        result: Array = np.einsum("kisa,ksa->ki", self._sides, pair[:, :, :3])
+        result += 0.5 * np.einsum("kisa,ksa->ki", slopes, pair[:, :, 3:])
+        result -= self.height
         return result
 
     def jacobian(self, x: Array) -> Array:  # noqa: D102
-        result = np.empty((len(self), self.size, 14))
-        result[:, :, PLACE] = self.directions
-        result[:, :, OTHER_PLACE] = -self.directions
-        turn = quat.rotate_derivative(x[self.bodies[:, 0], 3:], self.first)
-        other = quat.rotate_derivative(x[self.bodies[:, 1], 3:], self.second)
-        if not self._axes:
-            turn, other = self.directions @ turn, self.directions @ other
-        result[:, :, TURN] = turn
-        np.negative(other, out=result[:, :, OTHER_TURN])
-        return result
+        result = np.empty((len(self), self.size, 2, 7))
+        result[..., :3] = self._sides
+        result[..., 3:] = self._slopes(x)[1]
+        return result.reshape(len(self), self.size, 14)
 
     def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
-        push = np.einsum("ki,kij->kj", force, self.directions)
         result = np.zeros((len(self), 14, 14))
-        result[:, TURN, TURN] = 2.0 * quat.rotate_form(self.first, push)
-        result[:, OTHER_TURN, OTHER_TURN] = -2.0 * quat.rotate_form(self.second, push)
+        forms = np.einsum("ki,kisab->ksab", force, self._forms)
+        result[:, TURN, TURN] = forms[:, 0]
+        result[:, OTHER_TURN, OTHER_TURN] = forms[:, 1]
         return result
 
 
@@ -147,15 +149,21 @@ class Turn(Batch):
         self.pattern = np.zeros((self.size, 14), dtype=bool)
         self.pattern[:, TURN] = self.pattern[:, OTHER_TURN] = True
 
+    def _right(self, x: Array) -> Array:
+        """Derivative (k, size, 4) by the first quaternion."""
+        if self._seen is None or self._seen[0] is not x:
+            right = np.einsum("kiab,kb->kia", self.forms, x[self.bodies[:, 1], 3:])
+            self._seen = (x, right, right)
+        return self._seen[1]
+
     def residual(self, x: Array) -> Array:  # noqa: D102
-        right = self.forms @ x[self.bodies[:, 1], None, 3:, None]
-        result: Array = (right[..., 0] @ x[self.bodies[:, 0], 3:, None])[..., 0]
+        result: Array = np.einsum("kia,ka->ki", self._right(x), x[self.bodies[:, 0], 3:])
         return result
 
     def jacobian(self, x: Array) -> Array:  # noqa: D102
         result = np.zeros((len(self), self.size, 14))
-        result[:, :, TURN] = (self.forms @ x[self.bodies[:, 1], None, 3:, None])[..., 0]
-        result[:, :, OTHER_TURN] = (x[self.bodies[:, 0], None, None, 3:] @ self.forms)[:, :, 0]
+        result[:, :, TURN] = self._right(x)
+        result[:, :, OTHER_TURN] = np.einsum("ka,kiab->kib", x[self.bodies[:, 0], 3:], self.forms)
         return result
 
     def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
@@ -225,7 +233,7 @@ class Slide(Batch):
 class Angle(Batch):
     """Angle of a revolute joint about z of its axes: sign (2 atan2(z, w) of conj(e1 f1) (e2 f2) - bound).
 
-    As an equality it sets the joint; as an inequality it is a limit. The angle is taken on the turn nearest `center`.
+    As an inequality it is a limit. The angle is taken on the turn nearest `center`.
     """
 
     size = 1
@@ -240,9 +248,10 @@ class Angle(Batch):
 
     def _components(self, x: Array) -> tuple[Array, Array, Array]:
         """Components (k, 2) z and w, and their derivatives by either quaternion, (k, 2, 4)."""
-        right = (self.forms @ x[self.bodies[:, 1], None, 3:, None])[..., 0]
-        left = (x[self.bodies[:, 0], None, None, 3:] @ self.forms)[:, :, 0]
-        return (right @ x[self.bodies[:, 0], 3:, None])[..., 0], right, left
+        first, second = x[self.bodies[:, 0], 3:], x[self.bodies[:, 1], 3:]
+        right = np.einsum("kiab,kb->kia", self.forms, second)
+        left = np.einsum("ka,kiab->kib", first, self.forms)
+        return np.einsum("kia,ka->ki", right, first), right, left
 
     def angle(self, x: Array) -> Array:
         """(k,) the angles [rad]."""
@@ -270,8 +279,7 @@ class Angle(Batch):
 
     def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
         part, gradient, square = self._gradients(x)
-        sine, cosine = part[:, 0, None, None], part[:, 1, None, None]
-        mixed = cosine * self.forms[:, 0] - sine * self.forms[:, 1]
+        mixed = part[:, 1, None, None] * self.forms[:, 0] - part[:, 0, None, None] * self.forms[:, 1]
         second = np.zeros((len(self), 14, 14))
         second[:, TURN, OTHER_TURN] = mixed
         second[:, OTHER_TURN, TURN] = mixed.transpose(0, 2, 1)

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.methods.newton.batches import Angle, Batch, Coincide, Key, Slide, Turn, Unit
+from wholebody.methods.newton.batches import Angle, Batch, Coincide, Slide, Turn, Unit
+from wholebody.methods.newton.keys import Key
 from wholebody.methods.newton.quaternions import relative_forms
 from wholebody.methods.newton.system import System
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.methods.newton.batches import Batch, Key, Unit
+from wholebody.methods.newton.batches import Batch, Unit
 from wholebody.methods.newton.contacts import ContactSet
 from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.keys import OBJECTIVE, Key
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
 from wholebody.methods.newton.reaching import Course
-from wholebody.methods.newton.system import OBJECTIVE, System
+from wholebody.methods.newton.system import System
 from wholebody.methods.newton.terms import constraint_equations, goal_equations
 from wholebody.problem import Problem
 from wholebody.tasks import Effort

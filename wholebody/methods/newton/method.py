@@ -13,6 +13,7 @@ from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.inequalities import Kind
+from wholebody.methods.newton.linear_algebra.base import Pattern
 from wholebody.methods.newton.linear_algebra.choice import NAMES
 from wholebody.methods.newton.reaching import Reached, reach
 from wholebody.problem import Iterate, Problem, Solution, Status
@@ -139,6 +140,16 @@ class Newton:
             kind=self.inequalities,
         )
         return NewtonStep(course.bodies.posture(found.x), found.iterations, found.systems, course.structures)
+
+    def pattern(self) -> Pattern:
+        """Where the Jacobian of the last problem can be other than zero.
+
+        Raises:
+            InputError: there was none.
+        """
+        if self._course is None:
+            raise InputError("nothing has been solved yet; call solve(problem) first")
+        return self._course.system.pattern
 
     def _prepared(self, problem: Problem) -> FigureCourse:
         """The equations of the problem with its present goals; laid out anew where they are others."""

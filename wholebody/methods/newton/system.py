@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.methods.newton.batches import Batch, Key
+from wholebody.methods.newton.batches import Batch
+from wholebody.methods.newton.keys import OBJECTIVE, Key
 from wholebody.methods.newton.linear_algebra.base import Pattern
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-OBJECTIVE = "objective"
 WORLD = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
 
 
@@ -46,6 +46,7 @@ class System:
         self.count = count
         self.batches = [batch for batch, _ in batches if len(batch)]
         self.weight = weight
+        self._seen: tuple[Array, Array] | None = None
         sizes = [len(batch) * batch.size for batch in self.batches]
         self.starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
         self.goal = np.repeat([key.goal for key in keys], sizes).astype(bool)
@@ -71,8 +72,9 @@ class System:
 
     def bodies(self, x: Array) -> Array:
         """The variables (7 n,) as bodies (n + 1, 7), the world last."""
-        result: Array = np.concatenate([x, WORLD]).reshape(-1, 7)
-        return result
+        if self._seen is None or self._seen[0] is not x:
+            self._seen = (x, np.concatenate([x, WORLD]).reshape(-1, 7))
+        return self._seen[1]
 
     def residual(self, x: Array) -> Array:
         """(m,) metres and radians."""

@@ -12,9 +12,7 @@ from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.linear_algebra.reference import Dense, SingularValues
 
 NAMES = ("auto", "normal", "llt", "kkt", "schur", "dense", "svd")
-DENSE_ROWS = (
-    100  # rows in which a column must stand to be split off, about a hub with twenty joints; fewer = more splits
-)
+DENSE_ROWS = 60  # rows in which a column must stand to be split off, as of a hub; fewer = more splits
 
 
 def dense_columns(pattern: Pattern) -> Indices:

@@ -36,6 +36,7 @@ class Gram:
         self._first, self._second = first[order], second[order]
         self._target = index[: len(first)][order]
         self._diagonal = index[len(first) :]
+        self._products, self._factors = np.empty(len(first)), np.empty(len(first))  # kept: fresh ones cost page faults
         filled = np.unique(self._target)
         self._filled = filled
         self._starts = np.searchsorted(self._target, filled)
@@ -46,7 +47,10 @@ class Gram:
         data = self.matrix.data
         data[:] = 0.0
         if len(self._first):
-            data[self._filled] = np.add.reduceat(scaled[self._first] * values[self._second], self._starts)
+            np.take(scaled, self._first, out=self._products)
+            np.take(values, self._second, out=self._factors)
+            self._products *= self._factors
+            data[self._filled] = np.add.reduceat(self._products, self._starts)
         data[self._diagonal] += damping
 
 
