@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from wholebody import tasks
+from wholebody.methods.ccd.method import CCD
 from wholebody.methods.qp.method import QP
 from wholebody.taskfile import kinds
 from wholebody.taskfile.kinds import DIRECTION, FRAME, PLACEMENT, POSITION, QUATERNION, WEIGHT, Number
@@ -140,5 +141,15 @@ METHODS = {
             Key("seed", Number(0, 2**32 - 1, whole=True), "of those tries"),
         ),
         QP,
+    ),
+    "ccd": Form(
+        "Cyclic coordinate descent: points, frames and orientations, without measures.",
+        (
+            Key("tolerance", Number(1e-6, 0.1), "metres and radians to which goals are met; 1e-4 if left out"),
+            Key("iterations", Number(1, 100_000, whole=True), "sweeps from one start"),
+            Key("restarts", Number(0, 1000, whole=True), "most further starts"),
+            Key("seed", Number(0, 2**32 - 1, whole=True), "of those starts"),
+        ),
+        CCD,
     ),
 }

@@ -32,8 +32,9 @@ LEAST_GAIN = 1e-7  # rad^2: a chain that gets no nearer than this to the tracked
 HELD_UP = 0.4  # a part that gains less than this share of what drawing alone would have is held up (2 is all of it)
 SHAKES = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things came upon and that no joint's best value frees
 APART = 0.02  # m: how far a tip moves between two looks at the straight way from one shown posture to the next
-MOST_LOOKS = 9
-DIP = 1e-3  # m: how deep it may go in there
+MOST_LOOKS = 5
+LONG = 0.03  # m: a way on which a tip moves farther is swept as well, which costs more than looks and misses nothing
+DIP = 4e-4  # m: how deep it may go in there
 ARRIVED = 1e-12  # rad^2: a chain this near is there
 
 
@@ -128,7 +129,7 @@ class Frames:
         if not overlaps:
             if not remover.look(wanted) and not self._jumps(before, q, wanted):
                 touching = remover.deepest
-                if self._dip(q, wanted) < DIP:
+                if self._clear(q, wanted):
                     return self._result(wanted, touching)
             for self._step in (STEP, SMALL_STEP):
                 way = self._approach(q, left, wanted, before, rng, steps)
@@ -165,20 +166,20 @@ class Frames:
     def _straight(self, way: list[tuple[Array, float]]) -> tuple[Array, float] | None:
         """The last posture of the way to which the first can go straight, as it will be shown, without dipping in."""
         for q, left in way[:0:-1]:
-            if self._dip(way[0][0], q) < DIP:
+            if self._clear(way[0][0], q):
                 return q, left
         return None
 
-    def _dip(self, q0: Array, q1: Array) -> float:
-        """Deepest overlap at some postures between two, metres."""
+    def _clear(self, q0: Array, q1: Array) -> bool:
+        """Whether the straight way from one shown posture to the next does not dip in: looked at, swept where long."""
         way = np.abs(np.asarray(pin.difference(self._model, q0, q1)))
         length = max(float(way[dofs] @ reach) for dofs, reach in self._parts)
         looks = min(int(length / APART), MOST_LOOKS)
-        deepest = 0.0
         for k in range(looks):
             self._remover.look(np.asarray(pin.interpolate(self._model, q0, q1, (k + 1) / (looks + 1))))
-            deepest = max(deepest, self._remover.deepest)
-        return deepest
+            if self._remover.deepest > DIP:
+                return False
+        return length < LONG or self._sweeper.first_contact(q0, q1, None, 2.0 * DIP) is None
 
     def _shaken(self, q: Array, size: float, rng: np.random.Generator) -> Array:
         """Copy of a posture q (nq,) with its joints moved at random: a straight arm pushed along itself must bend."""
