@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import wholebody as wb
+from wholebody.interaction import Recording, judge
 
 Place = tuple[float, float, float]
 Color = tuple[float, float, float, float]
@@ -75,6 +76,47 @@ def picture(
         viewer.show(solution.q, problem=problem)
         viewer.look(eye=eye, target=target)
         print(f"  {viewer.save(out / f'{name}.html')}")
+        try:
+            print(f"  {viewer.picture(out / f'{name}.png')}")
+        except wb.MissingPackageError as error:
+            print(f"  no picture: {error}")
+
+
+def report_frames(title: str, scene: wb.Scene, recording: Recording) -> None:
+    """Print what became of a tracked motion, as `wholebody.interaction.judge` finds it."""
+    judged = judge(scene, recording)
+    inside = int((judged.tracked_depth > 1e-5).sum())
+    milliseconds = 1e3 * recording.seconds
+    print(f"{title}: {len(recording)} frames in {recording.seconds.sum():.2f} s, {milliseconds.mean():.1f} ms a frame")
+    print(f"  tracked: inside of something in {inside} frames, up to {1e3 * judged.tracked_depth.max():.0f} mm deep")
+    print(
+        f"  shown: deepest penetration {judged.depth.max():.1e} m, {len(judged.passed)} frames pass through something"
+    )
+    for end, frames in judged.returns:
+        print(f"  contact ends at frame {end}: back at the tracked posture {frames} frames later")
+    for note in filter(None, recording.notes):
+        print(f"  {note}")
+
+
+def film(
+    name: str,
+    scene: wb.Scene,
+    recording: Recording,
+    frame: int,
+    out: Path,
+    *,
+    eye: Place,
+    target: Place,
+    see_through: Collection[str] = (),
+) -> None:
+    """Write NAME.html, which plays the motion with the tracked posture as a ghost, and NAME.png of one frame."""
+    out.mkdir(parents=True, exist_ok=True)
+    with wb.Viewer(scene, see_through=see_through, title=name) as viewer:
+        viewer.look(eye=eye, target=target)
+        viewer.play(recording, ghost=recording.tracked)
+        print(f"  {viewer.save(out / f'{name}.html')}")
+        viewer.ghosts([recording.tracked[frame]])
+        viewer.show(recording.q[frame])
         try:
             print(f"  {viewer.picture(out / f'{name}.png')}")
         except wb.MissingPackageError as error:

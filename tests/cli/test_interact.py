@@ -48,15 +48,15 @@ def test_a_run_prints_tables_and_writes_numbers_chart_and_animation(
 
 def test_the_tables_go_into_the_documentation(tmp_path: Path) -> None:
     (tmp_path / "results.md").write_text(PAGE)
-    command = ["interact", "hand_in_corner", "--frames", "40", "--out", str(tmp_path / "out")]
+    command = ["interact", "hand_on_table", "--frames", "40", "--out", str(tmp_path / "out")]
     assert main([*command, "--update-docs", str(tmp_path)]) == 0
     page = (tmp_path / "results.md").read_text()
     assert "old" not in page
     assert page.startswith("before")
     assert page.rstrip().endswith("after")
-    assert "| hand in corner | qp | 40 |" in page
+    assert "| hand on table | qp | 40 |" in page
     assert "| arm in corner | paper | 2146 | 20.49 |" in page
-    assert (tmp_path / "assets" / "interaction" / "hand_in_corner-qp.svg").is_file()
+    assert (tmp_path / "assets" / "interaction" / "hand_on_table-qp.svg").is_file()
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ import wholebody as wb
 Example = Callable[[str], ModuleType]
 
 SINGLE = ("shelf", "carry_box_past_table", "behind_the_back", "look_and_touch_overhead", "robot_arm_among_obstacles")
-OTHERS = ("chair", "console_two_people")
+OTHERS = ("chair", "console_two_people", "hand_on_table", "avatar_two_arms")
 REST_ON = {("pelvis", "pouch"), ("lower_lumbar", "pouch")}  # what the figure wears lies on it
 
 
@@ -176,6 +176,24 @@ def test_chair_from_a_mesh(example: Example, tmp_path: Path, shared_data: Path, 
     solution = module.main(out=tmp_path, pictures=False)
     assert "made of boxes" not in capsys.readouterr().out
     sits(module.build(), solution)
+
+
+@pytest.mark.parametrize("name", ["hand_on_table", "avatar_two_arms"])
+def test_what_is_tracked_goes_in_and_what_is_shown_does_not(
+    name: str, example: Example, tmp_path: Path, capsys: Any
+) -> None:
+    module = example(name)
+    recording = module.main(out=tmp_path, pictures=False)
+    scene, _ = module.build()
+    problem = wb.Problem(scene)
+    assert min(deepest(problem, q)[0] for q in recording.tracked) < -0.02
+    for q in recording.q:
+        least, where = deepest(problem, q)
+        assert least > -1e-4, where
+    np.testing.assert_allclose(recording.q[-1], recording.tracked[-1], atol=1e-3)
+    assert not any(recording.notes)
+    assert "0 frames pass" in capsys.readouterr().out
+    assert not list(tmp_path.iterdir())
 
 
 def test_every_example_is_tested_and_listed(root: Path) -> None:

@@ -79,7 +79,9 @@ def test_judging_finds_what_is_planted(hand: wb.Figure, scene: wb.Scene) -> None
     zeros, none = np.zeros(count), np.zeros(count, dtype=np.intp)
     judged = judge(
         scene,
-        Recording(np.array(shown), np.array(tracked), 0.02, "qp", zeros, zeros, zeros, none, none, none, ("",) * count),
+        Recording(
+            np.array(shown), np.array(tracked), 0.02, "qp", zeros, zeros, zeros, zeros, none, none, none, ("",) * count
+        ),
     )
     assert judged.depth[1] == pytest.approx(0.005, abs=1e-4)
     assert judged.tracked_depth[1] == pytest.approx(0.03, abs=1e-4)

@@ -83,6 +83,7 @@ class FrameLoop:
             raise InputError(f"frame 0: a tracked posture is ({scene.model.nq},) finite numbers, not {q.shape}")
         self.shown, self._note = free_start(scene, q, rigid)
         self._remover = self._made(overlap, dt, seed, rigid)
+        self._kept_from_passing(self._remover.remove(self.shown, self.shown))  # what is set up once, before the clock
 
     def frame(self, tracked: ArrayLike) -> Frame:
         """Show one frame.
@@ -93,7 +94,7 @@ class FrameLoop:
         Args:
             tracked: (nq,) what the tracker says.
         """
-        began = time.perf_counter()
+        began = _clocks()
         goal = np.asarray(tracked, dtype=float)
         if goal.shape != self.shown.shape or not np.isfinite(goal).all():
             note = f"the tracked posture is not {len(self.shown)} finite numbers; the figure stays"
@@ -102,12 +103,13 @@ class FrameLoop:
         # Simulated objects would move here, after the driven ones have found their places.
         return self._shown(self._kept_from_passing(removal), began)
 
-    def _shown(self, removal: Removal, began: float) -> Frame:
+    def _shown(self, removal: Removal, began: tuple[float, float]) -> Frame:
         note = "; ".join(part for part in (self._note, removal.note) if part)
         note = f"frame {self.count}: {note}" if note else ""
         self.shown, self._note, self.count = np.array(removal.ways[0]), "", self.count + 1
+        wall, cpu = (now - then for now, then in zip(_clocks(), began, strict=True))
         return Frame(
-            self.shown, time.perf_counter() - began, removal.contact_seconds, removal.solve_seconds,
+            self.shown, wall, cpu, removal.contact_seconds, removal.solve_seconds,
             removal.iterations, removal.joints, removal.pairs, note,
         )  # fmt: skip
 
@@ -147,6 +149,11 @@ class FrameLoop:
         from wholebody.interaction.chains import LimbByLimb
 
         return LimbByLimb(self.scene, seed)
+
+
+def _clocks() -> tuple[float, float]:
+    """Wall time and the processor's time for this thread, seconds."""
+    return time.perf_counter(), time.thread_time()
 
 
 def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:

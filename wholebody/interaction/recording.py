@@ -19,6 +19,7 @@ class Frame(NamedTuple):
     Attributes:
         q: (nq,) the posture that is shown, free of overlap as far as the note does not say otherwise.
         seconds: that the frame took, without drawing.
+        cpu_seconds: that the processor worked on it, without waiting for other work on a shared machine.
         contact_seconds: of it, in collision queries.
         solve_seconds: of it, in finding joint angles (or, for a rigid figure, its displacement).
         iterations: programs solved, passes of CCD with a goal made anew, or displacements.
@@ -29,6 +30,7 @@ class Frame(NamedTuple):
 
     q: Array
     seconds: float
+    cpu_seconds: float
     contact_seconds: float
     solve_seconds: float
     iterations: int
@@ -46,7 +48,7 @@ class Recording:
         tracked: (n, nq) what the tracker said.
         dt: seconds from frame to frame.
         overlap: "qp" or "ccd".
-        seconds, contact_seconds, solve_seconds: (n,) as in `Frame`.
+        seconds, cpu_seconds, contact_seconds, solve_seconds: (n,) as in `Frame`.
         iterations, joints, pairs: (n,) as in `Frame`.
         notes: a note for each frame, mostly empty.
     """
@@ -56,6 +58,7 @@ class Recording:
     dt: float
     overlap: str
     seconds: Array
+    cpu_seconds: Array
     contact_seconds: Array
     solve_seconds: Array
     iterations: Counts
@@ -72,6 +75,7 @@ class Recording:
             dt=dt,
             overlap=overlap,
             seconds=np.array([frame.seconds for frame in frames]),
+            cpu_seconds=np.array([frame.cpu_seconds for frame in frames]),
             contact_seconds=np.array([frame.contact_seconds for frame in frames]),
             solve_seconds=np.array([frame.solve_seconds for frame in frames]),
             iterations=np.array([frame.iterations for frame in frames], dtype=np.intp),
