@@ -182,3 +182,43 @@ def test_bad_input_names_the_bodies() -> None:
         Assembly().solve()
     with pytest.raises(InputError, match="tolerance"):
         made.solve(tolerance=0.0)
+
+
+def test_the_nearest_place_is_found_with_quadratic_convergence() -> None:
+    # a point on a rod about the origin goes to the plane z = 0.6: of the circle there, the nearest one
+    made = Assembly().body("bob", (1.0, 0.2, 0.0), size=1e-3)
+    made.spherical("world", "bob", at=(0, 0, 0))
+    made.on_plane("bob", (0, 0, 0), normal=(0, 0, 1), through=(0, 0, 0.6))
+    before = np.array((1.0, 0.2, 0.0))
+    answer = made.solve(tolerance=1e-9, nearest=True)
+    radius = np.sqrt(before @ before - 0.36)
+    wanted = np.array((*(radius * before[:2] / np.linalg.norm(before)), 0.6))
+    assert answer.status == "solved"
+    assert answer.placements["bob"].translation == pytest.approx(wanted, abs=1e-6)
+
+
+def test_the_nearest_ring_is_nearer_than_what_least_steps_find() -> None:
+    count = 12
+
+    def ring() -> Assembly:
+        made, radius = Assembly(), count / (2.0 * np.pi)
+        corners = [radius * np.array((np.cos(a), np.sin(a), 0.0)) for a in 2.0 * np.pi * np.arange(count) / count]
+        for k, corner in enumerate(corners):
+            made.body(f"b{k}", corner, size=0.5)
+        for k, corner in enumerate(corners):
+            made.spherical(f"b{k - 1}" if k else f"b{count - 1}", f"b{k}", at=corner)
+        return made.point_goal("b0", corners[0] + (-0.3, 0.2, 0.5))
+
+    def way(made: Assembly, start: np.ndarray) -> float:
+        step = made.variables() - start
+        return float((made.system().weight * step) @ step)
+
+    stepped, nearest = ring(), ring()
+    start = stepped.variables()
+    stepped.solve(tolerance=1e-9)
+    answer = nearest.solve(tolerance=1e-9, nearest=True)
+    errors = np.array(answer.nearness)
+    assert errors[-1] <= 1e-9
+    near = errors[(errors < 0.05) & (errors > 1e-12)]
+    assert (near[1:] <= 50.0 * near[:-1] ** 2 + 1e-10).all()
+    assert way(nearest, start) < way(stepped, start) - 1e-6

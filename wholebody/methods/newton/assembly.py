@@ -11,13 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.geometry.placement import PlacementLike, placement
-from wholebody.methods.newton.assembly_solution import AssemblySolution, answer
-from wholebody.methods.newton.equations import EquationSet
+from wholebody.methods.newton.assembly_solution import AssemblySolution, solved
+from wholebody.methods.newton.equations import EquationSet, axes_along
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
-from wholebody.methods.newton.quaternions import axes_with_z
-from wholebody.methods.newton.reaching import Course, reach
+from wholebody.methods.newton.reaching import Course
 from wholebody.methods.newton.system import System
 from wholebody.tasks.inputs import direction, numbers, point
 
@@ -115,9 +114,9 @@ class Assembly:
             ours, theirs = turn_a.inverse() * along, turn_b.inverse() * along
         else:
             ours, theirs = along, direction(axis_second, f"{what}: axis_second")
-        basis_a = _with_z(ours)
+        basis_a = axes_along(ours)
         # the second body's axes agree with the first's at the present placements, so that the angle is zero now
-        basis_b = (turn_b.inverse() * turn_a * basis_a) if axis_second is None else _with_z(theirs)
+        basis_b = (turn_b.inverse() * turn_a * basis_a) if axis_second is None else axes_along(theirs)
         self._equations.coincide(a, b, what, *ends)
         self._equations.turn(a, b, what, basis_a, basis_b, 2)
         if limits is not None:
@@ -133,7 +132,7 @@ class Assembly:
         a, b = self._pair(first, second, "prismatic joint")
         along = direction(axis, f"{what}: axis")
         turn_a, turn_b = pin.Quaternion(self._place(a)[3:]), pin.Quaternion(self._place(b)[3:])
-        basis = _with_z(turn_a.inverse() * along)
+        basis = axes_along(turn_a.inverse() * along)
         self._equations.turn(a, b, what, basis, turn_b.inverse() * turn_a * basis, 3)
         way = turn_a.inverse() * (self._place(b)[:3] - self._place(a)[:3])
         for side in basis.toRotationMatrix().T[:2]:
@@ -212,15 +211,23 @@ class Assembly:
         return np.concatenate(self._places)
 
     def solve(
-        self, *, tolerance: float = 1e-5, iterations: int = 100, algebra: str = "auto", inequalities: Kind = "slack"
+        self,
+        *,
+        tolerance: float = 1e-5,
+        iterations: int = 100,
+        algebra: str = "auto",
+        inequalities: Kind = "slack",
+        nearest: bool = False,
     ) -> AssemblySolution:
-        """Move the bodies, each as little as can be, until joints and goals hold; they stay there.
+        """Move the bodies until joints and goals hold, each step the least motion; they stay there.
 
         Args:
             tolerance: metres and radians, from 1e-12.
             iterations: most Newton iterations.
             algebra: "auto", "normal", "llt", "kkt", "schur", "dense" or "svd".
             inequalities: "slack" or "barrier".
+            nearest: look for the place nearest to where the bodies were (eq. 1), which many least steps miss by a
+                little; without inequalities only.
 
         Raises:
             InputError: there are no bodies, or a setting is out of range.
@@ -235,11 +242,14 @@ class Assembly:
             self._prepared = (algebra, system, linear_algebra(system.pattern, algebra))
             self.structures += 1
         _, system, factor = self._prepared
-        found = reach(
-            Course(system, factor), self.variables(), tolerance=tolerance, iterations=iterations, kind=inequalities
-        )
-        self._places = list(found.x.reshape(-1, 7))
-        return answer(list(self._names), system, found, tolerance, factor.name)
+        if nearest and system.inequality.any():
+            raise InputError("nearest is for assemblies without limits and one-sided planes; leave it out")
+        x, solution = solved(
+            list(self._names), Course(system, factor), self.variables(),
+            tolerance=tolerance, iterations=iterations, kind=inequalities, nearest=nearest,
+        )  # fmt: skip
+        self._places = list(x.reshape(-1, 7))
+        return solution
 
     # ---- looking names up
 
@@ -287,8 +297,3 @@ class Assembly:
         place = point(at, f"{where}: at")
         sides = [pin.XYZQUATToSE3(self._place(index)).actInv(place) for index in (a, b)]
         return np.array(sides[0]), np.array(sides[1])
-
-
-def _with_z(direction: Array) -> Any:
-    """Axes (pin.Quaternion) whose z is a unit direction (3,)."""
-    return pin.Quaternion(axes_with_z(direction[None])[0])

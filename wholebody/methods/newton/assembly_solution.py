@@ -7,10 +7,16 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from wholebody.methods.newton.reaching import Reached
-from wholebody.methods.newton.system import System
+from wholebody.methods.newton.inequalities import Kind
+from wholebody.methods.newton.reaching import Course, reach, unit
+from wholebody.methods.newton.settling import settle
 from wholebody.problem import Status
+
+Array = NDArray[np.float64]
+
+FINEST = 1e-9  # least error of the KKT system that is asked for: redundant equations leave about a tenth of it
 
 
 @dataclass(frozen=True)
@@ -26,6 +32,8 @@ class AssemblySolution:
         residuals: largest error before each iteration and at the end.
         systems: linear systems solved.
         algebra: name of the factorisation.
+        nearness: largest error of the KKT system before each iteration towards the nearest place and at the end; empty
+            where that was not asked for. If the last is above the tolerance, the place is a near one, not the nearest.
         message: one sentence for a reader, with the bodies concerned.
     """
 
@@ -36,6 +44,7 @@ class AssemblySolution:
     residuals: tuple[float, ...]
     systems: int
     algebra: str
+    nearness: tuple[float, ...]
     message: str
 
     @property
@@ -44,9 +53,24 @@ class AssemblySolution:
         return len(self.residuals) - 1
 
 
-def answer(names: list[str], system: System, found: Reached, tolerance: float, algebra: str) -> AssemblySolution:
-    """Put what an iteration found into words."""
-    residual = system.residual(found.x)
+def solved(
+    names: list[str],
+    course: Course,
+    before: Array,
+    *,
+    tolerance: float,
+    iterations: int,
+    kind: Kind,
+    nearest: bool,
+) -> tuple[Array, AssemblySolution]:
+    """Solve from the variables `before` (7 n,); where the bodies end, as variables and in words."""
+    found = reach(course, before, tolerance=tolerance, iterations=iterations, kind=kind)
+    system, x = course.system, found.x
+    nearness: tuple[float, ...] = ()
+    if nearest and found.met:
+        settled = settle(system, x, before, tolerance=max(tolerance, FINEST), iterations=iterations)
+        x, nearness = (unit(settled.x) if settled.met else x), settled.errors
+    residual = system.residual(x)
     size = np.abs(np.where(system.inequality, np.minimum(residual, 0.0), residual))
     status: Status = "solved"
     message = f"solved in {found.iterations} iterations"
@@ -58,7 +82,15 @@ def answer(names: list[str], system: System, found: Reached, tolerance: float, a
         why = {"infeasible": "the joints cannot all hold", "unreachable": "all joints hold, the goals cannot"}
         left = f"{worst} is missed by {counted.max():.3g} m or rad"
         message = f"{why.get(status, 'ran out of iterations')}: {left}"
-    placements = {name: pin.XYZQUATToSE3(place) for name, place in zip(names, found.x.reshape(-1, 7), strict=True)}
-    return AssemblySolution(
-        placements, status, found.goal, found.hard, found.residuals, found.systems, algebra, message
+    placements = {name: pin.XYZQUATToSE3(place) for name, place in zip(names, x.reshape(-1, 7), strict=True)}
+    return x, AssemblySolution(
+        placements=placements,
+        status=status,
+        goal_error=float(size[system.goal].max(initial=0.0)),
+        joint_error=float(size[~system.goal].max(initial=0.0)),
+        residuals=found.residuals,
+        systems=found.systems,
+        algebra=course.algebra.name,
+        nearness=nearness,
+        message=message,
     )

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.methods.newton.batches import Angle, Batch, Coincide, Slide, Turn, Unit
 from wholebody.methods.newton.keys import Key
-from wholebody.methods.newton.quaternions import relative_forms
+from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
 from wholebody.methods.newton.system import System
 
 Array = NDArray[np.float64]
@@ -116,3 +117,8 @@ def _batch(kind: str, rows: list[Row], count: int) -> Batch:
     if kind == "angle":
         return Angle(bodies, labels, forms[:, 2:], columns[2], columns[3], columns[4])
     return Turn(bodies, labels, 2.0 * forms[:, : int(kind[-1])])
+
+
+def axes_along(direction: Array) -> Any:
+    """Axes (pin.Quaternion) whose z is a unit direction (3,)."""
+    return pin.Quaternion(axes_with_z(direction[None])[0])
