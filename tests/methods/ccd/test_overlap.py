@@ -72,7 +72,7 @@ def test_no_frame_overlaps_and_the_last_is_what_is_tracked(
         assert result.deepest <= 1e-3
         assert avatar.within_limits(q)
         assert outside(avatar, q) <= 1e-9
-        assert scene.sweeper.first_contact(before, q, None, 2e-3) is None
+        assert scene.sweeper.first_contact(before, q, None, 4e-3) is None
         wanted_inside = max(wanted_inside, deepest(scene, wanted))
         pushed += result.iterations > 0
     assert wanted_inside > 0.02

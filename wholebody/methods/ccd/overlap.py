@@ -26,7 +26,8 @@ Array = NDArray[np.float64]
 STEP = 0.03  # m: farthest that a chain's tip is drawn at once; half of a forearm's width
 SMALL_STEP = 0.006  # m: where steps of that length lead around a bulge that the straight way cuts
 STEPS = 8  # most steps of one frame
-MOST_GOALS = 40  # after so many the next frame goes on: some 5 ms
+ENOUGH = 60  # looks after which a frame makes no further step, and the next one goes on: some 6 ms
+TOO_MANY = 90  # looks after which no chain has another turn
 HALVINGS = 7  # of an interpolation: a step of 3 cm to a quarter of a millimetre
 LEAST_GAIN = 1e-7  # rad^2: a chain that gets no nearer than this to the tracked posture stays where it is
 HELD_UP = 0.4  # a part that gains less than this share of what drawing alone would have is held up (2 is all of it)
@@ -145,15 +146,16 @@ class Frames:
     ) -> list[tuple[Array, float]]:
         """From a free posture towards the wanted one, step by step: the postures and their deepest overlaps."""
         remover = self._remover
+        enough = remover.tally.looks + ENOUGH
         settled = [False] * len(self._parts)
         way = [(q, left)]
         for _ in range(steps):
-            if remover.tally.iterations > MOST_GOALS:
+            if remover.tally.looks > enough:
                 break
             drawn = self._draw(q, wanted, settled)
             if drawn is None:
                 break
-            trial, overlaps = remover.separate(drawn[0], rng)
+            trial, overlaps = remover.separate(drawn[0], rng, enough + TOO_MANY - ENOUGH)
             if overlaps:
                 trial = self._interpolate(q, trial)
             if self._jumps(before, q, trial):

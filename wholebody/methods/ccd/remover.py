@@ -30,6 +30,7 @@ GAIN = 0.98  # a pass that leaves more than this share of the deepest overlap le
 class Tally:
     """What a removal did, summed over its parts."""
 
+    looks: int = 0
     iterations: int = 0
     joints: set[int] = field(default_factory=set)
     pairs: set[tuple[int, int]] = field(default_factory=set)
@@ -89,6 +90,7 @@ class Remover:
     def look(self, q: Array) -> list[Overlap]:
         """What overlaps at a posture q (nq,), the deepest first."""
         began = time.perf_counter()
+        self.tally.looks += 1
         pin.forwardKinematics(self.scene.model, self._data, q)
         near = self.scene.proximity.near(self._data, self._within)
         depth = -near.distance if self.clearances is None else self.clearances[near.number] - near.distance
@@ -114,12 +116,13 @@ class Remover:
         self.tally.contact_seconds += time.perf_counter() - began
         return found
 
-    def separate(self, q: Array, rng: np.random.Generator) -> tuple[Array, list[Overlap]]:
+    def separate(self, q: Array, rng: np.random.Generator, most_looks: float = np.inf) -> tuple[Array, list[Overlap]]:
         """Push links out until nothing overlaps or nothing gains.
 
         Args:
             q: (nq,) posture.
             rng: of the order in which the chains have their turns.
+            most_looks: looks in the tally at which no further chain has its turn.
 
         Returns:
             The posture, and what still overlaps in it.
@@ -132,6 +135,8 @@ class Remover:
                 break
             before = self.deepest
             for k in rng.permutation(len(names)).tolist():
+                if self.tally.looks > most_looks:
+                    break
                 overlaps = self._leave(self.chains[names[k]], q, overlaps)
             if overlaps and self.deepest > GAIN * before:
                 break
