@@ -83,11 +83,11 @@ class InteractionRow:
 
     @property
     def misses(self) -> list[str]:
-        """What was asked of every scene and is not so here."""
+        """What was asked of every scene and is not so here; times are the processor's, for others may work beside."""
         late = self.latest < 0 or self.latest > IN_TIME
         asked = (
-            (self.mean_ms > GOAL_MEAN, f"mean {self.mean_ms:.1f} ms"),
-            (self.p99_ms > GOAL_P99, f"p99 {self.p99_ms:.1f} ms"),
+            (self.cpu_mean_ms > GOAL_MEAN, f"mean {self.cpu_mean_ms:.1f} ms"),
+            (self.cpu_p99_ms > GOAL_P99, f"p99 {self.cpu_p99_ms:.1f} ms"),
             (self.depth_mm > DEEPEST[self.overlap], f"{self.depth_mm:.2f} mm deep"),
             (self.passed > 0, f"{self.passed} frames pass"),
             (max(self.limit_rad, self.cone_rad) > 1e-6, "out of limits or cones"),
@@ -209,7 +209,7 @@ def report(rows: Sequence[InteractionRow], facts: Mapping[str, str]) -> str:
             "freedom at once: they count once for every program of a frame in contact. \"Joints off\" is the root mean "
             "square over the joints of the angle between shown and tracked posture, mean over the frames; jerk is the "
             "third difference of the joint angles, rad/s³. CPU is time that the processor worked on a frame, on a "
-            "shared machine. Asked of every scene: mean frame under "
+            "shared machine, and what is missed goes by it. Asked of every scene: mean frame under "
             f"{GOAL_MEAN:g} ms, p99 under {GOAL_P99:g} ms, deepest overlap left {DEEPEST['qp']:g} mm with qp and "
             f"{DEEPEST['ccd']:g} mm with ccd, no pair passed between frames, limits and cones kept, and back at the "
             f"tracked posture to 1 mrad within {IN_TIME} frames after contact; all judged from the postures, every "
