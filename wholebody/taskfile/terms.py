@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from wholebody import tasks
 from wholebody.methods.ccd.method import CCD
+from wholebody.methods.newton.method import Newton
 from wholebody.methods.qp.method import QP
 from wholebody.taskfile import kinds
 from wholebody.taskfile.kinds import DIRECTION, FRAME, PLACEMENT, POSITION, QUATERNION, WEIGHT, Number
@@ -151,5 +152,19 @@ METHODS = {
             Key("seed", Number(0, 2**32 - 1, whole=True), "of those starts"),
         ),
         CCD,
+    ),
+    "newton": Form(
+        "Sparse Newton in full coordinates: points, frames, orientations, axes, holds and planes; least effort.",
+        (
+            Key("tolerance", Number(1e-10, 0.1), "metres and radians to which goals are met; 1e-5 if left out"),
+            Key("iterations", Number(1, 100_000, whole=True), "most of them"),
+            Key("algebra", kinds.Text(), '"auto" (if left out), "normal", "llt", "kkt", "schur", "dense" or "svd"'),
+            Key(
+                "inequalities",
+                kinds.Choice(("slack", "barrier")),
+                "how limits and contacts are dealt with; slack if left out",
+            ),
+        ),
+        Newton,
     ),
 }
