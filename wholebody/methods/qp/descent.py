@@ -29,7 +29,8 @@ from wholebody.problem import Iterate
 FIRST_RADIUS = 0.3  # rad, m: of the trust region; larger = fewer iterations in the open, more rejected ones in clutter
 LARGEST_RADIUS = 0.8
 LEAST_RADIUS = 1e-7
-LEAST_WITHIN = 0.05  # m: pairs nearer than this, or than a step is long, get rows
+LEAST_WITHIN = 0.05  # m: pairs nearer than what a step asks for get rows, and at least those nearer than this
+MOST_WITHIN = 0.12  # m: but none farther apart than this; more is slower, less means more steps that meet things unseen
 SLOW = 0.1  # share of the violation that must go in PATIENCE iterations, else only the nearest posture is sought
 PATIENCE = 6
 RENEWALS = 2  # times that a descent with small steps begins anew with long ones before it is taken for settled
@@ -234,7 +235,7 @@ class Descent:
         return jumps(self.lineariser.scene, here.placed, there.placed, here.at.q, there.at.q)
 
     def _visit(self, q: Array) -> _Visit:
-        within = max(LEAST_WITHIN, PULL * self._radius)
+        within = min(max(LEAST_WITHIN, PULL * self._radius), MOST_WITHIN)
         at = self.lineariser.at(q, within)
         rows = self.subproblem.rows(at)
         if self.offset is not None:
