@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.doctor.surroundings import library_folders, python_fault, shadowing_folders
+from wholebody.doctor.surroundings import loader_folders, python_fault, shadowing_folders
 
 
 @pytest.mark.parametrize("version", [(3, 10), (3, 11), (3, 12), (3, 13)])
@@ -31,5 +31,5 @@ def test_a_workspace_on_pythonpath_that_brings_its_own_pinocchio_is_named(tmp_pa
 def test_libraries_that_replace_the_wheels_own_are_named(tmp_path: Path) -> None:
     (tmp_path / "libpinocchio_default.so.3").touch()
     (tmp_path / "libsomething.so").touch()
-    assert library_folders({"LD_LIBRARY_PATH": str(tmp_path)}) == {str(tmp_path): ["libpinocchio"]}
-    assert library_folders({"LD_LIBRARY_PATH": ""}) == {}
+    assert loader_folders({"LD_LIBRARY_PATH": str(tmp_path)}) == {str(tmp_path): ["libpinocchio"]}
+    assert loader_folders({"LD_LIBRARY_PATH": ""}) == {}

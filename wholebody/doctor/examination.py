@@ -155,6 +155,6 @@ def _conflicts(have: Mapping[str, Distribution]) -> Iterator[tuple[str, str]]:
 def _paths(environ: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     for folder, hidden in surroundings.shadowing_folders(environ, MODULES.values()).items():
         yield f"PYTHONPATH names {folder}, whose {', '.join(hidden)} hide the installed ones", "unset PYTHONPATH"
-    for folder, hidden in surroundings.library_folders(environ).items():
+    for folder, hidden in surroundings.loader_folders(environ).items():
         sentence = f"LD_LIBRARY_PATH names {folder}, whose {', '.join(hidden)} replace the installed ones"
         yield sentence, "unset LD_LIBRARY_PATH"

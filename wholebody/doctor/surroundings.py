@@ -33,7 +33,7 @@ def shadowing_folders(environ: Mapping[str, str], modules: Iterable[str]) -> dic
     return found
 
 
-def library_folders(environ: Mapping[str, str]) -> dict[str, list[str]]:
+def loader_folders(environ: Mapping[str, str]) -> dict[str, list[str]]:
     """Folders of LD_LIBRARY_PATH with libraries that would be loaded in place of the wheels' own.
 
     Returns:
