@@ -70,6 +70,7 @@ class Lineariser:
         bounds: Sequence[Bound],
         measures: Sequence[Measure],
         clearances: Array,
+        state: State,
         dt: float | None = None,
     ) -> None:
         """Take the resolved terms of a problem.
@@ -81,11 +82,12 @@ class Lineariser:
             bounds: resolved bounds on the displacement.
             measures: resolved measures.
             clearances: (pairs,) least distance asked of every collision pair, metres.
+            state: what to move; a problem's linearisers share one, since Pinocchio's data take 2 ms to make.
             dt: step in seconds for bounds that need one.
         """
         self.scene, self.goals, self.constraints = scene, goals, constraints
         self.bounds, self.measures, self.clearances, self.dt = bounds, measures, clearances, dt
-        self.state = State(scene.model)
+        self.state = state
         self._largest_clearance = float(clearances.max(initial=0.0))
 
     def at(self, q: Array, within: float) -> Linearisation:

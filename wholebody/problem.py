@@ -85,6 +85,7 @@ class Problem:
             term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
         )
         self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
+        self._state = State(scene.model)
         self._check_frozen()
         self._check_terms()
         self.touching = tuple(_owner_pair(scene, pair) for pair in touching)
@@ -108,7 +109,16 @@ class Problem:
             InputError: objects came to or left the scene after the problem was stated.
         """
         self.check_fresh()
-        return Lineariser(self.scene, self.goals, self.constraints, self.bounds, self.measures, self.clearances, dt)
+        return Lineariser(
+            self.scene,
+            self.goals,
+            self.constraints,
+            self.bounds,
+            self.measures,
+            self.clearances,
+            self._state,
+            dt,
+        )
 
     def check_fresh(self) -> None:
         """Raise InputError if objects came to or left the scene after the problem was stated (moving them is fine)."""
@@ -117,7 +127,7 @@ class Problem:
 
     def _check_frozen(self) -> None:
         """Raise InputError if a bound keeps a joint where its limits do not let it be."""
-        figure, state = self.scene.figure, State(self.scene.model).update(self.start)
+        figure, state = self.scene.figure, self._state.update(self.start)
         least, most = figure.tangent_bounds(self.start)
         for bound in self.bounds:
             low, high = bound.bounds(state, None)
@@ -131,7 +141,7 @@ class Problem:
 
     def _check_terms(self) -> None:
         """Evaluate every term once at the start, so that one written wrongly is named before anything is computed."""
-        state = State(self.scene.model).update(self.start)
+        state = self._state.update(self.start)
         for number, goal in enumerate(self.goals):
             check_rows(f"goals[{number}]", goal, goal.error(state), goal.jacobian(state), state)
         for number, constraint in enumerate(self.constraints):
