@@ -122,6 +122,7 @@ class Tracker:
         groups = np.zeros(rows.groups)
         groups[rows.groups - len(short) :] = short
         again = self._working_set.solve(replace(program, least=program.least + groups[rows.group]), rows.key)
+        self.problem.scene.proximity.place(self._lineariser.state.update(at.q).data)  # where motion begins
         motion, _ = self._motion(again.x)
         share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
         displacement = share * again.x
