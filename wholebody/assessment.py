@@ -6,7 +6,8 @@ official getters, and takes contact normals' derivatives from Pinocchio's own jo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -44,6 +45,7 @@ class Assessment:
             contact balances of the objective's gradient, divided by the objective's curvature; largest entry. The
             objective is the measures where the goals are met, else the squared goal errors.
         goal_errors: (goals,) norm of each goal's error, metres or radians (whichever is larger).
+        seconds: wall time that the judgement itself took; a method's own time is its solution's less this.
     """
 
     goal_error: float
@@ -56,6 +58,7 @@ class Assessment:
     measure: float
     optimality: float
     goal_errors: tuple[float, ...]
+    seconds: float = field(default=0.0, compare=False, repr=False)
 
     def holds(self, tolerance: float) -> bool:
         """Whether limits, constraints and clearances hold to a tolerance, metres and radians."""
@@ -77,6 +80,7 @@ def assess(problem: Problem, q: Array) -> Assessment:
     Raises:
         InputError: q has the wrong shape or a value that is not finite.
     """
+    began = time.perf_counter()
     q = np.asarray(q, dtype=float)
     if q.shape != (problem.scene.model.nq,) or not np.isfinite(q).all():
         raise InputError(f"a posture is ({problem.scene.model.nq},) finite numbers; got shape {q.shape}")
@@ -98,6 +102,7 @@ def assess(problem: Problem, q: Array) -> Assessment:
         measure=sum(term.weight * term.value(state) for term in problem.measures),
         optimality=_optimality(problem, state, pairs),
         goal_errors=each,
+        seconds=time.perf_counter() - began,
     )
 
 

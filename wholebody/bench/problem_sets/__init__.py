@@ -1,0 +1,1 @@
+"""Problems with known answers, made from seeds: what methods are compared on."""

@@ -1,0 +1,20 @@
+"""The command group `wholebody bench`, one file a command."""
+
+from __future__ import annotations
+
+import argparse
+
+from wholebody.cli.bench import newton, reaches, solve, step
+
+HELP = "measure steps, solves and random reaches, beside other tools where installed"
+DESCRIPTION = """\
+Measure what the package does, and write the numbers as CSV, the charts as SVG and PNG, and tables to read. Times depend
+on the machine and on what else runs on it: compare ratios of one run. Set OMP_NUM_THREADS=1 for steady ones."""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command `bench` with its own commands."""
+    parser = commands.add_parser("bench", help=HELP, description=DESCRIPTION)
+    kinds = parser.add_subparsers(title="what to measure", metavar="WHAT", required=True)
+    for command in (step, reaches, solve, newton):
+        command.add_to(kinds)

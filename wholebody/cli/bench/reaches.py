@@ -1,0 +1,50 @@
+"""`wholebody bench reaches`: random reaches whose answer is known to exist."""
+
+from __future__ import annotations
+
+import argparse
+
+from wholebody.cli.bench.publishing import add_common, check_count, publish
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "reaches",
+        help="random reaches whose answer is known to exist",
+        description="Solve random reaches from standing; list everything that was not solved.",
+    )
+    parser.add_argument("--count", type=int, default=200, metavar="N", help="how many (default: 200)")
+    parser.add_argument("--first", type=int, default=0, metavar="SEED", help="seed of the first one (default: 0)")
+    parser.add_argument("--solver", nargs="+", default=["osqp"], metavar="NAME", help="QP solvers (default: osqp)")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default: 1, for steady times)")
+    parser.set_defaults(run=run)
+    add_common(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure random reaches."""
+    from wholebody.bench import charts
+    from wholebody.bench.machine import machine
+    from wholebody.bench.reaches import run
+    from wholebody.bench.report import reaches_report
+    from wholebody.bench.tables import write_rows
+    from wholebody.methods.qp.solvers.base import make_solver
+
+    count = 10 if arguments.quick else arguments.count
+    check_count(count, "--count")
+    check_count(arguments.jobs, "--jobs")
+    for solver in arguments.solver:
+        make_solver(solver)
+    facts = machine() | {"processes": str(arguments.jobs)}
+    rows = []
+    for solver in arguments.solver:
+        for row in run(range(arguments.first, arguments.first + count), solver, arguments.jobs):
+            rows.append(row)
+            if row.status != "solved":
+                print(f"seed {row.seed}, {solver}: {row.status}; {row.how}")
+    report = reaches_report(rows, facts, arguments.jobs)
+    write_rows(arguments.out / "reaches.csv", facts, rows)
+    drawn = {"reaches": charts.reach_times(rows, arguments.out / "reaches")}
+    publish("reaches", report, drawn, {"reaches": "Share of the reaches solved within a time"}, arguments)
+    return 0

@@ -1,0 +1,44 @@
+"""`wholebody bench solve`: whole solves of a task, and memory."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from wholebody.cli.bench.publishing import add_common, check_count, publish
+
+SOLVERS = ("osqp", "daqp")
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "solve",
+        help="whole solves of the shelf task, and memory",
+        description="Solve a task with new and with used workspaces, and measure the memory of `wholebody pose`.",
+    )
+    parser.add_argument("--task", type=Path, metavar="TASK.toml", help="another task (default: the shelf)")
+    parser.add_argument("--count", type=int, default=30, metavar="N", help="solves of each kind (default: 30)")
+    parser.add_argument("--solver", nargs="+", default=list(SOLVERS), metavar="NAME", help="QP solvers (default: both)")
+    parser.set_defaults(run=run)
+    add_common(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure whole solves."""
+    from wholebody.bench import solve
+    from wholebody.bench.machine import machine
+    from wholebody.bench.report import solve_report
+    from wholebody.bench.tables import write_rows
+    from wholebody.cli.demo import shipped_tasks
+
+    task = arguments.task or shipped_tasks()["shelf"]
+    count = 3 if arguments.quick else arguments.count
+    check_count(count, "--count")
+    facts = machine()
+    rows = solve.both(task, tuple(arguments.solver), count, print)
+    peak = solve.memory(task)
+    write_rows(arguments.out / "solve.csv", facts, rows)
+    write_rows(arguments.out / "memory.csv", facts, [peak])
+    publish("solve", solve_report(rows, peak, facts), {}, {}, arguments)
+    return 0
