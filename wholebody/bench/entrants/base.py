@@ -1,0 +1,69 @@
+"""What a comparison has to know of a method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from wholebody.methods.solve import Method
+from wholebody.problem import Problem
+
+Budget = tuple[float, "int | None"]
+"""Tolerance [m, rad], and the most iterations, or None for the method's own default."""
+
+LADDER: tuple[Budget, ...] = (
+    (1e-1, None),
+    (3e-2, None),
+    (1e-2, None),
+    (3e-3, None),
+    (1e-3, None),
+    (1e-4, None),
+    (1e-5, None),
+    (1e-6, None),
+    (1e-8, None),
+)
+"""Tolerances from cheap to exact; each entrant begins and ends where it makes sense for it."""
+
+
+@runtime_checkable
+class Prepared(Protocol):
+    """A method that builds a model of its own before it can solve."""
+
+    def prepare(self, problem: Problem) -> None:
+        """Build what a solve of this problem needs; a solve without it builds it itself.
+
+        Raises:
+            InputError: the method cannot express the problem.
+        """
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """A method as it takes part in comparisons.
+
+    Attributes:
+        name: "qp/osqp", "ccd", "newton/slack", ...; it has one colour in all charts.
+        make: a fresh method from a tolerance and the most iterations (None for its own default).
+        loose: budgets from cheap to exact, that draw its curve of speed against accuracy.
+        setup: how it was set up, for reports.
+        differences: what it cannot express, or does otherwise; one sentence each.
+        package: what has to be installed for it; None where it comes with wholebody.
+    """
+
+    name: str
+    make: Callable[[float, int | None], Method]
+    loose: tuple[Budget, ...]
+    setup: str
+    differences: tuple[str, ...] = ()
+    package: str | None = None
+
+
+def set_up(method: Method, problem: Problem) -> None:
+    """Let a method build what it needs before a solve; nothing for one that needs nothing.
+
+    Raises:
+        InputError: the method cannot express the problem.
+    """
+    if isinstance(method, Prepared):
+        method.prepare(problem)

@@ -1,0 +1,92 @@
+"""Our own methods as they take part: qp with every QP solver, ccd, and newton in three ways."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+from wholebody.bench.entrants.base import LADDER, Budget, Entrant
+from wholebody.methods.solve import Method
+
+NEWTONS: dict[str, dict[str, Any]] = {
+    "slack": {"inequalities": "slack"},
+    "barrier": {"inequalities": "barrier"},
+    "kkt": {"inequalities": "slack", "algebra": "kkt"},
+}
+"""The ways of newton, as arguments of `Newton`."""
+
+_NEWTON_SETUPS = {
+    "slack": "squared slacks, and the factorisation that it chooses itself",
+    "barrier": "a logarithmic barrier, and the factorisation that it chooses itself",
+    "kkt": "squared slacks, and LDL^T of the symmetric saddle-point system in place of the normal equations",
+}
+
+
+def qp_entrant(solver: str, package: str | None = None) -> Entrant:
+    """The QP method with one of its solvers."""
+    return Entrant(
+        name=f"qp/{solver}",
+        make=partial(_qp, solver),
+        loose=(*_few(3, 6, 12, 25), *LADDER[1:]),
+        setup=f"wb.QP(solver={solver!r}), all else as it comes: 150 programs a descent; where the first descent does "
+        "not reach the goals, stages and at most 6 seeded starts within 1 s. A budget of few iterations has neither.",
+        package=package,
+    )
+
+
+def ccd_entrant() -> Entrant:
+    """Cyclic coordinate descent."""
+    return Entrant(
+        name="ccd",
+        make=_ccd,
+        loose=(*_few(2, 5, 20), *LADDER[:8]),
+        setup="wb.CCD(), all else as it comes: 400 sweeps from one start and at most 12 further starts. A budget of "
+        "few iterations has no further starts.",
+        differences=(
+            "ccd minimises nothing: it stops at the first posture that serves",
+            "ccd takes Point, Frame and Orientation goals, holds that the reaching joints do not move, Freeze and "
+            "ReachCones; the root of the figure stays",
+        ),
+    )
+
+
+def newton_entrant(way: str) -> Entrant:
+    """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
+    return Entrant(
+        name=f"newton/{way}",
+        make=partial(_newton, way),
+        loose=(*_few(3, 6, 12, 25), *LADDER[1:]),
+        setup=f"wb.Newton() with {_NEWTON_SETUPS[way]}; at most 200 iterations, one start.",
+        differences=(
+            "newton minimises no measure but Effort, as the least motion from the start",
+            "newton has no equations for CenterOfMass, Balance, Posture, ReachCones and Axis(toward=...)",
+        ),
+    )
+
+
+def _few(*iterations: int) -> tuple[Budget, ...]:
+    return tuple((1e-3, count) for count in iterations)
+
+
+def _qp(solver: str, tolerance: float, iterations: int | None) -> Method:
+    from wholebody.methods.qp.method import QP
+
+    if iterations is None:
+        return QP(solver=solver, tolerance=tolerance)
+    return QP(solver=solver, tolerance=tolerance, iterations=iterations, budget=0.0, restarts=0)
+
+
+def _ccd(tolerance: float, iterations: int | None) -> Method:
+    from wholebody.methods.ccd.method import CCD
+
+    if iterations is None:
+        return CCD(tolerance=tolerance)
+    return CCD(tolerance=tolerance, iterations=iterations, restarts=0)
+
+
+def _newton(way: str, tolerance: float, iterations: int | None) -> Method:
+    from wholebody.methods.newton.method import Newton
+
+    if iterations is None:
+        return Newton(tolerance=tolerance, **NEWTONS[way])
+    return Newton(tolerance=tolerance, iterations=iterations, **NEWTONS[way])

@@ -1,0 +1,74 @@
+"""Which entrants there are, and which of them are installed here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from importlib.util import find_spec
+from types import MappingProxyType
+from typing import NamedTuple
+
+from wholebody.bench.entrants.base import Entrant
+from wholebody.bench.entrants.own import NEWTONS, ccd_entrant, newton_entrant, qp_entrant
+from wholebody.errors import MissingPackageError, UnknownNameError
+
+SOLVERS = {"quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
+"""Further QP solvers that the extra `solvers` installs: their names in qpsolvers -> the modules they need."""
+
+
+class _Row(NamedTuple):
+    """How to build an entrant, the modules it needs, and the extra that installs them."""
+
+    build: Callable[[], Entrant]
+    modules: tuple[str, ...] = ()
+    extra: str = ""
+
+    def installed(self) -> bool:
+        return all(find_spec(module) for module in self.modules)
+
+
+def entrants(names: Iterable[str] | None = None) -> tuple[Entrant, ...]:
+    """The entrants of these names, in the order given; all installed ones where None.
+
+    Raises:
+        UnknownNameError: there is no such entrant.
+        MissingPackageError: what it needs is not installed.
+    """
+    rows = _rows()
+    if names is None:
+        return tuple(row.build() for row in rows.values() if row.installed())
+    chosen = tuple(names)
+    for name in chosen:
+        if name not in rows:
+            raise UnknownNameError("method", name, rows)
+        if not rows[name].installed():
+            raise MissingPackageError(f"{name} is not installed; install it with: {_command(rows[name])}")
+    return tuple(rows[name].build() for name in chosen)
+
+
+def names() -> tuple[str, ...]:
+    """Names of all entrants, installed or not, in the order of reports."""
+    return tuple(_rows())
+
+
+def missing() -> Mapping[str, str]:
+    """Entrants whose packages are not installed -> the command that installs them."""
+    return MappingProxyType({name: _command(row) for name, row in _rows().items() if not row.installed()})
+
+
+def _command(row: _Row) -> str:
+    return f"pip install 'wholebody[{row.extra}]'"
+
+
+def _rows() -> dict[str, _Row]:
+    from wholebody.methods.qp.solvers.base import solver_names
+
+    rows = {f"qp/{solver}": _Row(partial(qp_entrant, solver)) for solver in ("osqp", "daqp")}
+    for solver, module in SOLVERS.items():
+        rows[f"qp/{solver}"] = _Row(partial(qp_entrant, solver, module), (module,), "solvers")
+    for solver in solver_names():  # any other that qpsolvers finds on this machine
+        rows.setdefault(f"qp/{solver}", _Row(partial(qp_entrant, solver, solver)))
+    for way in NEWTONS:
+        rows[f"newton/{way}"] = _Row(partial(newton_entrant, way))
+    rows["ccd"] = _Row(ccd_entrant)
+    return rows
