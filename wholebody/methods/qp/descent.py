@@ -17,9 +17,9 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.linearisation import Linearisation, Lineariser
+from wholebody.methods.passage import Placed, jumps, snapshot
 from wholebody.methods.qp.acceleration import Anderson
 from wholebody.methods.qp.funnel import Funnel, Outlook, Verdict
-from wholebody.methods.qp.passage import Placed, jumps, snapshot
 from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem, Violation

@@ -12,8 +12,8 @@ import numpy as np
 from wholebody.methods.qp.descent import Descent, Local
 from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.starts import bent, restarts
 from wholebody.methods.qp.subproblem import Subproblem
+from wholebody.methods.starts import bent, restarts
 from wholebody.problem import Iterate, Problem
 
 ALIKE = 1e-5  # share of a goal's error by which two descents may differ and count as equally near

@@ -12,10 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wholebody.geometry.proximity import Contacts, Indices, Proximity
-from wholebody.methods.qp.quadratic_program import Array
 from wholebody.scene import Scene
+
+Array = NDArray[np.float64]
 
 DIP = 5e-4  # m: between two postures a piece may dip in by this much; half of the thinnest plate that counts
 OVERLAP = 2e-4  # m: overlap on the way that does not count; finer than any piece is thick

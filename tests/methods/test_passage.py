@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.qp.passage import doubtful_pairs, jumps, snapshot
+from wholebody.methods.passage import doubtful_pairs, jumps, snapshot
 
 WITHIN = 0.05
 

@@ -6,9 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from wholebody.methods.qp.quadratic_program import Array
 from wholebody.problem import Problem
+
+Array = NDArray[np.float64]
 
 SPREADS = (0.3, 0.6, 1.0)  # share of each joint's range that a start may leave the first one by, in turn
 AT_LIMIT = 0.02  # rad: nearer to its limit than this a joint counts as at it
