@@ -97,7 +97,7 @@ def test_a_goal_out_of_reach_is_an_answer_with_its_own_code(task: Path, capsys: 
         TASK.replace("[0.35, -0.25, 1.0]", "[0.35, -0.25, 9.0]")
         + '[[constraint]]\ntype = "hold"\nframe = "left_foot"\n'
     )
-    task.write_text(far + "[method]\nname = 'qp'\nbudget = 0.0\n")
+    task.write_text(far + "[method]\nname = 'qp'\nbudget = 0\n")
     assert main(["pose", str(task), "--json"]) == 1
     result = json.loads(capsys.readouterr().out)
     assert result["status"] != "solved"

@@ -96,7 +96,7 @@ def test_method_has_its_settings(everything: wb.Task) -> None:
     method = everything.method
     assert isinstance(method, wb.QP)
     assert (method.solver, method.tolerance, method.iterations) == ("daqp", 1e-7, 50)
-    assert (method.budget, method.restarts, method.seed) == (0.5, 2, 3)
+    assert (method.budget, method.restarts, method.seed) == (50, 2, 3)
 
 
 def test_what_is_left_out_is_what_python_leaves_out(tmp_path: Path) -> None:

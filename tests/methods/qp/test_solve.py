@@ -139,7 +139,7 @@ def test_reachable_targets_in_clutter_are_all_solved(planar_arm, honest, solver,
         pin.framesForwardKinematics(scene.model, data, q)
         target = data.oMf[scene.frame_id("tip")].translation
         problem = wb.Problem(scene, start=start, goals=[wb.Point("tip", target)], clearance=0.002)
-        solution = honest(problem, wb.QP(solver, budget=10.0, restarts=20).solve(problem))
+        solution = honest(problem, wb.QP(solver, budget=10_000, restarts=20).solve(problem))
         assert solution.status == "solved", (done, q)
         done += 1
 
@@ -234,7 +234,7 @@ def test_the_same_question_has_the_same_answer(planar_arm):
     for _ in range(3):
         scene = wb.Scene(planar_arm((0.4, 0.3, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.5, 0.3, 0.0))
         problem = wb.Problem(scene, goals=[wb.Point("tip", (0.5, 0.5, 0.0))], clearance=0.002)
-        answers.append(wb.QP(seed=3, budget=30.0).solve(problem))
+        answers.append(wb.QP(seed=3).solve(problem))
     assert np.array_equal(answers[0].q, answers[1].q)
     assert np.array_equal(answers[0].q, answers[2].q)
     assert len({(answer.status, answer.iterations) for answer in answers}) == 1
@@ -262,7 +262,7 @@ def test_every_solver_poses_the_human(solver, honest):
         ({"tolerance": 0.0}, "tolerance"),
         ({"tolerance": np.nan}, "tolerance"),
         ({"iterations": 0}, "iterations"),
-        ({"budget": -1.0}, "budget"),
+        ({"budget": -1}, "budget"),
         ({"restarts": -1}, "restarts"),
     ],
 )

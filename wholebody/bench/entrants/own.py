@@ -29,7 +29,7 @@ def qp_entrant(solver: str, package: str | None = None) -> Entrant:
         make=partial(_qp, solver),
         loose=(*_few(3, 6, 12, 25), *LADDER[1:]),
         setup=f"wb.QP(solver={solver!r}), all else as it comes: 150 programs a descent; where the first descent does "
-        "not reach the goals, stages and at most 6 seeded starts within 1 s. A budget of few iterations has neither.",
+        "not reach the goals, stages and at most 6 seeded starts within 600 programs. A budget of few iterations has neither.",
         package=package,
     )
 
@@ -73,7 +73,7 @@ def _qp(solver: str, tolerance: float, iterations: int | None) -> Method:
 
     if iterations is None:
         return QP(solver=solver, tolerance=tolerance)
-    return QP(solver=solver, tolerance=tolerance, iterations=iterations, budget=0.0, restarts=0)
+    return QP(solver=solver, tolerance=tolerance, iterations=iterations, budget=0, restarts=0)
 
 
 def _ccd(tolerance: float, iterations: int | None) -> Method:

@@ -9,7 +9,6 @@ that could have jumped over something are swept.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -47,7 +46,7 @@ class Local(NamedTuple):
         q: (nq,) posture.
         violation: what is left there.
         measure: weighted sum of the measures.
-        converged: whether it ended because nothing better is near, rather than out of iterations or time.
+        converged: whether it ended because nothing better is near, rather than out of iterations.
         iterations: how many programs were solved.
     """
 
@@ -77,7 +76,6 @@ class Descent:
         solver: solves the programs.
         tolerance: metres and radians.
         iterations: most programs to solve.
-        deadline: `time.perf_counter()` at which to stop.
         offset: (goal rows,) subtracted from the goal errors: a nearer goal on the way to the true one.
         trace: grows by one entry an iteration.
         note: what to call the iterations in the trace.
@@ -89,7 +87,6 @@ class Descent:
     solver: QPSolver
     tolerance: float
     iterations: int
-    deadline: float
     offset: Array | None = None
     trace: list[Iterate] = field(default_factory=list)
     note: str = ""
@@ -112,7 +109,7 @@ class Descent:
         working_set = WorkingSet(self.solver)
         history: list[float] = []
         count, converged, renewals = 0, False, RENEWALS
-        while count < self.iterations and time.perf_counter() < self.deadline:
+        while count < self.iterations:
             count += 1
             program = self.subproblem.program(
                 here.at, here.rows, self._radius, self._pull, self._damping, self._shift, self._measures

@@ -27,7 +27,8 @@ class QP:
         solver: "osqp", "daqp" or any name that qpsolvers lists on this machine; see `wholebody doctor`.
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most programs for one descent.
-        budget: seconds that continuation and restarts may add when the first descent does not reach the goals.
+        budget: most programs that continuation and restarts may add when the first descent does not reach the goals;
+            a program takes about a millisecond.
         restarts: most seeded starts that are tried after continuation.
         seed: of the restarts.
     """
@@ -35,7 +36,7 @@ class QP:
     solver: str = "osqp"
     tolerance: float = 1e-5
     iterations: int = 150
-    budget: float = 1.0
+    budget: int = 600
     restarts: int = 6
     seed: int = 0
     _tracker: Tracker | None = field(default=None, init=False, repr=False)
@@ -49,7 +50,7 @@ class QP:
         """
         if not LEAST_TOLERANCE <= self.tolerance <= 0.1:
             raise InputError(f"tolerance is {self.tolerance}; give metres from {LEAST_TOLERANCE} to 0.1")
-        if self.iterations < 1 or self.restarts < 0 or not self.budget >= 0.0:
+        if self.iterations < 1 or self.restarts < 0 or self.budget < 0:
             raise InputError("iterations are at least 1, restarts and budget at least 0")
         self._solver = make_solver(self.solver)
 
@@ -109,7 +110,7 @@ def _message(status: Status, judgement: Assessment, how: str) -> str:
     if status == "unreachable":
         return f"not reachable from here: nothing is violated, {left}"
     if status == "stalled":
-        return f"ran out of iterations or time: {left}"
+        return f"ran out of iterations: {left}"
     worst = max(
         ("a clearance", judgement.clearance_lack),
         ("a constraint", judgement.constraint_violation),

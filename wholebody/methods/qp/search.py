@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from itertools import chain
 from typing import NamedTuple
@@ -25,7 +24,7 @@ class Settings(NamedTuple):
 
     tolerance: float
     iterations: int
-    budget: float
+    budget: int
     restarts: int
     seed: int
 
@@ -36,11 +35,11 @@ class Search:
     def __init__(self, problem: Problem, solver: QPSolver, settings: Settings) -> None:
         """Set up for a problem; `run` does it all."""
         self.problem, self.solver, self.settings = problem, solver, settings
-        self.deadline = time.perf_counter() + settings.budget
         self.subproblem = Subproblem(problem)
         self.lineariser = problem.lineariser()
         self.trace: list[Iterate] = []
         self.spent = 0
+        self._left = settings.budget  # programs that the ways after the first may still solve
         self.how = "directly"
         self._best: Local | None = None
 
@@ -58,18 +57,18 @@ class Search:
 
     def _try_ways(self) -> None:
         start = self.problem.scene.figure.clamp(self.problem.start)
-        if self._accept(self._descend(start, np.inf, None, ""), "directly"):
+        if self._accept(self._descend(start), "directly"):
             return
         ways = chain(self._bent(start), self._staged(start), self._restarted(start))
         for local, how in ways:
-            if self._accept(local, how) or time.perf_counter() > self.deadline:
+            if self._accept(local, how) or self._left <= 0:
                 return
 
     def _bent(self, start: Array) -> Iterator[tuple[Local, str]]:
         """Straight limbs hide what bending them would do: the same descent with joints moved off their limits."""
         q = bent(self.problem, start)
         if q is not None:
-            yield self._descend(q, self.deadline, None, "bent"), "from a start with bent joints"
+            yield self._try(q, "bent"), "from a start with bent joints"
 
     def _staged(self, start: Array) -> Iterator[tuple[Local, str]]:
         """Goals approached through intermediate ones: the errors at the start, shrinking to nothing."""
@@ -77,21 +76,24 @@ class Search:
             return
         whole, q = self._goal_errors(start), start
         for share in STAGES:
-            q = self._descend(q, self.deadline, (1.0 - share) * whole, "stage").q
-        yield self._descend(q, self.deadline, None, "stage"), "in stages"
+            q = self._try(q, "stage", (1.0 - share) * whole).q
+        yield self._try(q, "stage"), "in stages"
 
     def _restarted(self, start: Array) -> Iterator[tuple[Local, str]]:
         """Seeded postures to begin from."""
         rng = np.random.default_rng(self.settings.seed)
         for q in restarts(self.problem, start, rng, self.settings.restarts):
-            yield self._descend(q, self.deadline, None, "restart"), "from another start"
+            yield self._try(q, "restart"), "from another start"
 
     def _settle(self) -> None:
         """Where the goals are not reached, come as near as goes, then improve the measures from there."""
         if self.best.violation.left <= self.settings.tolerance:
             return
-        self._accept(self._descend(self.best.q, np.inf, None, "nearest", measures=False), self.how)
-        best = self.best
+        nearest = self._descend(self.best.q, note="nearest", measures=False)
+        self._accept(nearest, self.how)
+        # it began at the best and came to rest: nothing nearer is near that
+        best = self.best._replace(converged=self.best.converged or nearest.converged)
+        self._best = best
         if best.violation.left > self.settings.tolerance and self.problem.measures:
             local = self._stay(best)
             if (
@@ -103,7 +105,7 @@ class Search:
     def _stay(self, local: Local) -> Local:
         """Descend with the goals' errors to stay as they are: what must hold is mended, then the measures improve."""
         nearest = self._goal_errors(local.q)
-        stayed = self._descent(np.inf, nearest, "nearest").run(local.q)
+        stayed = self._descent(self.settings.iterations, nearest, "nearest").run(local.q)
         self.spent += stayed.iterations
         left = float(np.linalg.norm(self._goal_errors(stayed.q)))
         violation = stayed.violation._replace(goal=left, left=left)
@@ -113,21 +115,35 @@ class Search:
         state = self.lineariser.state.update(q)
         return np.concatenate([np.zeros(0), *(np.atleast_1d(goal.error(state)) for goal in self.problem.goals)])
 
+    def _try(self, start: Array, note: str, offset: Array | None = None) -> Local:
+        """Descend with what is left of the budget."""
+        before = self.spent
+        local = self._descend(start, offset, note, most=max(self._left, 1))
+        self._left -= self.spent - before
+        return local
+
     def _descend(
-        self, start: Array, deadline: float, offset: Array | None, note: str, *, measures: bool = True
+        self,
+        start: Array,
+        offset: Array | None = None,
+        note: str = "",
+        *,
+        measures: bool = True,
+        most: int | None = None,
     ) -> Local:
         """Descend from a start; where that ends with something that must hold not holding, mend it."""
-        local = self._descent(deadline, offset, note, measures=measures).run(start)
+        iterations = self.settings.iterations if most is None else min(most, self.settings.iterations)
+        local = self._descent(iterations, offset, note, measures=measures).run(start)
         self.spent += local.iterations
-        if not _held(local, self.settings.tolerance) and offset is None and time.perf_counter() < deadline:
+        if not _held(local, self.settings.tolerance) and offset is None and (most is None or local.iterations < most):
             stayed = self._stay(local)
             local = stayed if _better(stayed, local, self.settings.tolerance) else local
         return local
 
-    def _descent(self, deadline: float, offset: Array | None, note: str, *, measures: bool = True) -> Descent:
+    def _descent(self, iterations: int, offset: Array | None, note: str, *, measures: bool = True) -> Descent:
         return Descent(
-            self.subproblem, self.lineariser, self.solver, self.settings.tolerance,
-            self.settings.iterations, deadline, offset, self.trace, note, measures,
+            self.subproblem, self.lineariser, self.solver, self.settings.tolerance, iterations, offset, self.trace,
+            note, measures,
         )  # fmt: skip
 
     def _accept(self, local: Local, how: str) -> bool:
