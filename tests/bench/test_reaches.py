@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.reaches import CLEARANCE, KINDS, OBJECTS, reach, solve_reach
+from wholebody.bench.problem_sets.bodies import CLEARANCE
+from wholebody.bench.problem_sets.clutter import THINGS
+from wholebody.bench.problem_sets.things import KINDS
+from wholebody.bench.reaches import reach, solve_reach
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -27,7 +30,7 @@ def test_the_witness_and_the_start_are_clear_of_all_objects() -> None:
         near = scene.contacts(q, within=CLEARANCE)
         pairs = {frozenset((owners[a], owners[b])) for a, b in near.pair}
         assert all(floor in pair for pair in pairs), pairs
-    assert len(scene.objects) == OBJECTS + 1
+    assert len(scene.objects) == THINGS + 1
     assert {name.split()[0] for name in scene.objects} == {*KINDS, floor}
 
 

@@ -9,8 +9,9 @@ from math import isnan
 import numpy as np
 
 from wholebody.bench.machine import sentence
-from wholebody.bench.reaches import CLEARANCE as REACH_CLEARANCE
-from wholebody.bench.reaches import OBJECTS, ReachRow
+from wholebody.bench.problem_sets.bodies import CLEARANCE as REACH_CLEARANCE
+from wholebody.bench.problem_sets.clutter import THINGS
+from wholebody.bench.reaches import ReachRow
 from wholebody.bench.solve import MemoryRow, SolveRow
 from wholebody.bench.step import StepRow, goal_lines
 from wholebody.bench.tables import markdown
@@ -99,7 +100,7 @@ def _results(rows: Sequence[StepRow]) -> str:
 def reaches_report(rows: Sequence[ReachRow], facts: Mapping[str, str], jobs: int) -> str:
     """Tables of the random reaches."""
     parts = [
-        f"Random reaches from standing among {OBJECTS} random objects and a floor, seeds {rows[0].seed} to "
+        f"Random reaches from standing among {THINGS} random objects and a floor, seeds {rows[0].seed} to "
         f"{rows[-1].seed}; the target is where a fingertip is in a sampled posture free of contact, so an answer "
         f"exists. Both feet held, effort minimised, clearance {1e3 * REACH_CLEARANCE:g} mm."
         + (f" Times with {jobs} processes beside each other." if jobs > 1 else "")

@@ -1,0 +1,77 @@
+"""The person of the sets, and random postures in which nothing touches."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+import wholebody as wb
+from wholebody.errors import InputError
+
+Array = NDArray[np.float64]
+
+ROOM = 0.005  # m: what limbs and things leave free in a witness, and things at the start
+CLEARANCE = 0.002  # m: what is asked of an answer
+TIPS = ("right_index_tip", "left_index_tip")
+FEET = ("left_foot", "right_foot")
+SOLES = ("left_foot", "right_foot", "left_toes", "right_toes")
+ATTEMPTS = 5000
+"""Postures that are tried for one witness; about one in five of a person's upper body is free."""
+
+
+@lru_cache(maxsize=1)
+def human() -> wb.Figure:
+    """The person, loaded once."""
+    return wb.load("human")
+
+
+@lru_cache(maxsize=8)
+def alone(figure: wb.Figure) -> wb.Scene:
+    """A figure on the floor and nothing else, to ask whether postures are free; never part of a case."""
+    return wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+
+
+def floor_scene(figure: wb.Figure) -> wb.Scene:
+    """A fresh scene of a figure on the floor."""
+    return wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+
+
+def is_free(figure: wb.Figure, q: Array, room: float = ROOM) -> bool:
+    """Whether nothing but the soles on the floor is nearer than `room`, metres, in the posture q, shape (nq,)."""
+    scene = alone(figure)
+    owners = scene.piece_owner
+    soles = {frozenset(("floor", name)) for name in SOLES}
+    return all(frozenset((owners[a], owners[b])) in soles for a, b in scene.contacts(q, within=room).pair)
+
+
+def sampled_posture(figure: wb.Figure, start: Array, rng: np.random.Generator) -> Array:
+    """Posture (nq,) with the upper body uniformly at random within its limits, nothing touching itself or the floor.
+
+    Raises:
+        InputError: none was found.
+    """
+    joints = figure.groups["upper_body"]
+    places = np.array([figure.model.joints[figure.joint_id(name)].idx_q for name in joints])
+    lower, upper = figure.model.lowerPositionLimit[places], figure.model.upperPositionLimit[places]
+    for _ in range(ATTEMPTS):
+        q = np.array(start)
+        q[places] = rng.uniform(lower, upper)
+        if is_free(figure, q):
+            return q
+    raise InputError(f"none of {ATTEMPTS} postures is free; give another seed")
+
+
+def place_of(figure: wb.Figure, q: Array, frame: str) -> Any:
+    """Placement (pin.SE3) in the world of a frame in the posture q, shape (nq,)."""
+    data = figure.model.createData()
+    pin.forwardKinematics(figure.model, data, q)
+    return pin.SE3(pin.updateFramePlacement(figure.model, data, figure.frame_id(frame)))
+
+
+def held_feet() -> list[wb.Hold]:
+    """Both feet where they are at the start."""
+    return [wb.Hold(foot) for foot in FEET]

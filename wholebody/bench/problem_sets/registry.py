@@ -1,0 +1,27 @@
+"""The problem sets by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from wholebody.bench.problem_sets import clutter, free_reach
+from wholebody.bench.problem_sets.case import ProblemSet
+from wholebody.errors import UnknownNameError
+
+SETS: Mapping[str, ProblemSet] = MappingProxyType({made.name: made for made in (free_reach.SET, clutter.SET)})
+"""From the easiest to the hardest to set up."""
+
+CASES = 200
+"""Problems of a set, if nothing else is asked for."""
+
+
+def problem_set(name: str) -> ProblemSet:
+    """Return a set.
+
+    Raises:
+        UnknownNameError: with the nearest names.
+    """
+    if name not in SETS:
+        raise UnknownNameError("problem set", name, SETS)
+    return SETS[name]
