@@ -57,6 +57,14 @@ class MotionBounds:
         self.turn: Array = np.zeros(model.njoints)
         self._slide: Array = np.zeros(model.njoints)
         self.speed: Array = np.zeros((len(joint), model.njoints))
+        self._finite = np.isfinite(reach)
+        self._size = np.where(self._finite, reach, 0.0)
+        self._twists = np.zeros((2, model.njoints, 3, model.nv))
+        for j in range(1, model.njoints):
+            kind = model.joints[j]
+            twist = np.asarray(kind.createData().S).reshape(2, 3, -1)
+            self._twists[:, j, :, kind.idx_v : kind.idx_v + kind.nv] = twist
+        self._parents = [int(parent) for parent in model.parents]
 
     def update(self, data: Any, velocity: Array, centers: Array) -> None:
         """Bound the motion from where `data` is.
@@ -66,45 +74,43 @@ class MotionBounds:
             velocity: (nv,) difference of the two postures.
             centers: (n, 3) the origins of the pieces at the start, world.
         """
-        for j in range(1, self.model.njoints):
-            kind = self.model.joints[j]
-            rates = velocity[kind.idx_v : kind.idx_v + kind.nv]
-            if rates.any():
-                twist = np.asarray(data.joints[j].S).reshape(6, -1) @ rates
-                self._slide[j], self.turn[j] = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])
-            else:
-                self._slide[j] = self.turn[j] = 0.0
-        origins = np.array([data.oMi[j].translation for j in range(self.model.njoints)])
-        finite = np.isfinite(self.reach)
-        self.speed = self._speeds(origins, centers, np.where(finite, self.reach, 0.0))
-        if not finite[self.joint > 0].all():
+        twists = self._twists @ velocity
+        self._slide, self.turn = np.sqrt(np.einsum("ijk,ijk->ij", twists, twists))
+        origins = np.array([place.translation for place in data.oMi])
+        self.speed = self._speeds(origins, centers, self._size)
+        if not self._finite[self.joint > 0].all():
             # Of a half-space only the part near other pieces counts: where two pieces are nearest, either of the two
             # points gives the same speed along the normal, and all other pieces stay within this sphere.
             travel = self.speed.sum(axis=1)
-            extent = np.where(finite, self.reach, 0.0) + travel
+            extent = self._size + travel
             around = np.linalg.norm(centers[:, None] - centers, axis=2) + extent + travel[:, None]
-            wide = np.where(finite, around, 0.0).max(axis=1, initial=0.0)
-            self.speed = self._speeds(origins, centers, np.where(finite, self.reach, wide))
+            wide = np.where(self._finite, around, 0.0).max(axis=1, initial=0.0)
+            self.speed = self._speeds(origins, centers, np.where(self._finite, self.reach, wide))
 
     def _speeds(self, origins: Array, centers: Array, reach: Array) -> Array:
-        speed = np.zeros((len(centers), self.model.njoints))
-        between = np.linalg.norm(origins[:, None] - origins, axis=2)
-        moving = (self._slide > 0.0) | (self.turn > 0.0)
-        for joint in np.unique(self.joint):
-            pieces = np.flatnonzero(self.joint == joint)
-            chain = [int(j) for j in np.flatnonzero(self.carries[joint] & moving)][::-1]
-            if not chain:
-                continue
-            farthest = np.linalg.norm(centers[pieces] - origins[chain[0]], axis=1) + reach[pieces]
-            for j, above in zip(chain, [*chain[1:], 0], strict=True):
-                speed[pieces, j] = self._slide[j] + self.turn[j] * farthest
-                farthest = farthest + self._slide[j] + between[j, above]
-        return speed
+        """Slides and turns of the joints times the ways from them to the pieces, along the joints that move."""
+        moving = ((self._slide > 0.0) | (self.turn > 0.0)).tolist()
+        above = [0] * len(moving)  # the joint that moves, itself or the nearest to the root
+        inner = [0] * len(moving)  # the next one from there
+        for j in range(1, len(moving)):
+            parent = above[self._parents[j]]
+            above[j], inner[j] = (j, parent) if moving[j] else (parent, 0)
+        step = origins - origins[inner]
+        lengths = (self._slide + np.sqrt(np.einsum("ij,ij->i", step, step))).tolist()
+        depth = [0.0] * len(moving)
+        for j in range(1, len(moving)):
+            if moving[j]:
+                depth[j] = depth[inner[j]] + lengths[j]
+        along, first = np.array(depth), np.array(above)[self.joint]
+        lever = centers - origins[first]
+        own = np.sqrt(np.einsum("ij,ij->i", lever, lever)) + reach
+        farthest = (own + along[first])[:, None] - along
+        return np.where(self.carries[self.joint], self._slide + self.turn * farthest, 0.0)
 
     def approach(self, first: NDArray[np.intp], second: NDArray[np.intp]) -> Array:
         """Most speed with which the distance of each pair can change, (k,), metres for the whole way."""
-        a, b = self.carries[self.joint[first]], self.carries[self.joint[second]]
-        return np.asarray((self.speed[first] * (a & ~b) + self.speed[second] * (b & ~a)).sum(axis=1))
+        against = self.speed @ ~self.carries.T  # of each piece against what each joint carries
+        return np.asarray(against[first, self.joint[second]] + against[second, self.joint[first]])
 
     def curvature(self, first: int, second: int, gap: float) -> float:
         """Most acceleration of a point of the first piece seen from the second, metres for the whole way squared.

@@ -1,4 +1,4 @@
-"""Signed distances between all pairs of a geometry model: bounding spheres first, coal for what survives.
+"""Signed distances between all pairs of a geometry model: bounding spheres first, then boxes, coal for what survives.
 
 About 24 us for 760 pairs of which 47 survive, against 207 us for coal on every pair.
 """
@@ -12,13 +12,19 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.geometry.cores import core_of
+from wholebody.geometry.cores import Core, core_of
 from wholebody.geometry.memory_views import distance_view, placement_view, read_result
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 COAL_ACCURACY = 1e-6  # m: of coal's distances
+
+MANY = 60
+"""Pairs that survive their spheres from which on their boxes are asked too: long walls have large spheres. It costs as
+much as thirty pairs in coal."""
+
+ENDLESS = 1e9  # m: half the size of a half-space's box
 
 
 class Contacts(NamedTuple):
@@ -39,6 +45,13 @@ class Contacts(NamedTuple):
     point_a: Array
     point_b: Array
     number: Indices
+
+
+def half_box(core: Core) -> Array:
+    """Half the size (3,) of a box about a piece's origin, along the piece's axes, that holds the piece."""
+    if not len(core.points):
+        return np.full(3, min(core.reach, ENDLESS))
+    return np.asarray(np.abs(core.points).max(axis=0) + core.radius)
 
 
 class Proximity:
@@ -66,6 +79,7 @@ class Proximity:
         ).reshape(-1, 2)
         self.joint: Indices = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
         self.reach = np.array([core.reach for core in self.cores]).reshape(-1)
+        self._half = np.array([half_box(core) for core in self.cores]).reshape(-1, 3)
         width = np.array([core.width for core in self.cores]).reshape(-1)
         self.widths: Array = width[self.pairs].sum(axis=1)
         radius = np.array([core.radius for core in self.cores]).reshape(-1)
@@ -131,10 +145,25 @@ class Proximity:
         gap += squares
         gap += squares[: self._rows, None]
         near = gap < self._threshold[1]
+        kept = np.flatnonzero(near)
+        if len(kept) > MANY:
+            boxed = self._boxes_near(self._pair_flat[kept], within)
+            near.ravel()[kept[~boxed]] = False
+            kept = kept[boxed]
         self._active[: self._rows] = near
         self.results.setActiveCollisionPairs(self.geometry, self._active, True)
         pin.computeDistances(self.geometry, self.results)
-        return self._pair_flat[np.flatnonzero(near)]
+        return self._pair_flat[kept]
+
+    def _boxes_near(self, index: Indices, within: float) -> NDArray[np.bool_]:
+        """Which pairs have boxes along the world's axes that are nearer than `within`; a bound in penetration too."""
+        placements = self.placements
+        half = np.einsum("ijk,ij->ik", np.abs(placements[:, :3]), self._half)
+        first, second = self.pairs[index, 0], self.pairs[index, 1]
+        gap = np.abs(placements[first, 3] - placements[second, 3])
+        gap -= half[first]
+        gap -= half[second]
+        return np.asarray((gap < within).all(axis=1))
 
     def _gather(self, index: Indices, within: float) -> Contacts:
         if self._distances is not None:

@@ -78,6 +78,8 @@ class Sweep:
         self._bounds = MotionBounds(model, joint, reach)
         pairs = [[pair.first, pair.second] for pair in geometry.collisionPairs]
         self._pairs: Indices = np.array(pairs, dtype=np.intp).reshape(-1, 2)
+        self._number = {(int(i), int(j)): k for k, (i, j) in enumerate(self._pairs)}
+        self._reach = reach[self._pairs].sum(axis=1)
         self._active = np.zeros((geometry.ngeoms, geometry.ngeoms), dtype=bool, order="F")
         self._place(pin.neutral(model), np.zeros(model.nv))
         pin.computeDistances(geometry, self._results)
@@ -117,7 +119,10 @@ class Sweep:
         centers = np.array([place.translation for place in self._results.oMg])
         self._bounds.update(self._data, velocity, centers)
         speed = self._bounds.approach(self._pairs[index, 0], self._pairs[index, 1])
-        index, speed = index[speed > 0.0], speed[speed > 0.0]
+        between = centers[self._pairs[index, 0]] - centers[self._pairs[index, 1]]
+        near = np.sqrt(np.einsum("ij,ij->i", between, between)) < self._reach[index] + speed
+        near &= speed > 0.0  # spheres that cannot meet on the way need no question
+        index, speed = index[near], speed[near]
         if not len(index):
             return None
         return self._advance(q0, velocity, index, speed, tolerance)
@@ -158,9 +163,8 @@ class Sweep:
         return FirstContact(fraction, q, index, (first, second), distance, certain)
 
     def _indices(self, pairs: Indices) -> Indices:
-        number = {(int(i), int(j)): k for k, (i, j) in enumerate(self._pairs)}
         try:
-            return np.array([number[int(i), int(j)] for i, j in np.asarray(pairs).reshape(-1, 2)], dtype=np.intp)
+            return np.array([self._number[int(i), int(j)] for i, j in np.asarray(pairs).reshape(-1, 2)], dtype=np.intp)
         except KeyError as missing:
             raise InputError(f"sweep: pieces {missing.args[0]} are not a collision pair; add the pair first") from None
 
