@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
     from wholebody.methods.ccd.method import CCD
+    from wholebody.methods.damped_least_squares import DampedLeastSquares
     from wholebody.methods.drag import Drag, pull
     from wholebody.methods.newton.assembly import Assembly
     from wholebody.methods.newton.method import Newton
@@ -74,6 +75,7 @@ __all__ = [
     "Capsule",
     "CenterOfMass",
     "Constraint",
+    "DampedLeastSquares",
     "Discomfort",
     "Displacement",
     "Drag",
@@ -122,6 +124,7 @@ _MODULES = {
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
     "wholebody.methods.ccd.method": "CCD",
+    "wholebody.methods.damped_least_squares": "DampedLeastSquares",
     "wholebody.methods.drag": "Drag pull",
     "wholebody.methods.newton.assembly": "Assembly",
     "wholebody.methods.newton.method": "Newton",

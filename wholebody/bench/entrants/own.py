@@ -1,4 +1,4 @@
-"""Our own methods as they take part: qp with every QP solver, ccd, and newton in three ways."""
+"""Our own methods as they take part: qp with every QP solver, newton in three ways, ccd and dls."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def qp_entrant(solver: str, package: str | None = None) -> Entrant:
         name=f"qp/{solver}",
         make=partial(_qp, solver),
         loose=(*_few(3, 6, 12, 25), *LADDER[1:]),
-        setup=f"wb.QP(solver={solver!r}), all else as it comes: 150 programs a descent; where the first descent does "
-        "not reach the goals, stages and at most 6 seeded starts within 600 programs. A budget of few iterations has neither.",
+        setup=f"wb.QP(solver={solver!r}), all else as it comes: stages and seeded starts follow where the first descent "
+        "does not reach the goals. A budget of few iterations has one descent only.",
         package=package,
     )
 
@@ -46,6 +46,21 @@ def ccd_entrant() -> Entrant:
             "ccd minimises nothing: it stops at the first posture that serves",
             "ccd takes Point, Frame and Orientation goals, holds that the reaching joints do not move, Freeze and "
             "ReachCones; the root of the figure stays",
+        ),
+    )
+
+
+def dls_entrant() -> Entrant:
+    """Damped least squares, the textbook baseline."""
+    return Entrant(
+        name="dls",
+        make=_dls,
+        loose=(*_few(2, 3, 4, 6), *LADDER),
+        setup="wb.DampedLeastSquares(), all else as it comes: one start, at most 300 steps, damping by Sugihara 2011.",
+        differences=(
+            "dls knows no contacts: it passes through things and may end inside of them",
+            "dls minimises no measure: each step is the least motion",
+            "dls takes equalities only: Balance, ReachCones and Plane with side 'above' are refused",
         ),
     )
 
@@ -90,3 +105,11 @@ def _newton(way: str, tolerance: float, iterations: int | None) -> Method:
     if iterations is None:
         return Newton(tolerance=tolerance, **NEWTONS[way])
     return Newton(tolerance=tolerance, iterations=iterations, **NEWTONS[way])
+
+
+def _dls(tolerance: float, iterations: int | None) -> Method:
+    from wholebody.methods.damped_least_squares import DampedLeastSquares
+
+    if iterations is None:
+        return DampedLeastSquares(tolerance=tolerance)
+    return DampedLeastSquares(tolerance=tolerance, iterations=iterations)

@@ -1,0 +1,137 @@
+"""Damped least squares against an arm that trigonometry solves, and what it says where it must not claim success."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import wholebody as wb
+from wholebody.errors import InputError
+from wholebody.methods.damped_least_squares import DampedLeastSquares
+
+
+@pytest.fixture(scope="module")
+def arm(planar_arm: Callable[..., wb.Figure]) -> wb.Figure:
+    return planar_arm((0.4, 0.3))
+
+
+@pytest.fixture(scope="module")
+def human() -> wb.Figure:
+    return wb.load("human")
+
+
+def judged(problem: wb.Problem, solution: wb.Solution, tolerance: float = 1e-5) -> wb.Assessment:
+    assert np.isfinite(solution.q).all()
+    assert problem.scene.figure.within_limits(solution.q)
+    judgement = wb.assess(problem, solution.q)
+    slack = 1.1 * tolerance + 2e-6
+    if solution.status == "solved":
+        assert judgement.met(slack)
+        assert judgement.holds(slack)
+    return judgement
+
+
+@given(st.floats(0.11, 0.69), st.floats(-np.pi, np.pi), st.sampled_from((-1.0, 1.0)))
+def test_two_links_bend_as_the_law_of_cosines_says(
+    planar_arm: Callable[..., wb.Figure], distance: float, bearing: float, side: float
+) -> None:
+    arm = planar_arm((0.4, 0.3), limit=4.0)
+    target = (distance * np.cos(bearing), distance * np.sin(bearing), 0.0)
+    start = np.array([bearing - 0.3 * side, side])
+    problem = wb.Problem(wb.Scene(arm), np.clip(start, -4.0, 4.0), goals=[wb.Point("tip", target)])
+    solution = DampedLeastSquares(tolerance=1e-8).solve(problem)
+    assert solution.solved, solution.message
+    inner = np.pi - np.arccos((0.4**2 + 0.3**2 - distance**2) / (2 * 0.4 * 0.3))
+    assert np.cos(solution.q[1]) == pytest.approx(np.cos(inner), abs=1e-5)
+
+
+def test_out_of_reach_the_arm_points_at_the_goal_and_rests(arm: wb.Figure) -> None:
+    problem = wb.Problem(wb.Scene(arm), np.array([0.2, 0.9]), goals=[wb.Point("tip", (0.0, 1.7, 0.0))])
+    solution = DampedLeastSquares().solve(problem)
+    assert solution.status == "unreachable", solution.message
+    assert judged(problem, solution).goal_error == pytest.approx(1.0, abs=1e-6)
+    assert solution.q == pytest.approx([np.pi / 2, 0.0], abs=1e-3)
+
+
+def test_limits_stop_a_joint_and_the_others_go_on(planar_arm: Callable[..., wb.Figure]) -> None:
+    arm = planar_arm((0.4, 0.3, 0.2), limit=0.5)
+    reached = np.array([0.5, 0.5, 0.3])
+    tip = wb.Scene(arm).state(reached).frame(arm.frame_id("tip")).translation
+    problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", np.array(tip))])
+    solution = wb.solve(problem, "dls")
+    assert solution.solved
+    judged(problem, solution)
+
+
+def test_a_singular_start_on_the_goals_line_does_not_move_and_does_not_claim_success(arm: wb.Figure) -> None:
+    problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", (0.5, 0.0, 0.0))])
+    solution = DampedLeastSquares().solve(problem)
+    assert solution.status == "unreachable"
+    assert solution.q == pytest.approx(np.zeros(2), abs=1e-9)
+
+
+def test_it_does_not_see_a_ball_and_says_so(planar_arm: Callable[..., wb.Figure]) -> None:
+    scene = wb.Scene(planar_arm((0.4, 0.3))).add(wb.Sphere(0.05), name="ball", at=(0.0, 0.5, 0.0))
+    problem = wb.Problem(scene, np.array([0.3, 0.6]), goals=[wb.Point("tip", (0.0, 0.5, 0.0))])
+    solution = DampedLeastSquares().solve(problem)
+    assert judged(problem, solution).goal_error < 1e-5
+    assert solution.assessment.penetration > 0.04
+    assert solution.status == "infeasible"
+    assert "not seen" in solution.message
+
+
+def test_feet_stay_where_a_goal_out_of_reach_pulls(human: wb.Figure) -> None:
+    problem = wb.Problem(
+        wb.Scene(human),
+        goals=[wb.Point("right_index_tip", (2.5, 0.0, 1.5))],
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")],
+    )
+    solution = DampedLeastSquares(iterations=60).solve(problem)
+    assert judged(problem, solution).constraint_violation < 1e-5
+    assert not solution.solved
+
+
+def test_every_goal_and_frozen_joints(human: wb.Figure) -> None:
+    scene = wb.Scene(human)
+    witness = human.with_joints(human.neutral, {"right_elbow_flexion": 1.2, "right_shoulder_flexion": 0.4})
+    state = scene.state(witness)
+    palm = pin.SE3(state.frame(human.frame_id("right_palm")))
+    gaze = state.frame(human.frame_id("head")).rotation[:, 0].copy()
+    problem = wb.Problem(
+        scene,
+        goals=[
+            wb.Frame("right_palm", palm),
+            wb.Axis("head", (1.0, 0.0, 0.0), direction=gaze),
+            wb.CenterOfMass(state.center_of_mass(), axes="xy"),
+            wb.Posture(witness, joints=["left_arm"]),
+        ],
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Freeze("neck")],
+    )
+    solution = DampedLeastSquares().solve(problem)
+    judgement = judged(problem, solution)
+    assert judgement.met(2e-5), solution.message
+    assert judgement.constraint_violation < 2e-5
+    frozen = human.dofs(["neck"])
+    assert np.array_equal(pin.difference(human.model, problem.start, solution.q)[frozen], np.zeros(len(frozen)))
+
+
+@pytest.mark.parametrize(
+    "term",
+    [wb.Balance(), wb.Plane("right_hand", (0, 0, 1), side="above"), wb.ReachCones()],
+    ids=lambda term: type(term).__name__,
+)
+def test_inequalities_are_refused_by_name(human: wb.Figure, term: wb.Constraint) -> None:
+    problem = wb.Problem(wb.Scene(human), goals=[wb.Point("head", (0, 0, 1.5))], constraints=[term])
+    with pytest.raises(InputError, match=type(term).__name__):
+        DampedLeastSquares().solve(problem)
+
+
+@pytest.mark.parametrize("settings", [{"tolerance": 1.0}, {"iterations": 0}, {"damping": 0.0}, {"damping": np.nan}])
+def test_settings_out_of_range_are_refused(settings: dict[str, float]) -> None:
+    with pytest.raises(InputError, match=next(iter(settings))):
+        DampedLeastSquares(**settings)  # type: ignore[arg-type]

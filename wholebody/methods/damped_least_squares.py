@@ -1,0 +1,246 @@
+"""Damped least squares: the textbook baseline, which knows no contacts.
+
+The step is that of Wampler 1986 ("Manipulator inverse kinematic solutions based on vector formulations and damped
+least-squares methods") and Nakamura and Hanafusa 1986, ``dq = J' (J J' + lambda^2 I)^-1 e``, with the damping of
+Sugihara 2011 ("Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", eq. 19),
+``lambda^2 = e'e / 2 + damping^2``, which vanishes as the goals are met and stays where they cannot be. It bounds every
+step: ``|dq| <= |e| / (2 lambda) < 0.71``.
+
+Equalities that must hold come first and the goals within what they leave (Nakamura, Hanafusa and Yoshikawa 1987,
+"Task-priority based redundancy control"): with the projector N on the null space of the equalities,
+``dq = J1# e1 + (J2 N)# (e2 - J2 J1# e1)``. The pseudoinverses are damped, the projector is not, so that a goal out of
+reach does not pull on what is held (Baerlocher and Boulic 2004). A joint that a step would take over its limit stops at
+it, and the step is computed again without that joint.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.assessment import Assessment, assess
+from wholebody.errors import InputError
+from wholebody.figures.state import State, Wrench
+from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.tasks.base import Constraint, Goal
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SHARE = 0.5  # of the tolerance: to what goals and equalities are met, so that the judge, who rounds otherwise, agrees
+REST = 1e-2  # share of the tolerance: a step smaller than this has come to rest
+RANK = 1e-8  # squared singular values below this share of the largest are taken for zero
+
+
+@dataclass
+class DampedLeastSquares:
+    """Damped least squares, the textbook method: goals and equalities, limits by clamping, and no contacts at all.
+
+    Takes every goal, and constraints that are equalities (`Hold`, `Plane` with side "on"); bounds such as `Freeze` too.
+    Inequalities (`Balance`, `ReachCones`, `Plane` with side "above") are refused by name. Measures are reported, not
+    minimised: each step is the least motion, and there is one start. It may end inside of things, and then says so.
+
+    Attributes:
+        tolerance: metres and radians to which goals and constraints are met.
+        iterations: most steps.
+        damping: damping that is left when the goals are met [m, rad]; more is steadier near singular postures, less
+            converges faster.
+    """
+
+    tolerance: float = 1e-5
+    iterations: int = 300
+    damping: float = 1e-3
+
+    def __post_init__(self) -> None:
+        """Check the settings.
+
+        Raises:
+            InputError: a setting out of range.
+        """
+        if not 1e-10 <= self.tolerance <= 0.1:
+            raise InputError(f"tolerance is {self.tolerance}; give metres from 1e-10 to 0.1")
+        if self.iterations < 1:
+            raise InputError(f"iterations is {self.iterations}; give 1 or more")
+        if not 0.0 < self.damping < np.inf:
+            raise InputError(f"damping is {self.damping}; give a positive number such as 1e-3")
+
+    @property
+    def name(self) -> str:
+        """Name for tables."""
+        return "dls"
+
+    def solve(self, problem: Problem) -> Solution:
+        """Find a posture. Goals out of reach are answers, not errors; contacts are not seen.
+
+        Raises:
+            InputError: the problem has a constraint that is not an equality, or its scene changed after it was stated.
+        """
+        began = time.perf_counter()
+        problem.check_fresh()
+        descent = _Descent(problem, self)
+        rested = descent.run()
+        judgement = assess(problem, descent.best)
+        status = _status(judgement, rested, 1.05 * self.tolerance + 1e-6)
+        return Solution(
+            q=descent.best,
+            status=status,
+            seconds=time.perf_counter() - began,
+            iterations=descent.steps,
+            assessment=judgement,
+            trace=tuple(descent.trace),
+            method=self.name,
+            message=_message(status, judgement, descent.steps),
+        )
+
+
+class _Descent:
+    """One descent: the best posture so far, and the way there."""
+
+    def __init__(self, problem: Problem, method: DampedLeastSquares) -> None:
+        for number, term in enumerate(problem.constraints):
+            if not np.array_equal(term.lower, term.upper):
+                raise InputError(
+                    f"method 'dls' cannot take constraints[{number}], {type(term).__name__}: it is no equality; leave "
+                    "it out or use method='qp'"
+                )
+        self._problem, self._method = problem, method
+        self._state = State(problem.scene.model)
+        self.best: Array = problem.scene.figure.clamp(problem.start)
+        self.trace: list[Iterate] = []
+        self.steps = 0
+
+    def run(self) -> bool:
+        """Descend; true where it came to rest or the goals are met, false where the iterations ran out."""
+        problem, method = self._problem, self._method
+        enough = SHARE * method.tolerance
+        q, step, best = self.best, 0.0, (np.inf, np.inf)
+        for _ in range(method.iterations + 1):
+            self._state.update(q)
+            held, wanted = self._held(), self._wanted()
+            violation, error = float(np.abs(held).max(initial=0.0)), self._largest_error()
+            self.trace.append(Iterate(error, violation, 0.0, step))
+            if (max(violation, enough), error) < best:
+                best, self.best = (max(violation, enough), error), q
+            if max(violation, error) <= enough:
+                return True
+            if self.steps and step <= REST * method.tolerance:
+                return True
+            if self.steps == method.iterations:
+                break
+            moved = problem.scene.figure.clamp(
+                np.asarray(pin.integrate(problem.scene.model, q, self._step(held, wanted)))
+            )
+            step = float(np.abs(pin.difference(problem.scene.model, q, moved)).max(initial=0.0))
+            q = moved
+            self.steps += 1
+        return False
+
+    def _held(self) -> Array:
+        """What is missing of every equality."""
+        return _joined([term.lower - np.atleast_1d(term.value(self._state)) for term in self._problem.constraints])
+
+    def _wanted(self) -> Array:
+        """What is missing of every goal, by the root of its weight."""
+        goals = self._problem.goals
+        return _joined([-(goal.weight**0.5) * np.atleast_1d(goal.error(self._state)) for goal in goals])
+
+    def _largest_error(self) -> float:
+        """As the assessment measures it: the longest error of a goal, metres or radians."""
+        lengths = [0.0]
+        for goal in self._problem.goals:
+            error = np.atleast_1d(goal.error(self._state))
+            angular = np.broadcast_to(goal.angular, error.shape)
+            lengths += [float(np.linalg.norm(error[angular])), float(np.linalg.norm(error[~angular]))]
+        return max(lengths)
+
+    def _step(self, held: Array, wanted: Array) -> Array:
+        """Displacement (nv,), within the limits."""
+        problem, state = self._problem, self._state
+        of_held = _jacobian(problem.constraints, state)
+        of_wanted = _jacobian(problem.goals, state) * np.repeat(
+            [goal.weight**0.5 for goal in problem.goals], [np.atleast_1d(g.error(state)).size for g in problem.goals]
+        ).reshape(-1, 1)
+        lower, upper = problem.scene.figure.tangent_bounds(state.q)
+        for bound in problem.bounds:
+            low, high = bound.bounds(state, None)
+            lower, upper = np.maximum(lower, low), np.minimum(upper, high)
+        dq, free = np.zeros(state.model.nv), upper > lower
+        stopped = np.zeros(state.model.nv)
+        while True:  # every round stops a joint more, so it ends
+            dq = _prioritised(
+                of_held[:, free],
+                held - of_held @ stopped,
+                of_wanted[:, free],
+                wanted - of_wanted @ stopped,
+                self._method,
+            )
+            full = np.array(stopped)
+            full[free] = dq
+            over = free & ((full < lower) | (full > upper))
+            if not over.any():
+                return full
+            stopped[over] = np.clip(full, lower, upper)[over]
+            free &= ~over
+
+
+def _prioritised(of_held: Array, held: Array, of_wanted: Array, wanted: Array, method: DampedLeastSquares) -> Array:
+    """Least motion (n,) that makes up for what is held first, and for what is wanted within what that leaves."""
+    if not len(held):
+        return _damped(of_wanted, wanted, method.damping)
+    first = _damped(of_held, held, method.damping)
+    square = of_held @ of_held.T
+    value, vector = np.linalg.eigh(square)
+    kept = value > RANK * max(float(value.max(initial=0.0)), RANK)
+    basis = (vector[:, kept] / np.sqrt(value[kept])).T @ of_held  # orthonormal rows that span those of the equalities
+    within = of_wanted - (of_wanted @ basis.T) @ basis
+    second = _damped(within, wanted - of_wanted @ first, method.damping)
+    return np.asarray(first + second - basis.T @ (basis @ second))
+
+
+def _damped(jacobian: Array, error: Array, damping: float) -> Array:
+    """``J' (J J' + lambda^2 I)^-1 e`` (n,) with Sugihara's damping."""
+    if not len(error):
+        return np.zeros(jacobian.shape[1])
+    square = jacobian @ jacobian.T
+    square[np.diag_indices_from(square)] += 0.5 * float(error @ error) + damping**2
+    return np.asarray(jacobian.T @ np.linalg.solve(square, error))
+
+
+def _jacobian(terms: Sequence[Goal | Constraint], state: State) -> Array:
+    """Rows (m, nv) of all terms."""
+    rows = []
+    for term in terms:
+        part = term.jacobian(state)
+        rows.append(state.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part))
+    return np.concatenate(rows) if rows else np.zeros((0, state.model.nv))
+
+
+def _joined(parts: list[Array]) -> Array:
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def _status(judgement: Assessment, rested: bool, slack: float) -> Status:
+    if not judgement.holds(slack):
+        return "infeasible" if rested else "stalled"
+    if judgement.met(slack):
+        return "solved"
+    return "unreachable" if rested else "stalled"
+
+
+def _message(status: Status, judgement: Assessment, steps: int) -> str:
+    left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
+    inside = f"; it knows no contacts, and is {1e3 * judgement.penetration:.3g} mm inside"
+    if status == "solved":
+        return f"solved in {steps} steps"
+    if status == "unreachable":
+        return f"came to rest: nothing is violated, {left}"
+    if status == "stalled":
+        return f"ran out of steps: {left}" + (inside if judgement.penetration > 0.0 else "")
+    if judgement.clearance_lack >= max(judgement.constraint_violation, judgement.limit_violation):
+        return f"contacts are not seen by this method: a pair is {1e3 * judgement.clearance_lack:.3g} mm too near"
+    return f"what must hold cannot all hold: missed by {judgement.constraint_violation:.3g} m or rad"
