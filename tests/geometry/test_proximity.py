@@ -267,3 +267,24 @@ def test_shapes_without_exact_distance_are_refused():
     geometry.addGeometryObject(pin.GeometryObject("drum", 0, pin.SE3.Identity(), coal.Cylinder(0.1, 0.2)))
     with pytest.raises(wb.InputError, match="Cylinder is not a convex piece"):
         Proximity(model, geometry)
+
+
+def test_boxes_of_long_walls_hide_nothing(free_bodies, monkeypatch):
+    """Turned bodies that nearly touch walls whose spheres hold the whole room: the same pairs as coal's."""
+    monkeypatch.setattr(module, "MANY", 0)
+    rng, found_any = np.random.default_rng(6), 0
+    shapes = [wb.Box((0.3, 0.2, 0.1)), wb.Capsule(0.05, 0.4), wb.Ellipsoid((0.2, 0.1, 0.1)), SHAPES["hull"]]
+    scene = wb.Scene(free_bodies(*shapes))
+    scene.add(wb.Box((10.0, 0.1, 3.0)), name="wall", at=(0.0, 0.3, 0.0))
+    scene.add(wb.HalfSpace(), name="floor", at=(0.0, 0.0, -0.3))
+    for _ in range(60):
+        q = scene.figure.neutral
+        for k in range(len(shapes)):
+            q[7 * k : 7 * k + 3] = rng.uniform(-0.4, 0.2, 3)
+            q[7 * k + 3 : 7 * k + 7] = pin.Quaternion(pin.exp3(rng.normal(size=3))).coeffs()
+        expected = asked_one_by_one(scene, q)
+        for within in (0.1, 0.0, -0.02):
+            found = {tuple(pair) for pair in scene.contacts(q, within).pair.tolist()}
+            found_any += len(found)
+            assert {pair for pair, row in expected.items() if row[0] < within - 5e-6} <= found
+    assert found_any > 300
