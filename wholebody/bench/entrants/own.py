@@ -28,8 +28,8 @@ def qp_entrant(solver: str, package: str | None = None) -> Entrant:
         name=f"qp/{solver}",
         make=partial(_qp, solver),
         loose=(*_few(3, 6, 12, 25), *LADDER[1:]),
-        setup=f"wb.QP(solver={solver!r}), all else as it comes: stages and seeded starts follow where the first descent "
-        "does not reach the goals. A budget of few iterations has one descent only.",
+        setup=f"wb.QP(solver={solver!r}), all else as it comes: stages and seeded starts follow where the first "
+        "descent does not reach the goals. A budget of few iterations has one descent only.",
         package=package,
     )
 
