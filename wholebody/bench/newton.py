@@ -10,9 +10,10 @@ import numpy as np
 
 from wholebody.errors import WholebodyError
 from wholebody.methods.newton.assembly import Assembly
+from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
-from wholebody.methods.newton.reaching import HARD_DAMPING, Course, reach
+from wholebody.methods.newton.reaching import HARD_DAMPING, reach
 
 SIZES = (10, 30, 100, 300, 1000)
 ALGEBRAS = ("normal", "llt", "kkt", "schur", "dense")

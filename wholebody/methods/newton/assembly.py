@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.methods.newton.assembly_solution import AssemblySolution, solved
+from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.equations import EquationSet, axes_along
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
-from wholebody.methods.newton.reaching import Course
 from wholebody.methods.newton.system import System
 from wholebody.tasks.inputs import direction, numbers, point
 

@@ -9,8 +9,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.methods.newton.course import Course, unit
 from wholebody.methods.newton.inequalities import Kind
-from wholebody.methods.newton.reaching import Course, reach, unit
+from wholebody.methods.newton.reaching import reach
 from wholebody.methods.newton.settling import settle
 from wholebody.problem import Status
 

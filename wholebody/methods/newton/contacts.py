@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Coincide
+from wholebody.methods.passage import Placed, jumps, snapshot
 from wholebody.problem import Problem
 
 Array = NDArray[np.float64]
@@ -19,6 +20,9 @@ LEAVE = 0.06  # m beyond the clearance: farther pairs are let go; the difference
 SLOTS = 4  # rows a pair: its witness points and the ends of its contact patch
 FAR = 1.0  # m: gap of a slot that has no row
 OVERLAP = 1e-3  # m: deeper than this a pair that was no inequality sends the step back
+DEEPEST = 0.01  # m: overlap that linearised contacts may leave after a step; deeper ones shorten it
+SHALLOW = 0.25  # share of the thinner piece's width that it may be at most
+MORE = 1e-4  # m: by which an overlap that was there before the step may grow
 
 
 class ContactSet:
@@ -26,7 +30,6 @@ class ContactSet:
 
     Attributes:
         pairs: (k,) places among the collision pairs.
-        structures: how often the set has changed.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -36,40 +39,25 @@ class ContactSet:
         self.structures = 0
         self._forced: Indices = np.zeros(0, dtype=np.intp)
         self._largest = float(problem.clearances.max(initial=0.0))
+        self._within = LEAVE + self._largest
         proximity = problem.scene.proximity
         self._names = problem.scene.piece_names
         self._labels: list[str] = []
         self._joint = proximity.joint[proximity.pairs].reshape(-1, 2)
+        thin = np.array([core.width for core in proximity.cores])[proximity.pairs].reshape(-1, 2).min(axis=1)
+        self._bearable = np.minimum(DEEPEST, SHALLOW * thin)
+        self._here: Placed | None = None
+        self._there: Placed | None = None
 
-    def renew(self, data: Any, bodies: Array, world: int) -> tuple[Coincide, bool]:
-        """The inequalities at the joints' places in `data` and the bodies (n + 1, 7); whether the pairs changed.
+    def look(self, data: Any) -> None:
+        """Measure at the joints' places in `data` (Pinocchio's), where a step leads."""
+        proximity = self.scene.proximity
+        self._there = snapshot(proximity, proximity.near(data, self._within), self._within)
 
-        Args:
-            data: Pinocchio's, with joint placements.
-            bodies: the same as variables.
-            world: index of the world among the bodies.
-        """
-        contacts = self.scene.proximity.near(data, (FAR if len(self._forced) else LEAVE) + self._largest)
-        spare = contacts.distance - self.clearances[contacts.number]
-        member = np.zeros(len(self.clearances), dtype=bool)
-        member[self.pairs] = True
-        keep = (spare < ENTER) | (member[contacts.number] & (spare < LEAVE))
-        if len(self._forced):
-            keep |= np.isin(contacts.number, self._forced)
-        wanted = contacts.number[keep]
-        self._forced = self._forced[:0]
-        changed = not np.array_equal(wanted, self.pairs)
-        if changed:
-            self.pairs, self._labels = wanted, []
-            self.structures += 1
-            names = self._names
-            for a, b in self.scene.proximity.pairs[wanted]:
-                self._labels += [f"the distance of {names[a]!r} and {names[b]!r}"] * SLOTS
-        return self._rows(contacts, bodies, world), changed
-
-    def runs_into(self, data: Any) -> bool:
-        """Whether a pair that is no inequality overlaps; the nearest are inequalities from now on."""
-        contacts = self.scene.proximity.near(data, self._largest)
+    def runs_into(self) -> bool:
+        """Whether a pair that is no inequality overlaps where the step leads; such pairs are from now on."""
+        assert self._there is not None
+        contacts = self._there.contacts
         lack = self.clearances[contacts.number] - contacts.distance
         new = contacts.number[lack > OVERLAP]
         if len(new):
@@ -78,6 +66,46 @@ class ContactSet:
             return False
         self._forced = new
         return True
+
+    def passes(self, before: Array, after: Array) -> bool:
+        """Whether a step from the posture before (nq,) to the one after jumps over nothing and ends in nothing."""
+        assert self._here is not None
+        assert self._there is not None
+        here, there = self._here.contacts, self._there.contacts
+        depth = np.zeros(len(self.clearances))
+        depth[here.number] = np.maximum(-here.distance, 0.0)
+        allowed = np.maximum(depth + MORE, self._bearable)
+        if (-there.distance > allowed[there.number]).any():
+            return False
+        return not jumps(self.scene, self._here, self._there, before, after)
+
+    def renew(self, data: Any, bodies: Array, world: int) -> Coincide:
+        """The inequalities where `look` has just been.
+
+        Args:
+            data: Pinocchio's, with the joints' places there.
+            bodies: (n + 1, 7) the same as variables.
+            world: index of the world among the bodies.
+        """
+        assert self._there is not None
+        self._here = self._there
+        contacts = self._here.contacts
+        if len(self._forced) and not np.isin(self._forced, contacts.number).all():
+            contacts = self.scene.proximity.near(data, FAR + self._largest)
+        spare = contacts.distance - self.clearances[contacts.number]
+        member = np.zeros(len(self.clearances), dtype=bool)
+        member[self.pairs] = True
+        keep = (spare < ENTER) | (member[contacts.number] & (spare < LEAVE))
+        if len(self._forced):
+            keep |= np.isin(contacts.number, self._forced)
+        wanted = contacts.number[keep]
+        self._forced = self._forced[:0]
+        if not np.array_equal(wanted, self.pairs):
+            self.pairs, self._labels = wanted, []
+            names = self._names
+            for a, b in self.scene.proximity.pairs[wanted]:
+                self._labels += [f"the distance of {names[a]!r} and {names[b]!r}"] * SLOTS
+        return self._rows(contacts, bodies, world)
 
     def _rows(self, contacts: Any, bodies: Array, world: int) -> Coincide:
         clearance = self.clearances[contacts.number]

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from wholebody.methods.newton.batches import Batch, Unit
 from wholebody.methods.newton.contacts import ContactSet
+from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.keys import OBJECTIVE, Key
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
-from wholebody.methods.newton.reaching import Course
 from wholebody.methods.newton.system import System
 from wholebody.methods.newton.terms import constraint_equations, goal_equations
 from wholebody.problem import Problem
@@ -53,7 +53,7 @@ class FigureCourse(Course):
         self._fixed += constraint_equations(problem).batches(count)
         self._goals = goal_equations(problem, problem.goals).batches(count)
         self._stiffness = self._objective(problem)
-        self.q = problem.start
+        self.q = self._left = problem.start
         self.structures = 0
         self._ordered = np.zeros(0)
         self._laid: tuple[object, ...] = ()
@@ -89,23 +89,30 @@ class FigureCourse(Course):
         """The bodies of the nearest posture."""
         self.q = self.bodies.posture(x)
         self._ordered = self.bodies.variables(self.q)
+        if self.contacts is not None:
+            self.contacts.look(self.bodies.data)
         return self._ordered
 
-    def admits(self, x: Array) -> bool:
-        """Whether nothing but the pairs that are inequalities overlaps at x, where `retract` has just been."""
-        return self.contacts is None or not self.contacts.runs_into(self.bodies.data)
+    def runs_into(self) -> bool:
+        """Whether a pair that is no inequality overlaps where `retract` has just been."""
+        return self.contacts is not None and self.contacts.runs_into()
+
+    def passes(self) -> bool:
+        """Whether nothing is jumped over or entered on the way to where `retract` has just been."""
+        return self.contacts is None or self.contacts.passes(self._left, self.q)
 
     def arrive(self, x: Array) -> bool:
         """Renew limits and contacts at x; whether the pattern changed."""
         if x is not self._ordered:
             x = self.retract(x)
+        self._left = self.q
         self.bodies.aim(self._limits, self.q)
         batches = [*self._fixed, *self._goals]
         pairs: bytes = b""
         if self.contacts is not None:
             world = self.bodies.count
             everything = np.concatenate([x, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)]).reshape(-1, 7)
-            rows, _ = self.contacts.renew(self.bodies.data, everything, world)
+            rows = self.contacts.renew(self.bodies.data, everything, world)
             pairs = self.contacts.pairs.tobytes()
             if len(rows):
                 batches.append((rows, ONE_SIDED))

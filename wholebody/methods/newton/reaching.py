@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.inequalities import FREE, Inequalities, Kind, inequalities
-from wholebody.methods.newton.linear_algebra.base import LinearAlgebra, LinearSystem, SingularSystemError
-from wholebody.methods.newton.system import System
+from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
 
 Array = NDArray[np.float64]
 
@@ -23,6 +23,8 @@ HARD_DAMPING = 1e-10  # of what must hold: redundant equations are tolerated at 
 GOAL_DAMPING = 1e-7  # of goals, far above, so that they give way first
 FIRST_DAMPING = 1e-5  # what a failed step begins with
 MOST_DAMPING = 1e4
+GOOD, POOR = 0.75, 0.25
+AMPLIFIED, ENOUGH = 6.0, 1.0
 DAMPING_UP, DAMPING_DOWN = 8.0, 0.1
 HARD_SHARE = 1e-6  # of the squared damping goes to what must hold, which only conflicts among that need
 PULL = 0.3  # m or rad: of a goal farther away, a step asks for this much; larger = fewer steps, more of them failed
@@ -35,38 +37,11 @@ NARROW = 0.7  # what is left of the funnel after a step that only mended
 WORTH = 0.05  # share of the promised progress that a step must make
 STAGNANT = 1e-6  # relative progress below which steps count as none
 PATIENCE = 12  # such steps in a row before the nearest point counts as found
-REFUSALS = 6  # times in a row that a step is made anew before it is taken as it is
+REFUSALS = 6  # times in a row that a step is made anew because it runs into something; after that it is shortened
+SHORTENINGS = 8  # halvings of a step whose way is not free before it counts as failed
 SYSTEMS = 25  # most linear systems a step, while inequalities come and go
 NEAR = 1e-2  # m or rad: errors below which the damping of equations is made good by the last multipliers
 MENDING = 30  # most steps that only mend what must hold, where the goals were not met
-
-
-class Course:
-    """What an iteration moves through: the equations, which may change on the way.
-
-    Attributes:
-        system: the equations.
-        algebra: for the system's pattern.
-        longest: metres that any part of a body may move in a step.
-    """
-
-    longest = np.inf
-
-    def __init__(self, system: System, algebra: LinearAlgebra) -> None:
-        """Take equations that do not change."""
-        self.system, self.algebra = system, algebra
-
-    def retract(self, x: Array) -> Array:
-        """The variables (7 n,) after a step, put in order."""
-        return unit(x)
-
-    def admits(self, x: Array) -> bool:
-        """Whether the step may end at x; if not, the equations have changed and the step is made anew."""
-        return True
-
-    def arrive(self, x: Array) -> bool:
-        """Renew the equations at x, where a step ended; whether their number or pattern changed."""
-        return False
 
 
 class Reached(NamedTuple):
@@ -97,7 +72,13 @@ class Reached(NamedTuple):
 
 
 def reach(
-    course: Course, x: Array, *, tolerance: float, iterations: int, kind: Kind = "slack", mend: bool = True
+    course: Course,
+    x: Array,
+    *,
+    tolerance: float,
+    iterations: int,
+    kind: Kind = "slack",
+    goal_tolerance: float | None = None,
 ) -> Reached:
     """Meet all equations from x (7 n,), or come as near as goes.
 
@@ -107,28 +88,33 @@ def reach(
         tolerance: metres and radians.
         iterations: most of them.
         kind: how inequalities are dealt with.
-        mend: whether to end with what must hold, where the goals were not met.
+        goal_tolerance: of the goals, where it is another.
     """
-    run = _Run(course, x, tolerance, kind)
+    run = _Run(course, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
     run.iterate(iterations, goals=True, pulls=True)
-    if run.stationary and max(run.hard, run.goal) > tolerance and len(run.objective):
+    if run.stationary and not run.met and len(run.objective):
         run.iterate(iterations, goals=True, pulls=False)
-    if mend and run.hard > tolerance and len(run.goal_rows):
+    if run.hard > tolerance and len(run.goal_rows):
         stationary = run.stationary
         run.iterate(MENDING, goals=False, pulls=False)
         run.stationary = stationary if run.hard <= tolerance else run.stationary
-    met = max(run.hard, run.goal) <= tolerance
-    return Reached(run.x, met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)
+    return Reached(run.x, run.met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)
 
 
 class _Run:
     """State of one iteration."""
 
-    def __init__(self, course: Course, x: Array, tolerance: float, kind: Kind) -> None:
-        self.course, self.tolerance, self.kind = course, tolerance, kind
+    def __init__(self, course: Course, x: Array, tolerance: float, goal_tolerance: float, kind: Kind) -> None:
+        self.course, self.kind = course, kind
+        self.tolerance, self.goal_tolerance = tolerance, goal_tolerance
         self._begin(course.retract(x))
         self.residuals = [max(self.hard, self.goal)]
         self.systems, self.stationary = 0, False
+
+    @property
+    def met(self) -> bool:
+        """Whether all equations hold to their tolerances."""
+        return self.hard <= self.tolerance and self.goal <= self.goal_tolerance
 
     def _begin(self, x: Array) -> None:
         """Take the equations as they are now, at x."""
@@ -164,30 +150,39 @@ class _Run:
         refused = 0
         funnel = max(min(FUNNEL * self._norms(self.residual)[1], WIDEST), self.tolerance)
         for _ in range(iterations):
-            if max(self.hard, self.goal * goals) <= self.tolerance and self.state.finished():
+            if (self.met if goals else self.hard <= self.tolerance) and self.state.finished():
                 return
             before = self._norms(self.residual)
             try:
-                mend = not goals or (self.goal > self.tolerance and before[0] > MEND * funnel)
+                mend = not goals or (self.goal > self.goal_tolerance and before[0] > MEND * funnel)
                 step = self._step(
                     damping, share, 0.0 if mend else min(1.0, pull / max(self.goal, 1e-300)), goals, pulls
                 )
+                asked = before[0] + min(pull, self.goal) if not mend else np.inf
+                while self._motion(step) > AMPLIFIED * asked and damping < ENOUGH:
+                    damping = max(FIRST_DAMPING, damping * DAMPING_UP)
+                    step = self._step(damping, share, min(1.0, pull / max(self.goal, 1e-300)), goals, pulls)
             except SingularSystemError:
                 step = np.zeros_like(self.x)
             length = min(1.0, LARGEST_TURN / max(_largest_turn(step), 1e-300)) * self.state.share()
             if np.isfinite(self.course.longest):
                 length = min(length, self.course.longest / max(self._motion(step), 1e-300))
             trial = self.course.retract(self.x + length * step)
-            if refused < REFUSALS and not self.course.admits(trial):
+            if refused < REFUSALS and self.course.runs_into():
                 refused += 1  # what was run into is an equation now: the step is made anew from where it began
                 self.residuals.append(self.residuals[-1])
                 self._begin(self.x)
                 continue
             refused = 0
+            halvings = 0
+            while halvings < SHORTENINGS and not self.course.passes():
+                halvings, length = halvings + 1, 0.5 * length
+                trial = self.course.retract(self.x + length * step)
             found = self.system.residual(trial)
             after = self._norms(found)
             promised = self._norms(self.residual + length * self.system.pattern.times(self.values, step))
-            if not self._better(before, after, promised, 0.0 if mend else funnel) and self.state.finished():
+            better = self._better(before, after, promised, 0.0 if mend else funnel) or not self.state.finished()
+            if halvings == SHORTENINGS or not better:
                 self.residuals.append(self.residuals[-1])
                 if damping >= MOST_DAMPING:
                     self.stationary = True
@@ -206,7 +201,11 @@ class _Run:
                 self._move(trial, None)
                 self.state.accept(length, self.residual[self.one_sided])
             self.residuals.append(max(self.hard, self.goal))
-            damping = damping * DAMPING_DOWN if damping > FIRST_DAMPING else 0.0
+            gain = before[1] - promised[1]
+            if mend or before[1] - after[1] >= GOOD * gain:
+                damping = damping * DAMPING_DOWN if damping > FIRST_DAMPING else 0.0
+            elif before[1] - after[1] < POOR * gain:
+                damping = max(FIRST_DAMPING, damping * DAMPING_UP)
             share, pull = min(1.0, 2.0 * share), min(PULL, 2.0 * pull)
             if stagnant >= PATIENCE:
                 self.stationary = True
@@ -223,7 +222,7 @@ class _Run:
         if damping == 0.0 and goals and max(self.hard, self.goal) < NEAR:
             base = np.where(self.system.goal, GOAL_DAMPING, HARD_DAMPING)
             asked -= np.where(self.system.objective | self.system.inequality, 0.0, base) * self.multiplier
-        diagonal[self.objective] = 1.0 / self.system.stiffness[self.objective]
+        diagonal[self.objective] = 1.0 / self.system.stiffness[self.objective] if pulls else FREE
         gradient = np.zeros_like(self.x)
         rows, phi = self.one_sided, self.residual[self.one_sided]
         base = diagonal[rows]
@@ -270,14 +269,6 @@ class _Run:
         if hard <= funnel and gain > 0.0 and before[1] - goal >= WORTH * gain:
             return True
         return hard < 0.9 * before[0]
-
-
-def unit(x: Array) -> Array:
-    """Copy of the variables (7 n,) with Euler parameters of unit length."""
-    bodies = x.reshape(-1, 7).copy()
-    bodies[:, 3:] /= np.sqrt((bodies[:, 3:] ** 2).sum(axis=1, keepdims=True))
-    result: Array = bodies.ravel()
-    return result
 
 
 def _largest_turn(step: Array) -> float:
