@@ -14,10 +14,14 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from wholebody.assessment import assess
 from wholebody.errors import InputError
+from wholebody.methods.ccd.method import CCD
 from wholebody.methods.newton.method import Newton
+from wholebody.methods.passage import jumps, snapshot
 from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import Method, method_named
 from wholebody.problem import Problem, Solution
@@ -30,6 +34,10 @@ Array = NDArray[np.float64]
 FRAME = 1.0 / 60.0  # s: a frame of a screen
 SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from nearer
 MOST_GOALS = 10_000
+ON_THE_WAY = 1e-3  # m, rad: to which a method that solves anew in every frame meets the goal before the end
+AT_THE_END = 1e-5  # m, rad
+WITHIN = 0.06  # m: pairs nearer than this are measured when a way is judged; larger = dearer, fewer left to a sweep
+SHARES = (1.0, 0.5, 0.25)  # of the way to a posture solved anew, tried when all of it would jump over something
 
 
 class DragFrame(NamedTuple):
@@ -51,6 +59,9 @@ class DragFrame(NamedTuple):
 class Drag:
     """Follows a goal that is moved from frame to frame.
 
+    "qp" makes one quadratic program a frame, "newton" a few Newton steps; other methods solve every frame anew from the
+    posture at hand, to a millimetre, and stop where that would jump over something. No method restarts elsewhere.
+
     Attributes:
         problem: what is asked; its goals are replaced as they move.
         q: (nq,) the present posture.
@@ -61,7 +72,8 @@ class Drag:
 
         Args:
             problem: with the goal that will move, a `Point` or a `Frame`.
-            method: "qp", "ccd", "newton", or a configured method.
+            method: "qp", "ccd", "newton" or another by name, which is set for 1e-5 at the end and not to restart; or a
+                configured method, which is taken as it is.
             goal: which of the problem's goals moves.
             dt: seconds a frame.
 
@@ -74,7 +86,8 @@ class Drag:
         if not (np.isfinite(dt) and dt > 0.0):
             raise InputError(f"dt is {dt}; give seconds a frame, such as 0.02")
         self.problem, self.dt = _own(problem), dt
-        self.method = method_named(method) if isinstance(method, str) else method
+        self.method = _chosen(method)
+        self._rough = replace(self.method, tolerance=ON_THE_WAY) if isinstance(self.method, CCD) else self.method
         self._goal = _moving_goal(problem, goal)
         self._number = goal
         self.q: Array = problem.scene.figure.clamp(problem.start)
@@ -94,8 +107,8 @@ class Drag:
             answer = self.method.step(self.problem, self.q, self.dt)
             self.q, iterations = answer.q, 1
         else:
-            solution = self.method.solve(_from(self.problem, self.q))
-            self.q, iterations = solution.q, solution.iterations
+            solution = self._rough.solve(_from(self.problem, self.q))
+            self.q, iterations = self._towards(solution.q), solution.iterations
         return DragFrame(self.q, _error(self.problem, self.q), iterations, time.perf_counter() - began)
 
     def finish(self) -> Solution:
@@ -104,16 +117,27 @@ class Drag:
         self.q = solution.q
         return solution
 
+    def _towards(self, q: Array) -> Array:
+        """The posture q (nq,), or as far towards it as nothing is jumped over."""
+        model = self.problem.scene.model
+        for share in SHARES:
+            part = q if share == 1.0 else np.asarray(pin.interpolate(model, self.q, q, share))
+            if not _jumps(self.problem, self.q, part):
+                return part
+        return self.q
+
 
 def pull(
     problem: Problem, path: ArrayLike, method: str | Method = "newton", *, goal: int = 0, spacing: float = SPACING
 ) -> tuple[Solution, ...]:
     """Pull a goal along a path, through evenly spaced intermediate goals.
 
+    Each is solved from the posture before; one whose posture lies beyond something in the way counts as not reached.
+
     Args:
         problem: with the goal that moves, a `Point`.
         path: (k, 3) corners of the path, metres; the first one is where the goal is met first.
-        method: "qp", "ccd", "newton", or a configured method.
+        method: by name, set for 1e-5 and not to restart, or a configured method.
         goal: which of the problem's goals moves.
         spacing: metres between intermediate goals, at most.
 
@@ -128,7 +152,7 @@ def pull(
     term = _moving_goal(problem, goal)
     if not isinstance(term, Point):
         raise InputError(f"pull moves a Point along a path, and goals[{goal}] is a {type(term).__name__}; use Drag")
-    chosen = method_named(method) if isinstance(method, str) else method
+    chosen = _chosen(method)
     own, q, found = _own(problem), problem.scene.figure.clamp(problem.start), []
     for place in places:
         _retarget(own, term, goal, place)
@@ -139,8 +163,36 @@ def pull(
     return tuple(found)
 
 
+def _chosen(method: str | Method) -> Method:
+    """A method for motions: given by name, it stays near the posture it begins from."""
+    if not isinstance(method, str):
+        return method
+    chosen = method_named(method)
+    if isinstance(chosen, QP):
+        return replace(chosen, restarts=0)
+    if isinstance(chosen, CCD):
+        return replace(chosen, tolerance=AT_THE_END, restarts=0)
+    return chosen
+
+
 def _solve(problem: Problem, q: Array, method: Method) -> Solution:
-    return method.follow(problem, q) if isinstance(method, Newton) else method.solve(_from(problem, q))
+    """Solve from the posture q (nq,); it is kept where the way from it jumps over something."""
+    here = _from(problem, q)
+    solution = method.follow(problem, q) if isinstance(method, Newton) else method.solve(here)
+    if not _jumps(problem, q, solution.q):
+        return solution
+    judgement = assess(here, q)
+    message = "the posture that was found lies beyond something in the way; the figure stays"
+    return replace(solution, q=q, status="unreachable", assessment=judgement, message=message)
+
+
+def _jumps(problem: Problem, before: Array, after: Array) -> bool:
+    """Whether something is jumped over on the way between two postures (nq,)."""
+    scene = problem.scene
+    first, last = (
+        snapshot(scene.proximity, scene.proximity.near(scene.state(q).data, WITHIN), WITHIN) for q in (before, after)
+    )
+    return jumps(scene, first, last, before, after)
 
 
 def _own(problem: Problem) -> Problem:
