@@ -65,6 +65,12 @@ def sampled_posture(figure: wb.Figure, start: Array, rng: np.random.Generator) -
     raise InputError(f"none of {ATTEMPTS} postures is free; give another seed")
 
 
+def movable(figure: wb.Figure) -> NDArray[np.intp]:
+    """Places in the tangent of all but the toes, which stay on the floor with their feet."""
+    toes = figure.dofs([name for name in figure.joints if "toe" in name])
+    return np.setdiff1d(np.arange(figure.model.nv), toes)
+
+
 def place_of(figure: wb.Figure, q: Array, frame: str) -> Any:
     """Placement (pin.SE3) in the world of a frame in the posture q, shape (nq,)."""
     data = figure.model.createData()

@@ -1,0 +1,114 @@
+"""Reaches that take the whole body: low down or far out, on both feet and in balance."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+import wholebody as wb
+from wholebody.bench.problem_sets.bodies import (
+    ATTEMPTS,
+    CLEARANCE,
+    FEET,
+    TIPS,
+    Array,
+    alone,
+    floor_scene,
+    held_feet,
+    human,
+    is_free,
+    movable,
+    place_of,
+)
+from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
+from wholebody.bench.problem_sets.fitting import MassAbove, fitted
+from wholebody.errors import InputError
+
+NAME = "balance"
+MARGIN = 0.02  # m: asked of the centre of mass from the edges of the support polygon
+SPARE = 0.005  # m: what the witness has beyond that
+LOW = ((0.10, -0.45, 0.03), (0.65, 0.45, 0.35))  # m: where a fingertip is asked to be, near the floor
+FAR = ((0.60, -0.50, 0.50), (0.95, 0.50, 1.40))  # m: and out in front
+TWO = ((0.15, 0.00, 0.05), (0.60, 0.35, 0.60))  # m: and the left of two; the right one is on the other side
+OVER = ((-0.04, -0.08), (0.16, 0.08))  # m: where the witness has its centre of mass, seen from above
+STANCE = {"hip_flexion": (0.0, 110.0), "knee_flexion": (5.0, 130.0), "ankle_dorsiflexion": (0.0, 33.0)}
+"""Degrees that the legs begin with before the feet are put on their places."""
+ARMS = 0.35  # share of the range of every joint of the upper body, around how it stands, to begin with
+
+
+def make(number: int, seed: int) -> Case:
+    """In turn: a fingertip low down, one far out, both low down; sides change too."""
+    rng, figure = generator(NAME, number, seed), human()
+    start = figure.posture("standing")
+    tip = TIPS[number // 3 % 2]
+    for _ in range(ATTEMPTS):
+        goals = _goals(number % 3, tip, rng)
+        equalities = [*_resolved(figure, goals), MassAbove(rng.uniform(*OVER))]
+        witness = fitted(figure, _beginning(figure, rng), equalities, movable(figure))
+        if witness is not None and is_free(figure, witness) and _least_room(witness) > MARGIN + SPARE:
+            break
+    else:
+        raise InputError(f"no posture of {ATTEMPTS} is free and in balance; give another seed")
+    problem = wb.Problem(
+        floor_scene(figure),
+        start,
+        goals=[wb.Point(goal.frame, place_of(figure, witness, goal.frame).translation) for goal in goals],
+        constraints=[*held_feet(), wb.Balance(margin=MARGIN)],
+        measures=[wb.Effort()],
+        clearance=CLEARANCE,
+    )
+    return Case(NAME, number, problem, witness)
+
+
+def _goals(kind: int, tip: str, rng: np.random.Generator) -> list[wb.Point]:
+    if kind < 2:
+        return [wb.Point(tip, rng.uniform(*(LOW if kind == 0 else FAR)))]
+    left, right = rng.uniform(*TWO), rng.uniform(*TWO) * (1.0, -1.0, 1.0)
+    return [wb.Point("left_index_tip", left), wb.Point("right_index_tip", right)]
+
+
+def _resolved(figure: wb.Figure, goals: list[wb.Point]) -> list[wb.Goal]:
+    start, scene = figure.posture("standing"), alone(figure)
+    feet = [wb.Frame(foot, place_of(figure, start, foot)) for foot in FEET]
+    return [goal.resolve(scene, start) for goal in (*goals, *feet)]
+
+
+def _beginning(figure: wb.Figure, rng: np.random.Generator) -> Array:
+    """A posture (nq,) with bent legs and the upper body anyhow; the feet are not yet where they belong."""
+    q = figure.posture("standing")
+    bend = float(rng.uniform())
+    values: dict[str, float] = {}
+    for name, (least, most) in STANCE.items():
+        angle = np.radians(least + bend * (most - least))
+        values |= {f"{side}_{name}": angle for side in ("left", "right")}
+    model = figure.model
+    for name in figure.groups["upper_body"]:
+        place = model.joints[figure.joint_id(name)].idx_q
+        reach = ARMS * (model.upperPositionLimit[place] - model.lowerPositionLimit[place])
+        values[name] = q[place] + rng.uniform(-reach, reach)
+    q = figure.clamp(figure.with_joints(q, values))
+    q[2] -= 0.45 * bend
+    q[:2] += rng.uniform(-0.1, 0.1, 2)
+    pitch = rng.uniform(0.0, 0.6) + 0.3 * bend
+    q[3:7] = 0.0, np.sin(pitch / 2.0), 0.0, np.cos(pitch / 2.0)
+    return q
+
+
+@lru_cache(maxsize=1)
+def _support() -> wb.Balance:
+    return wb.Balance().resolve(alone(human()), human().posture("standing"))
+
+
+def _least_room(q: Array) -> float:
+    """Distance of the centre of mass from the nearest edge of the support polygon, metres."""
+    return float(_support().value(alone(human()).state(q)).min())
+
+
+SET = ProblemSet(
+    NAME,
+    "balance",
+    "A standing person reaches low down or far out with one hand or both, feet held, the centre of mass kept above "
+    "the feet: the legs have to bend and the pelvis to give way.",
+    make,
+)
