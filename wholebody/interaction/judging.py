@@ -84,8 +84,8 @@ def judge(scene: Scene, recording: Recording) -> Judgement:
         root_distance=np.linalg.norm(recording.q[:, :3] - recording.tracked[:, :3], axis=1)
         if scene.figure.root == "free"
         else np.zeros(len(recording)),
-        jerk=_jerk(model, recording.q, recording.dt),
-        tracked_jerk=_jerk(model, recording.tracked, recording.dt),
+        jerk=jerk(model, recording.q, recording.dt),
+        tracked_jerk=jerk(model, recording.tracked, recording.dt),
         returns=_returns(tracked_depth > OVERLAPS, np.abs(apart).max(axis=1)),
     )
 
@@ -111,7 +111,8 @@ def _cone_violation(scene: Scene, postures: Array) -> float:
     return max(0.0, *(-float(cones.value(state.update(q)).min()) for q in postures))
 
 
-def _jerk(model: pin.Model, q: Array, dt: float) -> Array:
+def jerk(model: pin.Model, q: Array, dt: float) -> Array:
+    """(n - 3,) root of the mean square of the third difference of the joint angles, rad/s^3."""
     velocity = np.array([pin.difference(model, *pair) for pair in pairwise(q)]) / dt
     joints = slice(6 if model.nq != model.nv else 0, None)
     return _root_mean_square(np.diff(velocity[:, joints], n=2, axis=0) / dt**2) if len(q) > 3 else np.zeros(0)

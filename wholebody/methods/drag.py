@@ -85,10 +85,10 @@ class Drag:
             raise InputError(f"Drag takes a Problem, not a {type(problem).__name__}")
         if not (np.isfinite(dt) and dt > 0.0):
             raise InputError(f"dt is {dt}; give seconds a frame, such as 0.02")
-        self.problem, self.dt = _own(problem), dt
+        self.problem, self.dt = own_copy(problem), dt
         self.method = _chosen(method)
         self._rough = replace(self.method, tolerance=ON_THE_WAY) if isinstance(self.method, CCD) else self.method
-        self._goal = _moving_goal(problem, goal)
+        moving_goal(problem, goal)
         self._number = goal
         self.q: Array = problem.scene.figure.clamp(problem.start)
 
@@ -99,7 +99,7 @@ class Drag:
             InputError: the target is not one.
         """
         began = time.perf_counter()
-        _retarget(self.problem, self._goal, self._number, target)
+        retarget(self.problem, self._number, target)
         if isinstance(self.method, Newton):
             step = self.method.step(self.problem, self.q)
             self.q, iterations = step.q, step.iterations
@@ -149,13 +149,13 @@ def pull(
         UnknownNameError: there is no such method.
     """
     places = _spaced(path, spacing)
-    term = _moving_goal(problem, goal)
+    term = moving_goal(problem, goal)
     if not isinstance(term, Point):
         raise InputError(f"pull moves a Point along a path, and goals[{goal}] is a {type(term).__name__}; use Drag")
     chosen = _chosen(method)
-    own, q, found = _own(problem), problem.scene.figure.clamp(problem.start), []
+    own, q, found = own_copy(problem), problem.scene.figure.clamp(problem.start), []
     for place in places:
-        _retarget(own, term, goal, place)
+        retarget(own, goal, place)
         found.append(_solve(own, q, chosen))
         if not found[-1].solved:
             break
@@ -195,7 +195,7 @@ def _jumps(problem: Problem, before: Array, after: Array) -> bool:
     return jumps(scene, first, last, before, after)
 
 
-def _own(problem: Problem) -> Problem:
+def own_copy(problem: Problem) -> Problem:
     """A copy whose goals can be moved without moving the caller's."""
     problem.check_fresh()
     return copy.copy(problem)
@@ -208,7 +208,12 @@ def _from(problem: Problem, q: Array) -> Problem:
     return result
 
 
-def _moving_goal(problem: Problem, number: int) -> Point | Frame:
+def moving_goal(problem: Problem, number: int) -> Point | Frame:
+    """The goal of this number, which can be moved.
+
+    Raises:
+        InputError: there is no such goal, or it is of another kind.
+    """
     if not 0 <= number < len(problem.goals):
         raise InputError(f"the problem has {len(problem.goals)} goals, and none has the number {number}")
     goal = problem.goals[number]
@@ -217,9 +222,14 @@ def _moving_goal(problem: Problem, number: int) -> Point | Frame:
     return goal
 
 
-def _retarget(problem: Problem, goal: Point | Frame, number: int, target: Any) -> None:
+def retarget(problem: Problem, number: int, target: Any) -> None:
+    """Move a problem's goal, a `Point` or `Frame`, to another target.
+
+    Raises:
+        InputError: there is no such goal, it is of another kind, or the target is not one.
+    """
     goals: list[Goal] = list(problem.goals)
-    goals[number] = replace(goal, target=target)
+    goals[number] = replace(moving_goal(problem, number), target=target)
     problem.retarget(goals)
 
 

@@ -1,0 +1,164 @@
+"""Drags measured: a row a method, and a row a frame for the chart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wholebody.bench import style
+from wholebody.bench.machine import sentence
+from wholebody.bench.tables import markdown
+from wholebody.interaction.dragging import Dragged, DragJudgement
+
+ALLOWED = 1e-3  # m: of overlap, in a frame and on the way to the next
+
+COLORS = {"newton": "#d55e00", "qp": "#0072b2", "ccd": "#009e73"}
+"""By the first part of a method's name; Okabe and Ito's."""
+
+COLUMNS = (
+    "task", "method", "frames", "frame ms, mean", "p95", "max", "CPU mean", "iterations/frame",
+    "left to the goal mm, mean", "max", "at the end", "deepest in a frame mm", "between frames mm", "beyond limits rad", "holds off mm",
+    "jerk, median", "end",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class DragFrameRow:
+    """One frame; milliseconds, millimetres."""
+
+    task: str
+    method: str
+    frame: int
+    milliseconds: float
+    cpu_ms: float
+    iterations: int
+    error_mm: float
+    depth_mm: float
+    between_mm: float
+
+
+@dataclass(frozen=True)
+class DragRow:
+    """One drag; units in the names. `depth_mm` is of frames, start and end, `between_mm` a bound on the ways between.
+
+    Attributes:
+        error_mean_mm, error_max_mm: what was left to the goal in the frames.
+        end_error_mm: what is left of it at the end.
+        hold_mm: how far the worst constraint was off, mm or mrad.
+        status: of the end.
+    """
+
+    task: str
+    method: str
+    frames: int
+    mean_ms: float
+    p95_ms: float
+    max_ms: float
+    cpu_mean_ms: float
+    iterations: float
+    error_mean_mm: float
+    error_max_mm: float
+    end_error_mm: float
+    depth_mm: float
+    between_mm: float
+    limit_rad: float
+    hold_mm: float
+    jerk: float
+    status: str
+
+    @property
+    def clean(self) -> bool:
+        """Whether limits were kept and nothing was penetrated or passed."""
+        return max(self.depth_mm, self.between_mm) <= 1e3 * ALLOWED and self.limit_rad <= 1e-6
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The row as text, in the order of `COLUMNS`."""
+        between = f"{self.between_mm:.2g}" if np.isfinite(self.between_mm) else "passes"
+        return (
+            self.task, self.method, str(self.frames), f"{self.mean_ms:.2f}", f"{self.p95_ms:.2f}", f"{self.max_ms:.1f}",
+            f"{self.cpu_mean_ms:.2f}", f"{self.iterations:.1f}", f"{self.error_mean_mm:.3f}",
+            f"{self.error_max_mm:.2f}", f"{self.end_error_mm:.1e}", f"{self.depth_mm:.4f}", between, f"{self.limit_rad:.0e}", f"{self.hold_mm:.3f}",
+            f"{self.jerk:.0f}", self.status,
+        )  # fmt: skip
+
+
+def drag_summary(task: str, dragged: Dragged, judged: DragJudgement) -> DragRow:
+    """The row of one drag."""
+    ms = 1e3 * dragged.seconds
+    return DragRow(
+        task=task,
+        method=dragged.method,
+        frames=len(dragged),
+        mean_ms=float(ms.mean()),
+        p95_ms=float(np.quantile(ms, 0.95)),
+        max_ms=float(ms.max()),
+        cpu_mean_ms=1e3 * float(dragged.cpu_seconds.mean()),
+        iterations=float(dragged.iterations.mean()),
+        error_mean_mm=1e3 * float(judged.error.mean()),
+        error_max_mm=1e3 * float(judged.error.max()),
+        end_error_mm=1e3 * max(dragged.end.assessment.goal_error, dragged.end.assessment.goal_angle),
+        depth_mm=1e3 * float(judged.depth.max()),
+        between_mm=1e3 * float(judged.between.max()),
+        limit_rad=max(0.0, judged.limit_violation),
+        hold_mm=1e3 * float(judged.constraint_violation.max()),
+        jerk=float(np.median(judged.jerk)) if len(judged.jerk) else 0.0,
+        status=dragged.end.status,
+    )
+
+
+def drag_frames(task: str, dragged: Dragged, judged: DragJudgement) -> list[DragFrameRow]:
+    """The rows of all frames."""
+    return [
+        DragFrameRow(
+            task,
+            dragged.method,
+            k,
+            1e3 * float(dragged.seconds[k]),
+            1e3 * float(dragged.cpu_seconds[k]),
+            int(dragged.iterations[k]),
+            1e3 * float(judged.error[k]),
+            1e3 * float(judged.depth[k + 1]),
+            1e3 * float(judged.between[k]),
+        )
+        for k in range(len(dragged))
+    ]
+
+
+def drag_report(rows: Sequence[DragRow], facts: Mapping[str, str]) -> str:
+    """The table as Markdown."""
+    return "\n\n".join(
+        [
+            markdown(COLUMNS, [row.cells for row in rows]),
+            "Left to the goal is the distance of what is dragged to where the goal is in that frame (its angle, in "
+            "mrad, where that is more). Depths are found by coal over every pair of pieces; between frames stands a bound, found by a continuous sweep, on how much "
+            "deeper any pair gets on the way than at its deeper end. Jerk is the third difference of the joint angles, "
+            "rad/s³. CPU is the time that the processor worked on a frame. Holds are in mm or mrad.",
+            sentence(facts),
+        ]
+    )
+
+
+def drag_chart(drags: Mapping[str, Sequence[DragFrameRow]], path: Path) -> tuple[Path, Path]:
+    """Frame time and what is left to the goal over the frames, of one method or several."""
+    chart, axes = style.figure(2, 1, (7.6, 4.8))
+    above, below = axes[0][0], axes[1][0]
+    for method, rows in drags.items():
+        frame = [row.frame for row in rows]
+        color = COLORS.get(method.partition("/")[0], "#666666")
+        above.plot(frame, [row.milliseconds for row in rows], color=color, linewidth=1.0, label=method)
+        below.plot(frame, [max(row.error_mm, 1e-6) for row in rows], color=color, linewidth=1.0)
+    above.set_yscale("log")
+    above.set_ylabel("frame time [ms]")
+    above.legend(loc="upper right", frameon=False, ncols=3, fontsize=8)
+    first = next(iter(drags.values()))
+    above.set_title(f"{first[0].task.replace('_', ' ')}, dragged", loc="left")
+    below.set_yscale("log")
+    below.set_ylabel("left to the goal [mm]")
+    below.set_xlabel("frame")
+    for axis in (above, below):
+        axis.set_xlim(0, max(len(first) - 1, 1))
+    return style.save(chart, path)

@@ -1,0 +1,154 @@
+"""`wholebody drag`: a goal of a task is dragged along a path, frame by frame, by any method."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from wholebody.bench.drag import DragRow
+    from wholebody.interaction.dragging import Dragged, DragJudgement
+    from wholebody.problem import Problem
+    from wholebody.taskfile import Task
+
+HELP = "drag a goal of a task along a path, frame by frame"
+DESCRIPTION = """\
+Drag a goal of a task file (its first point or frame, or the one that --goal names) along a path at an even speed; a
+frame keeps its orientation. The figure follows frame by frame and at the end meets the goal to 1e-5 m. Prints a table
+of times and of what is left, judged independently in every frame and between frames, and writes into a folder the
+table (Markdown), the numbers of every frame (CSV), a chart of the frame times (PNG, SVG) and the animation (HTML, opens
+without a network).
+
+paths:
+  line      from where the dragged frame starts to --to, or to the goal's own place
+  circle    from there to a circle of radius --size round the goal's own place, in the plane across --normal
+  FILE      from there through the places of a text file: x y z in metres, one place a line"""
+EPILOG = """\
+examples:
+  wholebody drag sit_on_chair.toml --path line --method newton
+  wholebody drag shelf.toml --path circle --size 0.05 --method qp
+  wholebody drag shelf.toml --path corners.csv --frames 300 --out out/shelf
+exit code: 1 if the end is not met, or if a frame or the way to the next overlaps by more than 1 mm or leaves a limit"""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser("drag", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
+    parser.add_argument("task", type=Path, metavar="TASK.toml", help="the task file")
+    parser.add_argument("--path", required=True, metavar="FILE|circle|line", help="along what the goal moves")
+    parser.add_argument("--method", default="newton", metavar="NAME", help="newton, qp or ccd (default: newton)")
+    parser.add_argument("--goal", type=int, metavar="N", help="which goal, from 0 (default: first point or frame)")
+    parser.add_argument("--frames", type=int, metavar="N", help="frames (default: so that it moves at 0.5 m/s)")
+    parser.add_argument("--size", type=float, default=0.1, metavar="M", help="radius of a circle, m (default: 0.1)")
+    parser.add_argument(
+        "--normal", type=float, nargs=3, default=(1.0, 0.0, 0.0), metavar=("X", "Y", "Z"),
+        help="across a circle's plane (default: 1 0 0, which faces the figure)",
+    )  # fmt: skip
+    parser.add_argument("--to", type=float, nargs=3, metavar=("X", "Y", "Z"), help="end of a line, m")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to (default: out/drag/NAME-OF-TASK)")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Drag, judge, report and write; 1 where the end is not met or something was penetrated."""
+    from wholebody.bench.drag import drag_chart, drag_frames, drag_report, drag_summary
+    from wholebody.bench.machine import machine
+    from wholebody.bench.tables import write_rows, write_text
+    from wholebody.cli.picture import make_folder
+    from wholebody.interaction.paths import spread
+    from wholebody.methods.solve import method_named
+    from wholebody.taskfile import read_task
+
+    method_named(arguments.method)
+    task = read_task(arguments.task)
+    goal = _goal(task.problem, arguments.goal)
+    places = spread(_corners(task.problem, goal, arguments), arguments.frames)
+    out = arguments.out or Path("out") / "drag" / arguments.task.stem
+    make_folder(out)
+    dragged, judged = followed(task.problem, places, arguments.method, goal, f"{task.path.stem}, {arguments.method}")
+    name, facts = f"{task.path.stem}-{arguments.method}", machine()
+    row, frames = drag_summary(task.path.stem, dragged, judged), drag_frames(task.path.stem, dragged, judged)
+    write_rows(out / f"{name}.csv", facts, frames)
+    write_text(out / f"{name}.md", drag_report([row], facts) + "\n")
+    drag_chart({row.method: frames}, out / name)
+    _animation(task, dragged, out / f"{name}.html")
+    show([row])
+    print(f"end: {dragged.end.message}")
+    print(f"wrote {out}")
+    return 0 if row.clean and dragged.end.solved else 1
+
+
+def followed(problem: Problem, places: Any, method: str, goal: int, label: str) -> tuple[Dragged, DragJudgement]:
+    """Drag and judge, with a bar that shows how far it is."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from wholebody.interaction.dragging import drag_along, judge_drag
+
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
+        work = bar.add_task(label, total=len(places))
+        dragged = drag_along(
+            problem, places, method, goal=goal, progress=lambda done: bar.update(work, completed=done)
+        )  # fmt: skip
+        bar.update(work, description="judging every pair of every frame")
+        return dragged, judge_drag(problem, dragged, goal=goal)
+
+
+def show(rows: list[DragRow]) -> None:
+    """Print the table."""
+    from rich.console import Console
+
+    from wholebody.cli.tables import table
+
+    times = table(
+        "task", "method", "frames", "mean ms", "p95", "max", "CPU", "iter", "left mm", "max mm", "at the end",
+        "deepest mm", "between mm", "limits", "holds", "jerk", "end",
+    )  # fmt: skip
+    for row in rows:
+        times.add_row(*row.cells)
+    Console(width=max(170, Console().width)).print(times)
+
+
+def _goal(problem: Problem, number: int | None) -> int:
+    from wholebody.errors import InputError
+    from wholebody.methods.drag import moving_goal
+    from wholebody.tasks import Frame, Point
+
+    if number is None:
+        number = next((k for k, goal in enumerate(problem.goals) if isinstance(goal, (Point, Frame))), None)
+        if number is None:
+            raise InputError("the task has no point or frame goal that could be dragged; give it one")
+    moving_goal(problem, number)
+    return number
+
+
+def _corners(problem: Problem, goal: int, arguments: argparse.Namespace) -> Any:
+    """Corners (k, 3) of the path, from where the dragged frame is."""
+    import numpy as np
+
+    from wholebody.errors import FileFormatError
+    from wholebody.interaction.dragging import goal_place, present_place
+    from wholebody.interaction.paths import circle, read_path
+    from wholebody.tasks.inputs import point
+
+    if arguments.path == "line":
+        end = goal_place(problem, goal) if arguments.to is None else point(arguments.to, "--to")
+        way = end[None]
+    elif arguments.path == "circle":
+        way = circle(goal_place(problem, goal), arguments.size, arguments.normal)
+    elif Path(arguments.path).is_file():
+        way = read_path(arguments.path)
+    else:
+        raise FileFormatError(f"--path: there is no file {arguments.path}; give line, circle or a file of places")
+    return np.vstack([present_place(problem, goal), way])
+
+
+def _animation(task: Task, dragged: Dragged, path: Path) -> None:
+    from wholebody.cli.picture import viewer_of
+
+    with viewer_of(task.problem, task.view, task.title) as viewer:
+        viewer.play(dragged, repeat=float("inf"))
+        viewer.save(path)

@@ -1,0 +1,184 @@
+"""A goal dragged along a path by any method: what was shown, what it took, and how good it is.
+
+The drag of Choi and Cremer 1999, section 3: a stream of nearby goals, each met with moderate accuracy and the last one
+with high. Judged are all postures, by every pair of pieces, and the ways between them, by a continuous sweep.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from wholebody.assessment import assess
+from wholebody.geometry.sweep import Sweep
+from wholebody.interaction.judging import jerk
+from wholebody.interaction.scripts import FRAME
+from wholebody.methods.drag import Drag, moving_goal, own_copy, retarget
+from wholebody.methods.solve import Method
+from wholebody.problem import Problem, Solution
+from wholebody.tasks import Point
+from wholebody.tasks.inputs import numbers
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.intp]
+
+DEPTHS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
+"""Depths, metres, that are tried in turn as a bound on what a way goes in by."""
+
+
+@dataclass(frozen=True, eq=False)
+class Dragged:
+    """A drag, frame by frame; `q` and `dt` as a clip has them.
+
+    Attributes:
+        q: (n + 2, nq) the start, every frame, and the end, which is solved to full accuracy.
+        targets: (n, 3) where the goal was in each frame, metres.
+        dt: seconds from frame to frame.
+        method: its name.
+        seconds, cpu_seconds: (n,) of each frame: wall time, and the processor's for this thread.
+        iterations: (n,) of the method.
+        end: the answer at the end.
+    """
+
+    q: Array
+    targets: Array
+    dt: float
+    method: str
+    seconds: Array
+    cpu_seconds: Array
+    iterations: Counts
+    end: Solution
+
+    def __len__(self) -> int:
+        """Return the number of frames, without start and end."""
+        return len(self.targets)
+
+
+@dataclass(frozen=True, eq=False)
+class DragJudgement:
+    """How good a drag is; arrays have a row a posture, the start first and the end last.
+
+    Attributes:
+        error: (n,) what was left to the moving goal's target in each frame, metres, or radians where that is more.
+        depth: (n + 2,) deepest overlap of any pair, metres; 0 where there is none.
+        between: (n + 1,) a bound on how much deeper any pair gets on the way to the next posture than at the deeper end
+            of that way, metres, one of `DEPTHS`; inf where it is more than the last of them.
+        constraint_violation: (n + 2,) how far the worst constraint is from holding, metres or radians.
+        limit_violation: how far the worst joint of any posture is out of its limits, radians.
+        jerk: (n - 1,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
+    """
+
+    error: Array
+    depth: Array
+    between: Array
+    constraint_violation: Array
+    limit_violation: float
+    jerk: Array
+
+
+def present_place(problem: Problem, goal: int = 0) -> Array:
+    """Where the frame (or its point) that a goal moves is at the problem's start, (3,) metres.
+
+    Raises:
+        InputError: the goal is not a `Point` or a `Frame`.
+    """
+    term = moving_goal(problem, goal)
+    here: Array = goal_place(problem, goal) + term.error(problem.scene.state(problem.start))[:3]
+    return here
+
+
+def goal_place(problem: Problem, goal: int = 0) -> Array:
+    """Where a goal is, (3,) metres; raises like `present_place`."""
+    term = moving_goal(problem, goal)
+    return np.array(term._target if isinstance(term, Point) else term._target.translation, dtype=float)
+
+
+def drag_along(
+    problem: Problem,
+    places: ArrayLike,
+    method: str | Method = "newton",
+    *,
+    goal: int = 0,
+    dt: float = FRAME,
+    progress: Callable[[int], None] | None = None,
+) -> Dragged:
+    """Drag a goal through places, one a frame, and meet the last with full accuracy.
+
+    Args:
+        problem: with the goal that moves, a `Point` or a `Frame`, which keeps its orientation.
+        places: (n, 3) metres.
+        method: see `Drag`.
+        goal: which of the problem's goals moves.
+        dt: seconds from frame to frame.
+        progress: called with the number of frames done after each.
+
+    Raises:
+        InputError: the goal or the places are none.
+        UnknownNameError: there is no such method.
+    """
+    targets = numbers(places, (len(np.asarray(places)), 3), "places")
+    drag = Drag(problem, method, goal=goal, dt=dt)
+    aims = [_aim(problem, goal, place) for place in targets]
+    postures, wall, cpu, iterations = [drag.q], [], [], []
+    for number, aim in enumerate(aims, start=1):
+        began = time.thread_time()
+        frame = drag.to(aim)
+        cpu.append(time.thread_time() - began)
+        wall.append(frame.seconds)
+        postures.append(frame.q)
+        iterations.append(frame.iterations)
+        if progress is not None:
+            progress(number)
+    end = drag.finish()
+    return Dragged(
+        q=np.array([*postures, end.q]),
+        targets=targets,
+        dt=dt,
+        method=end.method,
+        seconds=np.array(wall),
+        cpu_seconds=np.array(cpu),
+        iterations=np.array(iterations, dtype=np.intp),
+        end=end,
+    )
+
+
+def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudgement:
+    """Judge a drag of a problem's goal."""
+    own, model = own_copy(problem), problem.scene.model
+    errors, judged = [], []
+    for frame, q in enumerate(dragged.q):
+        place = dragged.targets[min(max(frame - 1, 0), len(dragged) - 1)]
+        retarget(own, goal, _aim(problem, goal, place))
+        judged.append(assess(own, q))
+        errors.append(judged[-1].goal_errors[goal])
+    sweep = Sweep(model, problem.scene.geometry)
+    return DragJudgement(
+        error=np.array(errors[1:-1]),
+        depth=np.array([one.penetration for one in judged]),
+        between=np.array([_deepened(sweep, *way) for way in pairwise(dragged.q)]),
+        constraint_violation=np.array([one.constraint_violation for one in judged]),
+        limit_violation=max(one.limit_violation for one in judged),
+        jerk=jerk(model, dragged.q, dragged.dt),
+    )
+
+
+def _deepened(sweep: Sweep, before: Array, after: Array) -> float:
+    """The least of `DEPTHS` by which nothing gets deeper on a way, from either end; inf where it is by all of them."""
+    for depth in DEPTHS:
+        if sweep.first_contact(before, after, tolerance=depth) is None:
+            return depth
+        if sweep.first_contact(after, before, tolerance=depth) is None:
+            return depth
+    return np.inf
+
+
+def _aim(problem: Problem, goal: int, place: Array) -> Array | pin.SE3:
+    """The target of a moving goal at a place (3,)."""
+    term = moving_goal(problem, goal)
+    return place if isinstance(term, Point) else pin.SE3(term._target.rotation, place)

@@ -1,0 +1,119 @@
+"""Paths that a goal is dragged along: lines, circles, and places from a file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wholebody.errors import FileFormatError, InputError
+from wholebody.tasks.inputs import direction, numbers, point
+
+Array = NDArray[np.float64]
+
+SPEED = 0.5  # m/s: of a hand that drags, where the number of frames is not given
+CORNERS = 72  # of a circle
+LARGEST = 100.0  # m: a place farther out is taken for a slip of units
+
+
+class Line(NamedTuple):
+    """A line of a file: its number, counted from one, and what it says."""
+
+    number: int
+    text: str
+
+
+def circle(center: ArrayLike, radius: float, normal: ArrayLike = (1.0, 0.0, 0.0)) -> Array:
+    """Corners (k, 3) of a closed circle, which begins and ends at its lowest place.
+
+    Args:
+        center: (3,) metres.
+        radius: metres.
+        normal: (3,) of its plane; x faces the figure. Where it is upright the circle begins in front.
+
+    Raises:
+        InputError: the radius is not positive, or a value is not finite.
+    """
+    middle, axis = point(center, "circle: center"), direction(normal, "circle: normal")
+    if not (np.isfinite(radius) and 0.0 < radius <= LARGEST):
+        raise InputError(f"a circle has a radius of {radius} m; give metres greater than zero")
+    down = np.array((0.0, 0.0, -1.0)) if abs(axis[2]) < 0.99 else np.array((1.0, 0.0, 0.0))
+    first = down - (down @ axis) * axis
+    first /= np.linalg.norm(first)
+    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)[:, None]
+    corners: Array = middle + radius * (np.cos(angle) * first + np.sin(angle) * np.cross(axis, first))
+    return corners
+
+
+def read_path(path: str | os.PathLike[str]) -> Array:
+    """Read places from a text file: x, y and z in metres, one place a line, parted by commas or spaces.
+
+    Empty lines, what follows a #, and a first line of names are left out.
+
+    Returns:
+        (k, 3) places, at least one.
+
+    Raises:
+        FileFormatError: the file cannot be read or a line is no place; the line is named.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileFormatError(f"{path}: cannot be read ({error}); give a text file with a place a line") from None
+    lines = [Line(number, said.partition("#")[0].strip()) for number, said in enumerate(text.splitlines(), start=1)]
+    lines = [line for line in lines if line.text]
+    if lines and not any(_is_number(word) for word in _words(lines[0].text)):
+        lines = lines[1:]
+    places = [_place(path, line) for line in lines]
+    if not places:
+        raise FileFormatError(f"{path}: there is no place in it; give x y z in metres, one place a line")
+    return np.array(places)
+
+
+def spread(corners: ArrayLike, frames: int | None = None, dt: float = 1.0 / 60.0) -> Array:
+    """Places (n, 3) evenly along a path, its end the last and its beginning left out.
+
+    Args:
+        corners: (k, 3) of the path, metres.
+        frames: how many; as many as make half a metre a second if left out.
+        dt: seconds a frame.
+
+    Raises:
+        InputError: the corners are no path, or frames is not positive.
+    """
+    shape = np.shape(corners)
+    if len(shape) != 2 or shape[1] != 3 or shape[0] < 2:
+        raise InputError(f"a path has shape {shape}; give at least two corners, shape (k, 3), metres")
+    places = numbers(corners, (shape[0], 3), "path")
+    if frames is not None and frames < 1:
+        raise InputError(f"frames is {frames}; give 1 or more")
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+    count = frames if frames is not None else max(1, int(np.ceil(way[-1] / (SPEED * dt))))
+    at = way[-1] * np.arange(1, count + 1) / count
+    return np.stack([np.interp(at, way, places[:, axis]) for axis in range(3)], axis=1)
+
+
+def _words(text: str) -> list[str]:
+    return text.replace(",", " ").replace(";", " ").split()
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _place(path: Path, line: Line) -> list[float]:
+    words, where = _words(line.text), f"{path}, line {line.number}"
+    if len(words) != 3 or not all(map(_is_number, words)):
+        raise FileFormatError(f"{where}: {line.text!r} is not a place; give x y z in metres")
+    values = [float(word) for word in words]
+    if not all(abs(value) <= LARGEST for value in values):
+        raise FileFormatError(f"{where}: {line.text!r} is no place within {LARGEST:g} m; give metres")
+    return values
