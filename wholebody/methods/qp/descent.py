@@ -32,6 +32,7 @@ LEAST_WITHIN = 0.05  # m: pairs nearer than what a step asks for get rows, and a
 MOST_WITHIN = 0.12  # m: but none farther apart than this; more is slower, less means more steps that meet things unseen
 SLOW = 0.1  # share of the violation that must go in PATIENCE iterations, else only the nearest posture is sought
 PATIENCE = 6
+IDLE = 4  # postures that fit and are hardly better (ten tolerances of the measure) than the best before: then it ends
 RENEWALS = 2  # times that a descent with small steps begins anew with long ones before it is taken for settled
 MENDABLE = 0.03  # m, rad: violation that the next step is trusted to mend
 DULL, FLAT = 1e-3, 1e-7  # shares of the violation that a step must be foreseen to gain, with measures and without
@@ -100,6 +101,8 @@ class Descent:
         )
         self._anchor: _Visit | None = None  # where to go back to if a step that broke a rule is not mended
         self._memory = Anderson()
+        self._kept: _Visit | None = None  # best posture that fits, and how many since were hardly better
+        self._idle = 0
 
     def run(self, start: Array) -> Local:
         """Descend from a posture within limits, shape (nq,)."""
@@ -127,9 +130,13 @@ class Descent:
                     continue
                 converged = True
                 break
+            if self._idle >= IDLE:
+                converged = True
+                break
             there = self._advance(here, program, answer, outlook)
             if there is not None:
                 here = there
+                self._keep(here)
                 history.append(here.violation.total)
                 if self._stagnates(history):
                     self._measures = False
@@ -143,7 +150,23 @@ class Descent:
                 break
         if self._anchor is not None:
             here = self._anchor
+        if self._kept is not None and not self._better_than_kept(here):
+            here = self._kept
         return Local(here.at.q, here.violation, here.at.measure, converged, count)
+
+    def _keep(self, here: _Visit) -> None:
+        """Remember the best posture that fits: curved constraints make the measures go to and fro near an optimum."""
+        if here.violation.worst > self.tolerance or not self._measures:
+            return
+        worth = 10.0 * self.tolerance * (1.0 + abs(here.at.measure))
+        clearly = self._kept is None or self._kept.at.measure - here.at.measure > worth
+        self._idle = 0 if clearly else self._idle + 1
+        if self._better_than_kept(here):
+            self._kept = here
+
+    def _better_than_kept(self, here: _Visit) -> bool:
+        fits = here.violation.worst <= self.tolerance
+        return fits and (self._kept is None or here.at.measure < self._kept.at.measure)
 
     @property
     def _pull(self) -> float:
