@@ -20,6 +20,7 @@ from wholebody.bench.problem_sets.bodies import (
     is_free,
     movable,
     place_of,
+    shaken,
 )
 from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
 from wholebody.bench.problem_sets.fitting import MassAbove, fitted
@@ -46,7 +47,7 @@ def make(number: int, seed: int) -> Case:
         goals = _goals(number % 3, tip, rng)
         equalities = [*_resolved(figure, goals), MassAbove(rng.uniform(*OVER))]
         witness = fitted(figure, _beginning(figure, rng), equalities, movable(figure))
-        if witness is not None and is_free(figure, witness) and _least_room(witness) > MARGIN + SPARE:
+        if witness is not None and is_free(alone(figure), witness) and _least_room(witness) > MARGIN + SPARE:
             break
     else:
         raise InputError(f"no posture of {ATTEMPTS} is free and in balance; give another seed")
@@ -82,12 +83,7 @@ def _beginning(figure: wb.Figure, rng: np.random.Generator) -> Array:
     for name, (least, most) in STANCE.items():
         angle = np.radians(least + bend * (most - least))
         values |= {f"{side}_{name}": angle for side in ("left", "right")}
-    model = figure.model
-    for name in figure.groups["upper_body"]:
-        place = model.joints[figure.joint_id(name)].idx_q
-        reach = ARMS * (model.upperPositionLimit[place] - model.lowerPositionLimit[place])
-        values[name] = q[place] + rng.uniform(-reach, reach)
-    q = figure.clamp(figure.with_joints(q, values))
+    q = shaken(figure, figure.clamp(figure.with_joints(q, values)), ARMS, rng)
     q[2] -= 0.45 * bend
     q[:2] += rng.uniform(-0.1, 0.1, 2)
     pitch = rng.uniform(0.0, 0.6) + 0.3 * bend

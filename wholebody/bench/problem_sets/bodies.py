@@ -40,9 +40,8 @@ def floor_scene(figure: wb.Figure) -> wb.Scene:
     return wb.Scene(figure).add(wb.HalfSpace(), name="floor")
 
 
-def is_free(figure: wb.Figure, q: Array, room: float = ROOM) -> bool:
+def is_free(scene: wb.Scene, q: Array, room: float = ROOM) -> bool:
     """Whether nothing but the soles on the floor is nearer than `room`, metres, in the posture q, shape (nq,)."""
-    scene = alone(figure)
     owners = scene.piece_owner
     soles = {frozenset(("floor", name)) for name in SOLES}
     return all(frozenset((owners[a], owners[b])) in soles for a, b in scene.contacts(q, within=room).pair)
@@ -60,9 +59,20 @@ def sampled_posture(figure: wb.Figure, start: Array, rng: np.random.Generator) -
     for _ in range(ATTEMPTS):
         q = np.array(start)
         q[places] = rng.uniform(lower, upper)
-        if is_free(figure, q):
+        if is_free(alone(figure), q):
             return q
     raise InputError(f"none of {ATTEMPTS} postures is free; give another seed")
+
+
+def shaken(figure: wb.Figure, q: Array, share: float, rng: np.random.Generator) -> Array:
+    """The posture q, (nq,), with each joint of the upper body off by at most a share of its range."""
+    model = figure.model
+    values = {}
+    for name in figure.groups["upper_body"]:
+        place = model.joints[figure.joint_id(name)].idx_q
+        reach = share * (model.upperPositionLimit[place] - model.lowerPositionLimit[place])
+        values[name] = q[place] + float(rng.uniform(-reach, reach))
+    return figure.clamp(figure.with_joints(q, values))
 
 
 def movable(figure: wb.Figure) -> NDArray[np.intp]:

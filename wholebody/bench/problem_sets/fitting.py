@@ -8,6 +8,7 @@ compared; whoever calls it asks afterwards whether the posture is free.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 EXACT = 1e-10  # m, rad
-TURNS = 40
+TURNS = 25
 LONGEST = 0.5  # rad, m: of an entry of a step, as farther away the rows are no longer true
 SHORT = 1e-9  # keeps the step finite where rows depend on each other
 
@@ -50,7 +51,7 @@ def fitted(figure: wb.Figure, q: Array, goals: Sequence[wb.Goal], dofs: Indices)
         goals: the equalities, resolved.
         dofs: places in the tangent of what may move.
     """
-    model, state = figure.model, State(figure.model)
+    model, state = figure.model, _state(figure)
     for _ in range(TURNS):
         state.update(q)
         error = np.concatenate([goal.error(state) for goal in goals])
@@ -61,6 +62,12 @@ def fitted(figure: wb.Figure, q: Array, goals: Sequence[wb.Goal], dofs: Indices)
         step *= min(1.0, LONGEST / max(float(np.abs(step).max()), 1e-300))
         q = figure.clamp(pin.integrate(model, q, step))
     return None
+
+
+@lru_cache(maxsize=8)
+def _state(figure: wb.Figure) -> State:
+    """One for all postures of a figure: making it takes as long as twenty turns."""
+    return State(figure.model)
 
 
 def _shortest(rows: Array, wanted: Array, dofs: Indices, lower: Array, upper: Array) -> Array:
