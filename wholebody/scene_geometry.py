@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Proximity
 
 if TYPE_CHECKING:
@@ -61,15 +62,10 @@ class SceneGeometry:
 def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tuple[str, str], str]) -> SceneGeometry:
     """Geometry model of a figure with things: the figure's pieces first, then carried ones, then the world's."""
     model = figure.model
-    geometry = pin.GeometryModel()
-    owners: list[str] = []
+    pieces = [pin.GeometryObject(piece) for piece in figure.geometry.geometryObjects]
+    owners = [model.frames[piece.parentFrame].name for piece in pieces]
     pieces_of: dict[str, list[tuple[int, pin.SE3]]] = {}
-    for piece in figure.geometry.geometryObjects:
-        geometry.addGeometryObject(pin.GeometryObject(piece))
-        owners.append(model.frames[piece.parentFrame].name)
-    body = geometry.ngeoms
-    for pair in figure.geometry.collisionPairs:
-        geometry.addCollisionPair(pin.CollisionPair(pair.first, pair.second))
+    body = len(pieces)
 
     things = sorted(objects, key=lambda item: item.segment is None)
     for thing in things:
@@ -80,17 +76,19 @@ def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tupl
         pieces_of[thing.name] = []
         for number, part in enumerate(thing.shape.pieces()):
             name = f"{thing.name}:{number}"
-            made = pin.GeometryObject(name, joint, parent, base * part.placement, part.geometry)
-            index = geometry.addGeometryObject(made)
+            pieces_of[thing.name].append((len(pieces), part.placement))
+            pieces.append(pin.GeometryObject(name, joint, parent, base * part.placement, part.geometry))
             owners.append(thing.name)
-            pieces_of[thing.name].append((index, part.placement))
 
+    geometry = geometry_model(pieces)
+    for pair in figure.geometry.collisionPairs:
+        geometry.addCollisionPair(pin.CollisionPair(pair.first, pair.second))
     joints = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=int)
     carried = {thing.name: thing for thing in things if thing.segment is not None}
     excluded.update(_leaning(figure, geometry, body, joints, owners, carried))
     for second in range(body, geometry.ngeoms):
-        for first in range(second):
-            if joints[first] != joints[second] and (owners[first], owners[second]) not in excluded:
+        for first in np.flatnonzero(joints[:second] != joints[second]).tolist():
+            if (owners[first], owners[second]) not in excluded:
                 geometry.addCollisionPair(pin.CollisionPair(first, second))
     return SceneGeometry(model, geometry, tuple(owners), pieces_of)
 
