@@ -1,0 +1,1 @@
+"""Speed against accuracy: every method on every problem set at many budgets, judged alike, charted and explained."""

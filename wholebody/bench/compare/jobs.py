@@ -1,0 +1,122 @@
+"""One chunk of work, and where chunks are worked on: in processes of this machine or on a cluster, through joblib."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import dataclass, replace
+from typing import Any
+
+from wholebody.bench.compare.messages import Build, Solve
+from wholebody.bench.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Record
+from wholebody.bench.compare.store import Chunk
+from wholebody.bench.compare.worker import EndedError, Worker, own_worker
+from wholebody.bench.entrants.base import Budget, Entrant
+from wholebody.bench.problem_sets.case import ProblemSet
+from wholebody.errors import MissingPackageError, WholebodyError
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a chunk of work is.
+
+    Attributes:
+        family, number, seed: which case.
+        solves: methods, each with its further budgets (none where only the default one is asked for).
+        cap: seconds after which a solve is ended.
+    """
+
+    family: ProblemSet
+    number: int
+    seed: int
+    solves: tuple[tuple[Entrant, tuple[Budget, ...]], ...]
+    cap: float
+
+
+def work(task: Task) -> Chunk:
+    """Build a case and let every method solve it, one after the other in a process of their own."""
+    worker = own_worker()
+    began = time.perf_counter()
+    try:
+        fault = worker.build(Build(task.family, task.number, task.seed))
+    except EndedError as error:
+        fault = str(error)
+    building = time.perf_counter() - began
+    if fault:
+        return Chunk(task.family.name, task.number, (), building=building, fault=fault)
+    records: list[Record] = []
+    spent, swept = {}, {}
+    for entrant, ladder in task.solves:
+        began = time.perf_counter()
+        first = _solve(worker, entrant, DEFAULT, task)
+        records.append(first)
+        between = time.perf_counter()
+        spent[entrant.name] = between - began
+        if ladder:
+            records += _sweep(worker, entrant, ladder, task, first)
+            swept[entrant.name] = time.perf_counter() - between
+    return Chunk(task.family.name, task.number, tuple(records), spent, swept, building)
+
+
+def _sweep(worker: Worker, entrant: Entrant, ladder: Iterable[Budget], task: Task, first: Record) -> list[Record]:
+    """All further budgets, unless the first solve or one of them shows that it is of no use."""
+    records: list[Record] = []
+    stopped = first if first.outcome in (REFUSED, OVERTIME) else None
+    for level in ladder:
+        if stopped is None:
+            records.append(_solve(worker, entrant, level, task))
+            stopped = records[-1] if records[-1].outcome == OVERTIME else None
+        elif stopped.outcome == OVERTIME:  # counted as what it would have been
+            records.append(replace(stopped, tolerance=level[0], budget=level[1] or 0))
+    return records
+
+
+def _solve(worker: Worker, entrant: Entrant, level: Budget, task: Task) -> Record:
+    try:
+        record: Record = worker.solve(Solve(entrant, level, task.cap))
+    except EndedError as error:
+        empty = Record(task.family.name, task.number, entrant.name, level[0], level[1] or 0, FAILED)
+        if error.overtime:
+            return replace(empty, outcome=OVERTIME, said=f"ended after {task.cap:g} s")
+        return replace(empty, said=str(error))
+    return record
+
+
+def compute(tasks: Iterator[Task], jobs: int, cluster: str | None = None) -> Iterator[Chunk]:
+    """Work on tasks beside each other, and give their chunks as they are done. Tasks are asked for when one can begin.
+
+    Args:
+        tasks: asked for one by one.
+        jobs: how many at a time.
+        cluster: address of a dask scheduler; processes of this machine where None.
+
+    Raises:
+        MissingPackageError: joblib or dask is not installed.
+        WholebodyError: the cluster does not answer.
+    """
+    try:
+        import joblib
+    except ImportError:
+        raise MissingPackageError("comparing needs joblib; install it with: pip install 'wholebody[charts]'") from None
+    with ExitStack() as stack:
+        if cluster is not None:
+            stack.enter_context(_client(cluster))
+            stack.enter_context(joblib.parallel_config(backend="dask"))
+        parallel = joblib.Parallel(
+            n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=jobs + 1
+        )  # fmt: skip
+        yield from parallel(joblib.delayed(work)(task) for task in tasks)
+
+
+def _client(address: str) -> AbstractContextManager[Any]:
+    try:
+        from distributed import Client
+    except ImportError:
+        raise MissingPackageError("--cluster needs dask; install it with: pip install 'wholebody[cluster]'") from None
+    try:
+        connect: Callable[..., AbstractContextManager[Any]] = Client
+        client = connect(address, timeout=10)
+    except (OSError, ValueError) as error:
+        raise WholebodyError(f"no dask scheduler answers at {address} ({error}); start one: dask scheduler") from None
+    return client

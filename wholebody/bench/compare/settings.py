@@ -1,0 +1,78 @@
+"""What a comparison is asked to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from wholebody.bench.compare.record import DEFAULT
+from wholebody.bench.entrants.base import Budget, Entrant
+from wholebody.bench.problem_sets.case import ProblemSet
+from wholebody.errors import InputError
+from wholebody.version import __version__
+
+MOVING_LEVELS = 3  # budgets of a set whose goals move: a case is hundreds of solves
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is compared, and how much of it.
+
+    Attributes:
+        sets, entrants: problem sets and methods.
+        cases: of every set at the default budget.
+        sweep: of these, the first so many at every budget.
+        levels: most budgets beside the default one.
+        seed: of all problems.
+        cap: seconds after which a solve is ended.
+        minutes: of all solving; methods that are too slow for it get fewer cases.
+    """
+
+    sets: tuple[ProblemSet, ...]
+    entrants: tuple[Entrant, ...]
+    cases: int = 200
+    sweep: int = 40
+    levels: int = 99
+    seed: int = 0
+    cap: float = 20.0
+    minutes: float = 25.0
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            InputError: one that makes no sense.
+        """
+        for name, least in (("cases", 1), ("sweep", 0), ("levels", 1), ("seed", 0)):
+            if getattr(self, name) < least:
+                raise InputError(f"{name} is {getattr(self, name)}; give {least} or more")
+        if not self.sets or not self.entrants:
+            raise InputError("a comparison needs a problem set and a method; name at least one of each")
+
+    def described(self) -> dict[str, Any]:
+        """What a folder's run must agree in to be gone on with."""
+        return {
+            "wholebody": __version__,
+            "sets": [family.name for family in self.sets],
+            "methods": [entrant.name for entrant in self.entrants],
+            "cases": self.cases,
+            "sweep": self.sweep,
+            "levels": {entrant.name: [list(level) for level in self.ladder(entrant)] for entrant in self.entrants},
+            "seed": self.seed,
+            "cap": self.cap,
+            "minutes": self.minutes,
+        }
+
+    def ladder(self, entrant: Entrant, moving: bool = False) -> list[Budget]:
+        """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`."""
+        listed = [level for level in entrant.loose if level != DEFAULT]
+        most = min(self.levels, MOVING_LEVELS) if moving else self.levels
+        if len(listed) <= most:
+            return listed
+        if most == 1:
+            return listed[:1]
+        return [listed[round(place * (len(listed) - 1) / (most - 1))] for place in range(most)]
+
+
+QUICK = {"cases": 20, "sweep": 6, "levels": 5, "cap": 5.0, "minutes": 2.2}
+"""A short comparison, within three minutes on two cores."""
