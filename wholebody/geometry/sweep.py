@@ -179,40 +179,43 @@ class Sweep:
             if len(self._cores[points].points) and (
                 len(self._cores[plane].points) or np.isinf(self._cores[plane].reach)
             ):
-                for direction in self._planes(plane, out):
-                    best = max(best, self._plane_keeps(points, plane, direction, float(row[0]), level))
+                best = max(best, self._planes_keep(points, plane, self._planes(plane, out), float(row[0]), level))
         return best
 
-    def _planes(self, piece: int, normal: Array) -> list[Array]:
-        """Directions to bound a piece in, near a normal of coal's: its face that looks there, and the normal itself.
+    def _planes(self, piece: int, normal: Array) -> Array:
+        """Directions (k, 3) to bound a piece in, near a normal of coal's: the normal, and its face that looks there.
 
         Any direction gives a true bound, and a wide face a useless one if it is not met exactly: where faces touch,
         coal's normal can be 1e-4 rad off.
         """
         core, rotation = self._cores[piece], self._results.oMg[piece].rotation
         if not len(core.faces):
-            return [normal]
+            return normal[None]
         faces = core.faces[:, :3] @ rotation.T
         face = faces[int(np.argmax(faces @ normal))]
-        return [face] if np.isinf(core.reach) else [face, normal]
+        return face[None] if np.isinf(core.reach) else np.array([face, normal])
 
-    def _plane_keeps(self, points: int, plane: int, normal: Array, distance: float, level: float) -> float:
-        """Time until a core point of `points` can come down to `level` over the supporting plane of `plane`."""
+    def _planes_keep(self, points: int, plane: int, normals: Array, distance: float, level: float) -> float:
+        """Time until a core point of `points` can come down to `level` over supporting planes (k, 3) of `plane`."""
         core, base = self._cores[points], self._cores[plane]
         at, below = self._results.oMg[points], self._results.oMg[plane]
         if np.isinf(base.reach):
-            height = float(base.faces[0, 3] + normal @ below.translation)
+            heights = base.faces[0, 3] + normals @ below.translation
         else:
-            height = float((base.points @ (below.rotation.T @ normal)).max() + normal @ below.translation)
+            heights = (base.points @ below.rotation.T @ normals.T).max(axis=0) + normals @ below.translation
         corners = core.points @ at.rotation.T + at.translation
-        room = corners @ normal - height - core.radius - base.radius - level
-        if room.min() <= 0.0:
+        room = corners @ normals.T - (heights + core.radius + base.radius + level)
+        above = room.min(axis=0) > 0.0
+        if not above.any():
             return 0.0
-        rate = (self._velocities(points, corners) - self._velocities(plane, corners)) @ normal
+        room = room[:, above]
+        rate = (self._velocities(points, corners) - self._velocities(plane, corners)) @ normals[above].T
         bend = self._bounds.curvature(points, plane, distance)
         if bend <= 0.0:
-            return float(np.where(rate < 0.0, room / np.maximum(-rate, 1e-300), np.inf).min())
-        return float(((rate + np.sqrt(rate * rate + 2.0 * bend * room)) / bend).min())
+            times = np.where(rate < 0.0, room / np.maximum(-rate, 1e-300), np.inf)
+        else:
+            times = (rate + np.sqrt(rate * rate + 2.0 * bend * room)) / bend
+        return float(times.min(axis=0).max())
 
     def _velocities(self, piece: int, places: Array) -> Array:
         """Velocities (k, 3) that points at `places` have with the body that carries the piece."""

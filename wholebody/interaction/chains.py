@@ -28,8 +28,14 @@ class LimbByLimb:
     def remove(self, shown: Array, tracked: Array) -> Removal:
         """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""
         result = remove_overlap(self.scene, shown, tracked, self._rng)
-        left = self.scene.contacts(result.q, within=-NOTED).distance
-        note = f"{-1e3 * left[0]:.1f} mm of overlap are left" if len(left) else ""
+        note = f"{1e3 * result.deepest:.1f} mm of overlap are left" if result.deepest > NOTED else ""
         return Removal(
-            (result.q,), result.contact_seconds, result.ik_seconds, result.iterations, result.joints, result.pairs, note
+            ways=(result.q,),
+            contact_seconds=result.contact_seconds,
+            solve_seconds=result.ik_seconds,
+            iterations=result.iterations,
+            joints=result.joints,
+            pairs=result.pairs,
+            note=note,
+            swept=result.swept,
         )

@@ -120,9 +120,12 @@ class FrameLoop:
     def _kept_from_passing(self, removal: Removal) -> Removal:
         """The first posture whose way from the one shown is free; else a part of its way, or the one shown.
 
-        This is the interpolation with the last posture without overlap of algorithm 1, step 4. What is free for the
-        whole length of a share is taken, and never what is free up to a contact: that would creep into it.
+        What the removal swept is not swept again. This is the interpolation with the last posture without overlap of
+        algorithm 1, step 4. What is free for the whole length of a share is taken, and never what is free up to a
+        contact: that would creep into it.
         """
+        if removal.swept:
+            return removal
         began = time.perf_counter()
         nearest = removal.ways[-1]
         parts = (np.asarray(pin.interpolate(self.scene.model, self.shown, nearest, share)) for share in SHARES)

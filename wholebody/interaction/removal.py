@@ -15,6 +15,7 @@ class Removal(NamedTuple):
 
     Attributes:
         ways: postures (nq,) to show, the best one first; the next is taken if the way to one is not free.
+        swept: the way to the first of them was swept and is free.
     """
 
     ways: tuple[Array, ...]
@@ -24,6 +25,7 @@ class Removal(NamedTuple):
     joints: int
     pairs: int
     note: str
+    swept: bool = False
 
 
 class Remover(Protocol):

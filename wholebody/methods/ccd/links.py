@@ -58,14 +58,16 @@ class Link(NamedTuple):
 class LinkFinder:
     """Finds the overlapping link of one chain."""
 
-    def __init__(self, scene: Scene, limbs: Limbs, foreign: frozenset[int]) -> None:
+    def __init__(self, scene: Scene, limbs: Limbs, foreign: frozenset[int], exact: bool = True) -> None:
         """Say which joints belong to the chain.
 
         Args:
             scene: figure and things.
             limbs: the joints of the chain.
             foreign: joints of other chains: what they carry is no link of this one, although it may move it.
+            exact: where PD_g cancels, look for the least translation that separates.
         """
+        self._exact = exact
         self._scene, self._limbs = scene, limbs
         self._carrier = [limbs.carrier(joint) for joint in range(scene.model.njoints)]
         self._own = list(self._carrier)
@@ -130,7 +132,7 @@ class LinkFinder:
         normals = np.array([overlap.normal for overlap, _ in group])
         normals[[is_a for _, is_a in group]] *= -1.0
         x, y, z = global_depth(depths, normals).tolist()
-        if (x * x + y * y + z * z) ** 0.5 >= CANCELLED * float(depths.max()):
+        if not self._exact or (x * x + y * y + z * z) ** 0.5 >= CANCELLED * float(depths.max()):
             return x, y, z
         return self._separation(owner, group) or (x, y, z)
 

@@ -26,15 +26,15 @@ Array = NDArray[np.float64]
 STEP = 0.03  # m: farthest that a chain's tip is drawn at once; half of a forearm's width
 SMALL_STEP = 0.006  # m: where steps of that length lead around a bulge that the straight way cuts
 STEPS = 8  # most steps of one frame
-ENOUGH = 60  # looks after which a frame makes no further step, and the next one goes on: some 6 ms
-TOO_MANY = 90  # looks after which no chain has another turn
+ENOUGH = 55  # looks and goals after which a frame makes no further step, and the next one goes on: some 4 ms
+LEAST = 15  # looks and goals for small steps, where larger ones led nowhere straight
+TOO_MANY = 20  # looks and goals beyond these after which no chain has another turn
 HALVINGS = 7  # of an interpolation: a step of 3 cm to a quarter of a millimetre
 LEAST_GAIN = 1e-7  # rad^2: a chain that gets no nearer than this to the tracked posture stays where it is
 HELD_UP = 0.4  # a part that gains less than this share of what drawing alone would have is held up (2 is all of it)
 SHAKES = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things came upon and that no joint's best value frees
 APART = 0.02  # m: how far a tip moves between two looks at the straight way from one shown posture to the next
 MOST_LOOKS = 5
-LONG = 0.03  # m: a way on which a tip moves farther is swept as well, which costs more than looks and misses nothing
 DIP = 4e-4  # m: how deep it may go in there
 ARRIVED = 1e-12  # rad^2: a chain this near is there
 
@@ -52,6 +52,7 @@ class OverlapResult:
         ik_seconds: time of cyclic coordinate descent.
         fell_back: interpolation with the last posture without overlap was needed.
         deepest: deepest overlap left, metres.
+        swept: the straight way from the posture shown before was swept and goes into nothing.
     """
 
     q: Array
@@ -62,6 +63,7 @@ class OverlapResult:
     ik_seconds: float
     fell_back: bool
     deepest: float
+    swept: bool
 
 
 def remove_overlap(
@@ -96,7 +98,7 @@ class Frames:
         """Prepare the chains, and which degrees of freedom are of which."""
         self.revision = scene.revision
         self._model, self._figure, self._proximity = scene.model, scene.figure, scene.proximity
-        self._remover = Remover(scene) if remover is None else remover
+        self._remover = Remover(scene, exact=False) if remover is None else remover
         self._sweeper = scene.sweeper
         self._parts: list[tuple[NDArray[np.intp], Array]] = []
         rest = np.ones(scene.model.nv, dtype=bool)
@@ -118,62 +120,57 @@ class Frames:
         remover = self._remover
         remover.tally = Tally()
         wanted = remover.into_cones(self._figure.clamp(q_wanted))
-        self._fell_back = False
-        q, overlaps = remover.separate(q_free, rng)
+        self._fell_back = self._swept = False
+        q, overlaps = remover.separate(q_free, rng, TOO_MANY)
+        pushed = remover.tally.iterations > 0
         for size in SHAKES if overlaps else ():
-            shaken, still = remover.separate(self._shaken(q_free, size, rng), rng)
+            shaken, still = remover.separate(self._shaken(q_free, size, rng), rng, remover.tally.work + TOO_MANY)
             if not still:
                 q, overlaps = shaken, still
                 break
+        if overlaps:
+            return self._result(q if remover.look(wanted) else wanted)
         before = self._proximity.placements.copy()
-        left = remover.deepest
-        if not overlaps:
-            if not remover.look(wanted) and not self._jumps(before, q, wanted):
-                touching = remover.deepest
-                if self._clear(q, wanted):
-                    return self._result(wanted, touching)
-            for self._step in (STEP, SMALL_STEP):
-                way = self._approach(q, left, wanted, before, rng, steps)
-                shown = self._straight(way)
-                if shown is not None:
-                    return self._result(*shown)
-        elif not remover.look(wanted):
-            return self._result(wanted, remover.deepest)
-        return self._result(q, left)
+        if not remover.look(wanted) and not self._jumps(before, q, wanted) and self._clear(q, wanted):
+            self._swept &= not pushed
+            return self._result(wanted)
+        self._limit = remover.tally.work + ENOUGH
+        for self._step in (STEP, SMALL_STEP):
+            self._limit = max(self._limit, remover.tally.work + LEAST)
+            shown = self._straight(self._approach(q, wanted, before, rng, steps))
+            if shown is not None:
+                self._swept &= not pushed
+                return self._result(shown)
+        self._swept = False
+        return self._result(q)
 
-    def _approach(
-        self, q: Array, left: float, wanted: Array, before: Array, rng: np.random.Generator, steps: int
-    ) -> list[tuple[Array, float]]:
-        """From a free posture towards the wanted one, step by step: the postures and their deepest overlaps."""
+    def _approach(self, q: Array, wanted: Array, before: Array, rng: np.random.Generator, steps: int) -> list[Array]:
+        """From a free posture towards the wanted one, step by step: the postures on the way."""
         remover = self._remover
-        enough = remover.tally.looks + ENOUGH
         settled = [False] * len(self._parts)
-        way = [(q, left)]
+        way = [q]
         for _ in range(steps):
-            if remover.tally.looks > enough:
+            if remover.tally.work > self._limit:
                 break
             drawn = self._draw(q, wanted, settled)
             if drawn is None:
                 break
-            trial, overlaps = remover.separate(drawn[0], rng, enough + TOO_MANY - ENOUGH)
+            trial, overlaps = remover.separate(drawn[0], rng, self._limit + TOO_MANY)
             if overlaps:
                 trial = self._interpolate(q, trial)
             if self._jumps(before, q, trial):
                 trial = self._interpolate(q, self._hit)
             q = self._keep_gains(q, trial, wanted, drawn[1], settled)
-            way.append((q, remover.deepest))
+            way.append(q)
             before = self._proximity.placements.copy()
         return way
 
-    def _straight(self, way: list[tuple[Array, float]]) -> tuple[Array, float] | None:
+    def _straight(self, way: list[Array]) -> Array | None:
         """The last posture of the way to which the first can go straight, as it will be shown, without dipping in."""
-        for q, left in way[:0:-1]:
-            if self._clear(way[0][0], q):
-                return q, left
-        return None
+        return next((q for q in way[:0:-1] if self._clear(way[0], q)), None)
 
     def _clear(self, q0: Array, q1: Array) -> bool:
-        """Whether the straight way from one shown posture to the next does not dip in: looked at, swept where long."""
+        """Whether the straight way from one shown posture to the next does not dip in: looks are cheap, a sweep sure."""
         way = np.abs(np.asarray(pin.difference(self._model, q0, q1)))
         length = max(float(way[dofs] @ reach) for dofs, reach in self._parts)
         looks = min(int(length / APART), MOST_LOOKS)
@@ -181,7 +178,8 @@ class Frames:
             self._remover.look(np.asarray(pin.interpolate(self._model, q0, q1, (k + 1) / (looks + 1))))
             if self._remover.deepest > DIP:
                 return False
-        return length < LONG or self._sweeper.first_contact(q0, q1, None, 2.0 * DIP) is None
+        self._swept = self._sweeper.first_contact(q0, q1, None, 2.0 * DIP) is None
+        return self._swept
 
     def _shaken(self, q: Array, size: float, rng: np.random.Generator) -> Array:
         """Copy of a posture q (nq,) with its joints moved at random: a straight arm pushed along itself must bend."""
@@ -240,7 +238,7 @@ class Frames:
         gained = False
         for dof, reach in zip(*self._parts[part], strict=True):
             way = float(pin.difference(self._model, q, wanted)[dof])
-            if way * way < LEAST_GAIN:
+            if way * way < LEAST_GAIN or self._remover.tally.work > self._limit + TOO_MANY:
                 continue
             step = np.zeros(self._model.nv)
             step[dof] = min(max(way, -self._step / reach), self._step / reach)
@@ -271,8 +269,9 @@ class Frames:
             self._hit = hit.q
         return hit is not None
 
-    def _result(self, q: Array, deepest: float) -> OverlapResult:
+    def _result(self, q: Array) -> OverlapResult:
         tally = self._remover.tally
+        self._remover.look(q)
         return OverlapResult(
             q=q,
             iterations=tally.iterations,
@@ -281,7 +280,8 @@ class Frames:
             contact_seconds=tally.contact_seconds,
             ik_seconds=tally.ik_seconds,
             fell_back=self._fell_back,
-            deepest=deepest,
+            deepest=self._remover.deepest,
+            swept=self._swept,
         )
 
 

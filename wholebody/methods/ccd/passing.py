@@ -15,7 +15,7 @@ from wholebody.scene import Scene
 Array = NDArray[np.float64]
 
 ARC = 1.1  # length of an arc over its chord, at the most, for the turns that one motion makes
-OVERLAP = 5e-4  # m: overlap on the way that does not count
+OVERLAP = 2e-3  # m: overlap on the way that does not count; what is shown in the end is swept more closely
 
 
 def jump(scene: Scene, before: Array, after: Array, q0: Array, q1: Array, apart: Array) -> FirstContact | None:

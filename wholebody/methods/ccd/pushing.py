@@ -41,6 +41,7 @@ class ChainPusher:
         foreign: frozenset[int],
         tip: int,
         cones: Sequence[str] | None = None,
+        exact: bool = True,
     ) -> None:
         """Prepare a chain.
 
@@ -51,10 +52,11 @@ class ChainPusher:
             foreign: joints of the other chains.
             tip: index of the frame at its end.
             cones: names of the reach cones to keep; all of the figure's where None.
+            exact: see `LinkFinder`.
         """
         self.name = name
         self.limbs = Limbs(scene.model, joints)
-        self._finder = LinkFinder(scene, self.limbs, foreign)
+        self._finder = LinkFinder(scene, self.limbs, foreign, exact)
         self._guards = guards(scene.figure, self.limbs, cones)
         self._tip = _three(scene.model.frames[tip].placement.translation)
         self._bearing = self._links_with_pieces(scene)
