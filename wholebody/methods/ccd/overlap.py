@@ -170,7 +170,7 @@ class Frames:
         return next((q for q in way[:0:-1] if self._clear(way[0], q)), None)
 
     def _clear(self, q0: Array, q1: Array) -> bool:
-        """Whether the straight way from one shown posture to the next does not dip in: looks are cheap, a sweep sure."""
+        """Whether the straight way between two shown postures does not dip in; looks are cheap, the sweep is sure."""
         way = np.abs(np.asarray(pin.difference(self._model, q0, q1)))
         length = max(float(way[dofs] @ reach) for dofs, reach in self._parts)
         looks = min(int(length / APART), MOST_LOOKS)
