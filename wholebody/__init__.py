@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from wholebody.methods.drag import Drag, pull
     from wholebody.methods.newton.assembly import Assembly
     from wholebody.methods.newton.method import Newton
+    from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
     from wholebody.problem import Problem, Solution
@@ -95,6 +96,7 @@ __all__ = [
     "MissingPackageError",
     "Newton",
     "Orientation",
+    "Placo",
     "Plane",
     "Point",
     "Posture",
@@ -128,6 +130,7 @@ _MODULES = {
     "wholebody.methods.drag": "Drag pull",
     "wholebody.methods.newton.assembly": "Assembly",
     "wholebody.methods.newton.method": "Newton",
+    "wholebody.methods.placo.method": "Placo",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
     "wholebody.problem": "Problem Solution",

@@ -7,7 +7,7 @@ from typing import Protocol
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.problem import Problem, Solution
 
-METHODS = ("qp", "ccd", "newton", "dls")
+METHODS = ("qp", "ccd", "newton", "placo", "dls")
 
 
 class Method(Protocol):
@@ -39,6 +39,10 @@ def method_named(name: str) -> Method:
         from wholebody.methods.newton.method import Newton
 
         return Newton()
+    if name == "placo":
+        from wholebody.methods.placo.method import Placo
+
+        return Placo()
     if name == "dls":
         from wholebody.methods.damped_least_squares import DampedLeastSquares
 
@@ -51,7 +55,7 @@ def solve(problem: Problem, method: str | Method = "qp") -> Solution:
 
     Args:
         problem: what is asked.
-        method: "qp", "ccd", "newton", "dls", or a configured method such as `QP(solver="daqp", tolerance=1e-8)`.
+        method: "qp", "ccd", "newton", "placo", "dls", or a configured method such as `QP(solver="daqp")`.
 
     Returns:
         The posture with its status and the independent assessment. Goals out of reach and starts in penetration are

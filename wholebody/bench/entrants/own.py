@@ -1,4 +1,4 @@
-"""Our own methods as they take part: qp with every QP solver, newton in three ways, ccd and dls."""
+"""Our own methods as they take part: qp with every QP solver, newton in three ways, ccd, dls and placo."""
 
 from __future__ import annotations
 
@@ -65,6 +65,27 @@ def dls_entrant() -> Entrant:
     )
 
 
+def placo_entrant() -> Entrant:
+    """The adapter to placo's kinematics solver."""
+    return Entrant(
+        name="placo",
+        make=_placo,
+        loose=(*_few(5, 10, 20), *LADDER),
+        setup="wb.Placo(), all else as it comes: goals as soft tasks, holds and the self-collision constraint hard, "
+        "joint limits, at most 0.05 rad or m a program, joints tasks for the measures with a weight that fades; one "
+        "start, at most 200 programs. The objects are added to its collision model, with the clearance of each pair. "
+        "Building its robot is set-up.",
+        differences=(
+            "placo has no class for objects in the world: they are added to its collision model as parts of the robot",
+            "placo minimises Effort and Displacement only",
+            "placo has no reach cones, no half-spaces for frames and no axis toward a place",
+            "placo has one row a pair, between the two nearest points",
+            "placo finds no solution where hard tasks repeat each other, as in a redundant closed loop",
+        ),
+        package="placo",
+    )
+
+
 def newton_entrant(way: str) -> Entrant:
     """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
     return Entrant(
@@ -113,3 +134,9 @@ def _dls(tolerance: float, iterations: int | None) -> Method:
     if iterations is None:
         return DampedLeastSquares(tolerance=tolerance)
     return DampedLeastSquares(tolerance=tolerance, iterations=iterations)
+
+
+def _placo(tolerance: float, iterations: int | None) -> Method:
+    from wholebody.methods.placo.method import Placo
+
+    return Placo(tolerance=tolerance) if iterations is None else Placo(tolerance=tolerance, iterations=iterations)

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from wholebody.bench.entrants.base import Entrant
-from wholebody.bench.entrants.own import NEWTONS, ccd_entrant, dls_entrant, newton_entrant, qp_entrant
+from wholebody.bench.entrants.own import NEWTONS, ccd_entrant, dls_entrant, newton_entrant, placo_entrant, qp_entrant
 from wholebody.errors import MissingPackageError, UnknownNameError
 
 SOLVERS = {"quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
@@ -72,4 +72,5 @@ def _rows() -> dict[str, _Row]:
         rows[f"newton/{way}"] = _Row(partial(newton_entrant, way))
     rows["ccd"] = _Row(ccd_entrant)
     rows["dls"] = _Row(dls_entrant)
+    rows["placo"] = _Row(placo_entrant, ("placo",), "compare")
     return rows

@@ -1,0 +1,233 @@
+"""The method placo: its differential inverse kinematics, iterated until a whole problem is solved."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.assessment import Assessment, assess
+from wholebody.errors import InputError
+from wholebody.figures.state import State
+from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.methods.placo.robot import SWELL, Robot
+from wholebody.methods.placo.terms import add_terms, check, named_frames
+from wholebody.problem import Iterate, Problem, Solution, Status
+
+Array = NDArray[np.float64]
+
+STEP = 0.05  # rad, m: most that a joint or the root moves in one iteration
+NEAR = 0.1  # m: pairs nearer than this have a row; placo's trigger
+SHARE = 0.5  # of the tolerance: to what everything is met, so that the judge, who rounds otherwise, agrees
+LET_IN = 0.4  # share of the tolerance by which pairs may be nearer than their clearance
+REST = 1e-2  # share of the tolerance: a step smaller than this has come to rest
+COMFORT = 1e-2  # weight of the measures at the beginning, against goals of weight 1
+DECAY = 0.6  # of that weight from one iteration to the next
+LEAST = 1e-3  # share of the tolerance: least weight of the measures, which goals then miss by less than the tolerance
+REGULAR = 1e-3  # share of the measures' weight: what moving itself costs
+DAMPING = 1e-3  # what moving costs once a step goes back on the one before, against goals of weight 1
+STIFFER, LOOSER = 4.0, 0.5  # factors on that, after another such step and after any other
+MOST_DAMPING = 10.0
+
+
+@dataclass
+class Placo:
+    """placo's `KinematicsSolver`, by its documented tasks, iterated.
+
+    Goals are soft tasks, holds hard ones; joint limits and its self-collision constraint, to whose model the objects
+    are added, are hard too; the measures are joints tasks whose weight fades. An iteration is one of its programs.
+
+    Takes Point, Frame, Orientation, Axis(direction=...), CenterOfMass, Posture and Relative goals; Hold, Plane with
+    side "on", Balance and Freeze; Effort and Displacement. Everything else is refused by name. There is one
+    start. Where placo finds no solution of a program, the posture before it is the answer, with placo's words.
+
+    Attributes:
+        tolerance: metres and radians to which goals and constraints are met.
+        iterations: most programs.
+    """
+
+    tolerance: float = 1e-5
+    iterations: int = 200
+    _robot: tuple[Problem, Robot] | None = field(default=None, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the settings.
+
+        Raises:
+            InputError: a setting out of range.
+        """
+        if not 1e-10 <= self.tolerance <= 0.1:
+            raise InputError(f"tolerance is {self.tolerance}; give metres from 1e-10 to 0.1")
+        if self.iterations < 1:
+            raise InputError(f"iterations is {self.iterations}; give 1 or more")
+
+    @property
+    def name(self) -> str:
+        """Name for tables."""
+        return "placo"
+
+    def prepare(self, problem: Problem) -> None:
+        """Build placo's robot for a problem; `solve` does it where this was not called.
+
+        Raises:
+            InputError: placo cannot express the problem, or its scene changed after it was stated.
+            MissingPackageError: placo is not installed.
+        """
+        self._prepared(problem)
+
+    def solve(self, problem: Problem) -> Solution:
+        """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
+
+        Raises:
+            InputError: placo cannot express the problem, or its scene changed after it was stated.
+            MissingPackageError: placo is not installed.
+        """
+        began = time.perf_counter()
+        run = _Run(problem, self._prepared(problem), self)
+        run.go()
+        judgement = assess(problem, run.q)
+        status = _status(judgement, run, 1.05 * self.tolerance + 1e-6)
+        return Solution(
+            q=run.q,
+            status=status,
+            seconds=time.perf_counter() - began,
+            iterations=run.programs,
+            assessment=judgement,
+            trace=tuple(run.trace),
+            method=self.name,
+            message=_message(status, judgement, run),
+        )
+
+    def _prepared(self, problem: Problem) -> Robot:
+        problem.check_fresh()
+        check(problem)
+        frames = named_frames(problem)
+        if self._robot is None or self._robot[0] is not problem or not set(frames) <= set(self._robot[1].frames):
+            self._robot = (problem, Robot(problem, frames))
+        return self._robot[1]
+
+
+class _Run:
+    """One solve.
+
+    Attributes:
+        q: (nq,) the present posture.
+        programs: how many were solved.
+        rested: whether it ended because nothing moves any more.
+        failure: placo's words where it found no solution.
+    """
+
+    def __init__(self, problem: Problem, robot: Robot, method: Placo) -> None:
+        import placo
+
+        self._problem, self._robot, self._method = problem, robot, method
+        self.q: Array = problem.scene.figure.clamp(problem.start)
+        self._state = State(problem.scene.model)
+        self.trace: list[Iterate] = []
+        self.programs, self.rested, self.failure = 0, False, ""
+        self._damping, self._last = 0.0, np.zeros(problem.scene.model.nv)
+        robot.place_objects()
+        self._solver: Any = placo.KinematicsSolver(robot.wrapper)
+        self._tasks = add_terms(self._solver, robot, problem)
+        self._regular = self._solver.add_regularization_task(REGULAR * COMFORT)
+        self._solver.dt = 1.0
+        robot.wrapper.set_velocity_limits(STEP)
+        self._solver.enable_joint_limits(True)
+        self._solver.enable_velocity_limits(True)
+        apart = self._solver.add_avoid_self_collisions_constraint()
+        # rounding alone makes a held foot on a floor infeasible
+        apart.self_collisions_margin = -SWELL - LET_IN * method.tolerance
+        apart.self_collisions_trigger = NEAR - SWELL
+        apart.configure("apart", "hard", 1.0)
+
+    def go(self) -> None:
+        """Iterate until everything is met, nothing moves, placo gives up or the programs run out."""
+        method, model = self._method, self._problem.scene.model
+        step = 0.0
+        while True:
+            error, violation = self._look()
+            self.trace.append(Iterate(error, violation, 0.0, step))
+            enough = SHARE * method.tolerance
+            if max(error, violation) <= enough and self._apart(enough):
+                return
+            if self.programs and step <= REST * method.tolerance:
+                self.rested = True
+                return
+            if self.programs == method.iterations:
+                return
+            move = self._program()
+            if move is None:
+                return
+            moved = self._problem.scene.figure.clamp(np.asarray(pin.integrate(model, self.q, move)))
+            step = float(np.abs(pin.difference(model, self.q, moved)).max(initial=0.0))
+            self.q = moved
+
+    def _look(self) -> tuple[float, float]:
+        """The largest error of a goal and of a constraint, metres or radians."""
+        state = self._state.update(self.q)
+        errors, violations = [0.0], [0.0]
+        for goal in self._problem.goals:
+            error = np.atleast_1d(goal.error(state))
+            angular = np.broadcast_to(goal.angular, error.shape)
+            errors += [float(np.linalg.norm(error[angular])), float(np.linalg.norm(error[~angular]))]
+        for term in self._problem.constraints:
+            value = np.atleast_1d(term.value(state))
+            violations.append(float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0)))
+        return max(errors), max(violations)
+
+    def _apart(self, tolerance: float) -> bool:
+        """Whether all pairs keep their clearance."""
+        clearances = self._problem.clearances
+        near = self._problem.scene.proximity.near(self._state.data, float(clearances.max(initial=0.0)))
+        return bool((near.distance >= clearances[near.number] - tolerance - COAL_ACCURACY).all())
+
+    def _program(self) -> Array | None:
+        """Displacement (nv,) by one of placo's programs, or None where it has no solution."""
+        weight = max(COMFORT * DECAY**self.programs, LEAST * self._method.tolerance)
+        self._tasks.weigh(weight)
+        self._regular.set_weight(max(REGULAR * weight, self._damping))
+        self._robot.move(self.q)
+        self.programs += 1
+        try:
+            theirs = self._solver.solve(False)
+        except RuntimeError as error:
+            self.failure = " ".join(str(error).split())
+            return None
+        move = self._robot.displacement(theirs)
+        if not np.isfinite(move).all():
+            self.failure = "a displacement that is not a number"
+            return None
+        move = move * min(1.0, STEP / max(float(np.abs(move).max(initial=0.0)), STEP))
+        back = float(move @ self._last) < 0.0
+        self._damping = min(max(STIFFER * self._damping, DAMPING), MOST_DAMPING) if back else LOOSER * self._damping
+        self._last = move
+        return move
+
+
+def _status(judgement: Assessment, run: _Run, slack: float) -> Status:
+    ended = run.rested or bool(run.failure)
+    if not judgement.holds(slack):
+        return "infeasible" if ended else "stalled"
+    if judgement.met(slack):
+        return "solved"
+    if run.failure:
+        return "infeasible"
+    return "unreachable" if run.rested else "stalled"
+
+
+def _message(status: Status, judgement: Assessment, run: _Run) -> str:
+    left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
+    if status == "solved":
+        return f"solved in {run.programs} programs"
+    if run.failure:
+        return f"placo gave up at program {run.programs} ({run.failure}): {left}"
+    if status == "unreachable":
+        return f"came to rest: nothing is violated, {left}"
+    if status == "stalled":
+        return f"ran out of iterations: {left}"
+    worst = max(judgement.clearance_lack, judgement.constraint_violation, judgement.limit_violation)
+    return f"came to rest where something does not hold: missed by {worst:.3g} m or rad"

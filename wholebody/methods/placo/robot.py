@@ -1,0 +1,184 @@
+"""A scene as placo sees it: a robot with a floating base, whose collision model holds the objects too.
+
+placo reads robots from URDF. What it reads here is a skeleton: links, the kinds and axes of joints, and a link for
+every frame that a task names. Placements, limits and inertias, which a URDF rounds, and the pieces are then copied from
+our model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError, MissingPackageError
+from wholebody.figures.figure import Figure
+from wholebody.problem import Problem
+
+Array = NDArray[np.float64]
+
+SWELL = 0.005
+"""Metres by which pieces are swollen beyond their clearance, and which placo's margin takes off again.
+
+placo takes the direction of a row from the two nearest points. Where pieces just touch these are one and it has none;
+swollen pieces overlap there instead.
+"""
+
+ENDLESS = 1e6  # rad, m: limit of a joint that has none
+BASE = "base"
+
+
+class Robot:
+    """placo's robot for the scene of a problem.
+
+    Attributes:
+        wrapper: the placo.RobotWrapper.
+        frames: the frames that tasks can name -> the index of the joint and the place in it.
+    """
+
+    def __init__(self, problem: Problem, frames: Mapping[str, tuple[int, pin.SE3]]) -> None:
+        """Build it.
+
+        Args:
+            problem: its scene, and the clearances of its pairs.
+            frames: names of the frames that tasks use -> joint of our model and placement in it.
+
+        Raises:
+            InputError: placo has no joint of a kind that the figure has.
+            MissingPackageError: placo is not installed.
+        """
+        try:
+            import placo
+        except ImportError:
+            raise MissingPackageError("placo is not installed; install it with: pip install placo") from None
+        figure = problem.scene.figure
+        self.frames, self._scene = dict(frames), problem.scene
+        text = ElementTree.tostring(_skeleton(figure, self.frames), encoding="unicode")
+        self.wrapper = placo.RobotWrapper("", placo.Flags.ignore_collisions, text)
+        self._copy_model(figure)
+        self._pieces = self._copy_pieces(problem)
+
+    @property
+    def floating(self) -> bool:
+        """Whether the figure moves its root too."""
+        return bool(self._scene.figure.root == "free")
+
+    def move(self, q: Array) -> None:
+        """Take our posture q (nq,), and the objects' present places."""
+        theirs = pin.neutral(self.wrapper.model)
+        theirs[self._idx_q] = q
+        self.wrapper.state.q = theirs
+        self.wrapper.update_kinematics()
+
+    def place_objects(self) -> None:
+        """Move the pieces to where the scene has them now."""
+        model, ours = self.wrapper.collision_model, self._scene.geometry
+        for index, number in enumerate(self._pieces):
+            model.geometryObjects[index].placement = ours.geometryObjects[number].placement
+
+    def displacement(self, theirs: Array) -> Array:
+        """Our displacement (nv,) from placo's."""
+        return np.asarray(theirs, dtype=float)[self._idx_v]
+
+    def joint_name(self, joint: int) -> str:
+        """Name in placo of a joint of our model."""
+        return f"j{joint:05d}"
+
+    def _joint(self, ours: int) -> int:
+        """Index of our joint in placo's model."""
+        if ours == 0:
+            return 0
+        root = self.floating and ours == 1
+        return 1 if root else int(self.wrapper.model.getJointId(self.joint_name(ours)))
+
+    def _copy_model(self, figure: Figure) -> None:
+        ours, theirs = figure.model, self.wrapper.model
+        idx_q, idx_v = np.zeros(ours.nq, dtype=np.intp), np.zeros(ours.nv, dtype=np.intp)
+        lower, upper = theirs.lowerPositionLimit.copy(), theirs.upperPositionLimit.copy()
+        for index in range(1, ours.njoints):
+            joint, other = ours.joints[index], theirs.joints[self._joint(index)]
+            idx_q[joint.idx_q : joint.idx_q + joint.nq] = np.arange(other.idx_q, other.idx_q + joint.nq)
+            idx_v[joint.idx_v : joint.idx_v + joint.nv] = np.arange(other.idx_v, other.idx_v + joint.nv)
+            theirs.jointPlacements[other.id] = ours.jointPlacements[index]
+            theirs.inertias[other.id] = ours.inertias[index]
+            if joint.nq == 1:
+                lower[other.idx_q] = max(ours.lowerPositionLimit[joint.idx_q], -ENDLESS)
+                upper[other.idx_q] = min(ours.upperPositionLimit[joint.idx_q], ENDLESS)
+        theirs.lowerPositionLimit, theirs.upperPositionLimit = lower, upper
+        self._idx_q, self._idx_v = idx_q, idx_v
+        for name, (_, placement) in self.frames.items():
+            theirs.frames[theirs.getFrameId(name)].placement = placement
+
+    def _copy_pieces(self, problem: Problem) -> list[int]:
+        """Add the pieces of all pairs; return the number of each one in our geometry model.
+
+        placo asks one margin of all pairs, a problem a clearance of each: so the first piece of a pair is swollen by
+        the clearance, once for every clearance that it has.
+        """
+        scene, model = problem.scene.geometry, self.wrapper.collision_model
+        numbers: list[int] = []
+        made: dict[tuple[int, float], int] = {}
+
+        def piece(number: int, radius: float) -> int:
+            if (number, radius) not in made:
+                ours = scene.geometryObjects[number]
+                shape = ours.geometry.clone()
+                shape.setSweptSphereRadius(ours.geometry.getSweptSphereRadius() + radius)
+                name = f"{ours.name} {radius!r}"
+                added = pin.GeometryObject(name, self._joint(ours.parentJoint), ours.placement, shape)
+                made[number, radius] = model.addGeometryObject(added)
+                numbers.append(number)
+            return made[number, radius]
+
+        for pair, clearance in zip(scene.collisionPairs, problem.clearances.tolist(), strict=True):
+            first, second = piece(pair.first, clearance + SWELL), piece(pair.second, 0.0)
+            model.addCollisionPair(pin.CollisionPair(first, second))
+        return numbers
+
+
+def _skeleton(figure: Figure, frames: Mapping[str, tuple[int, pin.SE3]]) -> ElementTree.Element:
+    """URDF of links and joints without places, and of a link for every frame."""
+    model = figure.model
+    robot = ElementTree.Element("robot", name="figure")
+    root = 1 if figure.root == "free" else 0
+    link = {0: BASE, root: BASE}
+    ElementTree.SubElement(robot, "link", name=BASE)
+    for index in range(root + 1, model.njoints):
+        link[index] = f"l{index:05d}"
+        ElementTree.SubElement(robot, "link", name=link[index])
+        kind, axis = _kind(model, index)
+        joint = _joint(robot, f"j{index:05d}", kind, link[int(model.parents[index])], link[index])
+        ElementTree.SubElement(joint, "axis", xyz=" ".join(repr(float(value)) for value in axis))
+        if kind != "continuous":
+            ElementTree.SubElement(joint, "limit", lower="-1", upper="1", effort="1", velocity="1")
+    for name, (carrier, _) in frames.items():
+        ElementTree.SubElement(robot, "link", name=name)
+        _joint(robot, f"to {name}", "fixed", link[carrier], name)
+    return robot
+
+
+def _joint(robot: ElementTree.Element, name: str, kind: str, parent: str, child: str) -> ElementTree.Element:
+    joint = ElementTree.SubElement(robot, "joint", name=name, type=kind)
+    ElementTree.SubElement(joint, "parent", link=parent)
+    ElementTree.SubElement(joint, "child", link=child)
+    return joint
+
+
+def _kind(model: Any, index: int) -> tuple[str, Array]:
+    """URDF's word for a joint, and its axis (3,)."""
+    joint = model.joints[index]
+    kinds = {("R", 1): "revolute", ("R", 2): "continuous", ("P", 1): "prismatic"}
+    kind = kinds.get((joint.shortname().removeprefix("JointModel")[0], joint.nq)) if joint.nv == 1 else None
+    if kind is None:
+        raise InputError(
+            f"method 'placo' cannot take joint {model.names[index]!r}, a {joint.shortname()}: its robots have turning "
+            "and sliding joints and one floating base; use method='qp'"
+        )
+    data = joint.createData()
+    joint.calc(data, pin.neutral(model))
+    motion = np.array(data.S).ravel()
+    return kind, motion[:3] if kind == "prismatic" else motion[3:]

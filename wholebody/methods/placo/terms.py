@@ -1,0 +1,239 @@
+"""A problem's terms as placo's tasks and constraints; what it has no class for is refused by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError
+from wholebody.methods.placo.robot import Robot
+from wholebody.problem import Problem
+from wholebody.tasks import (
+    Axis,
+    Balance,
+    CenterOfMass,
+    Displacement,
+    Effort,
+    Frame,
+    Freeze,
+    Hold,
+    Orientation,
+    Plane,
+    Point,
+    Posture,
+    Relative,
+    StepLimit,
+)
+from wholebody.tasks.inputs import Place
+from wholebody.tasks.residuals import PlacementResidual
+
+Array = NDArray[np.float64]
+Frames = dict[str, tuple[int, pin.SE3]]
+
+REASONS = {
+    "Axis": "placo aligns an axis with a direction, not with a place",
+    "Plane": "placo has no half-spaces for frames",
+    "ReachCones": "placo's cones are circular",
+}
+"""Why a term is refused where its class alone does not say it."""
+
+
+@dataclass
+class Tasks:
+    """What was added to a solver that changes while it runs.
+
+    Attributes:
+        comfort: the tasks that stand for the measures, with the share of the weight that each has.
+    """
+
+    comfort: list[tuple[Any, float]] = field(default_factory=list)
+
+    def weigh(self, weight: float) -> None:
+        """Give the measures a weight against the goals."""
+        for number, (task, share) in enumerate(self.comfort):
+            task.configure(f"measure {number}", "soft", weight * share)
+
+
+def check(problem: Problem) -> None:
+    """Refuse what placo has no class for.
+
+    Raises:
+        InputError: naming every term.
+    """
+    refused = []
+    for group, terms in (
+        ("goals", problem.goals),
+        ("constraints", problem.constraints),
+        ("constraints", problem.bounds),
+        ("measures", problem.measures),
+    ):
+        for number, term in enumerate(terms):
+            if not _takes(term):
+                kind = type(term).__name__
+                reason = f" ({REASONS[kind]})" if kind in REASONS else ""
+                refused.append(f"{group}[{number}], {kind}{reason}")
+    if refused:
+        raise InputError(f"method 'placo' cannot take {'; '.join(refused)}; leave them out or use method='qp'")
+
+
+def _takes(term: object) -> bool:
+    if isinstance(term, Axis):
+        return term.toward is None
+    if isinstance(term, Plane):
+        return term.side == "on"
+    kinds = (Point, Frame, Orientation, CenterOfMass, Posture, Relative, Hold, Balance, Freeze, StepLimit)
+    return isinstance(term, (*kinds, Effort, Displacement))
+
+
+def named_frames(problem: Problem) -> Frames:
+    """The frames that the tasks will name: joint and placement in it."""
+    found: Frames = {}
+    for term in (*problem.goals, *problem.constraints):
+        if isinstance(term, Point):
+            _add(found, problem, term._place, term._offset)
+        elif isinstance(term, (Axis, Plane)):
+            _add(found, problem, term._place)
+        elif isinstance(term, (Frame, Orientation, Relative, Hold)):
+            _add(found, problem, term._residual.place)
+            _add(found, problem, term._residual.base)
+    return found
+
+
+def _add(frames: Frames, problem: Problem, place: Place, offset: Array | None = None) -> None:
+    frame = problem.scene.model.frames[place.frame]
+    there = frame.placement if offset is None else frame.placement * pin.SE3(np.eye(3), offset)
+    frames[_name(place, offset)] = (place.joint, there)
+
+
+def _name(place: Place, offset: Array | None = None) -> str:
+    if offset is None or not offset.any():
+        return f"f{place.frame:05d}"
+    return f"f{place.frame:05d} at {' '.join(repr(value) for value in offset.tolist())}"
+
+
+def add_terms(solver: Any, robot: Robot, problem: Problem) -> Tasks:
+    """Give placo's solver the goals as soft tasks, what must hold as hard ones, and the measures."""
+    tasks = Tasks()
+    for number, goal in enumerate(problem.goals):
+        _goal(solver, robot, problem, f"goal {number}", goal)
+    for number, term in enumerate(problem.constraints):
+        _constraint(solver, f"constraint {number}", term)
+    for bound in problem.bounds:
+        if isinstance(bound, Freeze):  # a solve is not tied to time, so a step limit bounds nothing
+            _freeze(solver, robot, problem, bound)
+    if not robot.floating:
+        solver.mask_fbase(True)
+    for measure in problem.measures:
+        if isinstance(measure, (Effort, Displacement)):
+            _measure(solver, robot, problem, measure, tasks)
+    return tasks
+
+
+def _goal(solver: Any, robot: Robot, problem: Problem, name: str, goal: Any) -> None:
+    if isinstance(goal, Point):
+        task = solver.add_position_task(_name(goal._place, goal._offset), np.array(goal._target))
+        task.configure(name, "soft", goal.weight)
+    elif isinstance(goal, (Frame, Orientation, Relative)):
+        _placement(solver, name, goal._residual, "soft", goal.weight)
+    elif isinstance(goal, Axis):
+        task = solver.add_axisalign_task(_name(goal._place), np.array(goal._basis[2]), np.array(goal._wanted))
+        task.configure(name, "soft", goal.weight)
+    elif isinstance(goal, CenterOfMass):
+        task = solver.add_com_task(np.array((*goal._target, 0.0)[:3]))
+        task.mask.set_axises(goal.axes, "task")
+        task.configure(name, "soft", goal.weight)
+    elif isinstance(goal, Posture):
+        _posture(solver, robot, problem, name, goal)
+
+
+def _posture(solver: Any, robot: Robot, problem: Problem, name: str, goal: Posture) -> None:
+    figure, dofs = problem.scene.figure, set(np.asarray(goal._dofs).tolist())
+    values = _joint_values(robot, problem, goal._q, dofs)
+    if values:
+        task = solver.add_joints_task()
+        task.set_joints(values)
+        task.configure(name, "soft", goal.weight)
+    if robot.floating and 0 in dofs:
+        base = figure.model.jointPlacements[1] * pin.XYZQUATToSE3(goal._q[:7])
+        solver.add_frame_task("base", base.homogeneous).configure(f"{name}, root", "soft", goal.weight, goal.weight)
+
+
+def _constraint(solver: Any, name: str, term: Any) -> None:
+    if isinstance(term, Hold):
+        _placement(solver, name, term._residual, "hard", 1.0)
+    elif isinstance(term, Plane):
+        task = solver.add_position_task(_name(term._place), term._height * np.array(term._normal))
+        across = np.linalg.svd(term._normal[None])[2]  # rows: the normal, and two directions in the plane
+        task.mask.R_custom_world = np.array([across[1], across[2], term._normal])
+        task.mask.set_axises("z", "custom")
+        task.configure(name, "hard", 1.0)
+    elif isinstance(term, Balance):
+        corners = _corners(term._normals, term._offsets)
+        constraint = solver.add_com_polygon_constraint(list(corners[::-1]), term.margin)
+        constraint.configure(name, "hard", 1.0)
+
+
+def _placement(solver: Any, name: str, residual: PlacementResidual, priority: str, weight: float) -> None:
+    """The residual of one frame in another, or in the world."""
+    frame, target = _name(residual.place), pin.SE3(residual.undo.rotation.T, residual.target)
+    if residual.base.frame:
+        arguments: tuple[Any, ...] = (_name(residual.base), frame)
+        kind = "relative_"
+    else:
+        arguments, kind = (frame,), ""
+    if residual.position and residual.orientation:
+        task = getattr(solver, f"add_{kind}frame_task")(*arguments, target.homogeneous)
+        task.configure(name, priority, weight, weight)
+    elif residual.position:
+        getattr(solver, f"add_{kind}position_task")(*arguments, target.translation).configure(name, priority, weight)
+    else:
+        getattr(solver, f"add_{kind}orientation_task")(*arguments, target.rotation).configure(name, priority, weight)
+
+
+def _freeze(solver: Any, robot: Robot, problem: Problem, bound: Freeze) -> None:
+    figure = problem.scene.figure
+    for name in figure.joint_names(bound.joints):
+        joint = figure.joint_id(name)
+        if robot.floating and joint == 1:
+            solver.mask_fbase(True)
+        else:
+            solver.mask_dof(robot.joint_name(joint))
+
+
+def _measure(solver: Any, robot: Robot, problem: Problem, measure: Effort | Displacement, tasks: Tasks) -> None:
+    """Weighted squared distance from a posture: a joints task for every weight that occurs."""
+    weights = measure._distance.weights
+    for value in sorted(set(weights[weights > 0.0].tolist())):
+        values = _joint_values(robot, problem, measure._distance.reference, np.flatnonzero(weights == value).tolist())
+        if values:
+            task = solver.add_joints_task()
+            task.set_joints(values)
+            tasks.comfort.append((task, measure.weight * value / float(weights.max())))
+
+
+def _joint_values(robot: Robot, problem: Problem, q: Array, dofs: Iterable[int]) -> dict[str, float]:
+    """Joints with these degrees of freedom, by their names in placo -> their values in the posture q (nq,)."""
+    figure, chosen = problem.scene.figure, set(dofs)
+    values = figure.joint_values(q)
+    ids = {name: figure.joint_id(name) for name in values}
+    return {
+        robot.joint_name(ids[name]): value
+        for name, value in values.items()
+        if figure.model.joints[ids[name]].idx_v in chosen
+    }
+
+
+def _corners(normals: Array, offsets: Array) -> Array:
+    """Corners (k, 2) of a convex polygon, anticlockwise, from its edges."""
+    before = np.roll(normals, 1, axis=0), np.roll(offsets, 1)
+    return np.array(
+        [
+            np.linalg.solve(np.array([n0, n1]), np.array([o0, o1]))
+            for n0, n1, o0, o1 in zip(before[0], normals, before[1], offsets, strict=True)
+        ]
+    )
