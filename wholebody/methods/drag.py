@@ -132,7 +132,8 @@ def pull(
 ) -> tuple[Solution, ...]:
     """Pull a goal along a path, through evenly spaced intermediate goals.
 
-    Each is solved from the posture before; one whose posture lies beyond something in the way counts as not reached.
+    The first corner is gone to as `solve` would. Each goal after it is solved from the posture before; one whose posture
+    lies beyond something in the way counts as not reached.
 
     Args:
         problem: with the goal that moves, a `Point`.
@@ -154,9 +155,9 @@ def pull(
         raise InputError(f"pull moves a Point along a path, and goals[{goal}] is a {type(term).__name__}; use Drag")
     chosen = _chosen(method)
     own, q, found = own_copy(problem), problem.scene.figure.clamp(problem.start), []
-    for place in places:
+    for number, place in enumerate(places):
         retarget(own, goal, place)
-        found.append(_solve(own, q, chosen))
+        found.append(_solve(own, q, chosen) if number else _solve_freely(own, q, chosen))
         if not found[-1].solved:
             break
         q = found[-1].q
@@ -175,13 +176,16 @@ def _chosen(method: str | Method) -> Method:
     return chosen
 
 
+def _solve_freely(problem: Problem, q: Array, method: Method) -> Solution:
+    return method.follow(problem, q) if isinstance(method, Newton) else method.solve(_from(problem, q))
+
+
 def _solve(problem: Problem, q: Array, method: Method) -> Solution:
     """Solve from the posture q (nq,); it is kept where the way from it jumps over something."""
-    here = _from(problem, q)
-    solution = method.follow(problem, q) if isinstance(method, Newton) else method.solve(here)
+    solution = _solve_freely(problem, q, method)
     if not _jumps(problem, q, solution.q):
         return solution
-    judgement = assess(here, q)
+    judgement = assess(_from(problem, q), q)
     message = "the posture that was found lies beyond something in the way; the figure stays"
     return replace(solution, q=q, status="unreachable", assessment=judgement, message=message)
 
