@@ -132,8 +132,8 @@ def pull(
 ) -> tuple[Solution, ...]:
     """Pull a goal along a path, through evenly spaced intermediate goals.
 
-    The first corner is gone to as `solve` would. Each goal after it is solved from the posture before; one whose posture
-    lies beyond something in the way counts as not reached.
+    The first corner is gone to as `solve` would. Each goal after it is solved from the posture before; one whose
+    posture lies beyond something in the way counts as not reached.
 
     Args:
         problem: with the goal that moves, a `Point`.
