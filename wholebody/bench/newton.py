@@ -13,7 +13,8 @@ from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
-from wholebody.methods.newton.reaching import HARD_DAMPING, reach
+from wholebody.methods.newton.reaching import reach
+from wholebody.methods.newton.run import HARD_DAMPING
 
 SIZES = (10, 30, 100, 300, 1000)
 ALGEBRAS = ("normal", "llt", "kkt", "schur", "dense")

@@ -81,6 +81,10 @@ class FigureBodies:
         bound, sign = q[self._places].copy(), np.ones(len(part))
         return Angle(part.bodies, part.labels, part.forms, part.center, bound, sign), tangent
 
+    def angles_at(self, q: Array) -> Array:
+        """(k,) angles of the turning joints at the posture q (nq,)."""
+        return q[self._places]
+
     def aim(self, limits: Angle, q: Array) -> None:
         """Turn the rows of `limits` to the limits that are nearer at q (nq,)."""
         value = q[self._places[self._limited]]

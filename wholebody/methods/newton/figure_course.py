@@ -11,15 +11,13 @@ from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.keys import OBJECTIVE, Key
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
+from wholebody.methods.newton.objective import Objective
 from wholebody.methods.newton.system import System
 from wholebody.methods.newton.terms import constraint_equations, goal_equations
 from wholebody.problem import Problem
-from wholebody.tasks import Effort
 
 Array = NDArray[np.float64]
 
-STIFFNESS = 10.0  # m^2 a unit of effort [rad^2]: what bodies' motion counts against it; larger = nearer to least effort
-LEAST_STIFFNESS = 0.03  # units of effort that every joint has
 LONGEST = 0.08  # m: longest way of a body in a step where there are pairs that can touch; larger = faster, less seen
 HARD = Key("", False, False, 1.0)
 ONE_SIDED = Key("", False, True, 1.0)
@@ -52,26 +50,13 @@ class FigureCourse(Course):
         self._fixed += self.bodies.equations.batches(count)
         self._fixed += constraint_equations(problem).batches(count)
         self._goals = goal_equations(problem, problem.goals).batches(count)
-        self._stiffness = self._objective(problem)
+        self.objective = Objective(problem, self.bodies)
+        self._fixed.append((self.objective.rows, Key(OBJECTIVE, False, False, 1.0)))
         self.q = self._left = problem.start
         self.structures = 0
         self._ordered = np.zeros(0)
         self._laid: tuple[object, ...] = ()
         self.arrive(self.variables(problem.start))
-
-    def _objective(self, problem: Problem) -> Array:
-        """Joint angles that measures ask to be near others, and their factors; how far the joints move otherwise."""
-        nv = self.bodies.model.nv
-        weight, target = np.zeros(nv), problem.start
-        self.reported = []
-        for term in problem.measures:
-            if isinstance(term, Effort):
-                weight = weight + term.weight * problem.scene.figure.effort_weights
-            else:
-                self.reported.append(type(term).__name__)
-        self.angles, tangent = self.bodies.distance(target)
-        self._fixed.append((self.angles, Key(OBJECTIVE, False, False, 1.0)))
-        return STIFFNESS * np.maximum(weight[tangent], LEAST_STIFFNESS)
 
     def variables(self, q: Array) -> Array:
         """The bodies at the posture q (nq,)."""
@@ -80,10 +65,6 @@ class FigureCourse(Course):
     def retarget(self) -> None:
         """Take the problem's new goals."""
         self._goals = goal_equations(self.problem, self.problem.goals).batches(self.bodies.count)
-
-    def anchor(self, q: Array) -> None:
-        """Take the posture q (nq,) for what the effort is counted from: the last state of a drag."""
-        self.angles.bound = self.bodies.distance(q)[0].bound
 
     def retract(self, x: Array) -> Array:
         """The bodies of the nearest posture."""
@@ -107,6 +88,7 @@ class FigureCourse(Course):
             x = self.retract(x)
         self._left = self.q
         self.bodies.aim(self._limits, self.q)
+        self.objective.renew(self.q)
         batches = [*self._fixed, *self._goals]
         pairs: bytes = b""
         if self.contacts is not None:
@@ -117,11 +99,13 @@ class FigureCourse(Course):
             if len(rows):
                 batches.append((rows, ONE_SIDED))
         laid = (pairs, *((type(batch), batch.size, batch.bodies.tobytes(), key) for batch, key in self._goals))
-        if laid != self._laid:
+        changed = laid != self._laid
+        if changed:
             self._laid = laid
-            self.system = System(self.bodies.count, batches, self.bodies.weight, self._stiffness)
+            self.system = System(self.bodies.count, batches, self.bodies.weight)
             self.algebra = linear_algebra(self.system.pattern, self._name)
             self.structures += 1
-            return True
-        self.system.batches = [batch for batch, _ in batches if len(batch)]
-        return False
+        else:
+            self.system.batches = [batch for batch, _ in batches if len(batch)]
+        self.objective.enter(self.system)
+        return changed

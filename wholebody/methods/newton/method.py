@@ -9,18 +9,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.linear_algebra.base import Pattern
 from wholebody.methods.newton.linear_algebra.choice import NAMES
-from wholebody.methods.newton.reaching import Reached, reach
+from wholebody.methods.newton.reaching import reach
+from wholebody.methods.newton.search import SHARPER, Found, Search, Settings
 from wholebody.problem import Iterate, Problem, Solution, Status
 
 Array = NDArray[np.float64]
-
-SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessment adds the rows of a goal up
 
 FRAME_TOLERANCE = 1e-4  # m, rad: on the way of a drag; its end is solved to the method's own
 FRAME_ITERATIONS = 12  # most of one frame; a goal that asks for more is followed over the next frames
@@ -56,12 +54,16 @@ class Newton:
         iterations: most Newton iterations.
         algebra: "auto", "normal", "llt", "kkt", "schur", "dense" or "svd".
         inequalities: "slack" (squared slacks) or "barrier" (logarithmic).
+        restarts: most seeded starts that are tried where the straight way does not serve.
+        seed: of the restarts.
     """
 
     tolerance: float = 1e-5
     iterations: int = 200
     algebra: str = "auto"
     inequalities: Kind = "slack"
+    restarts: int = 6
+    seed: int = 0
     _course: FigureCourse | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -73,8 +75,8 @@ class Newton:
         """
         if not 1e-10 <= self.tolerance <= 0.1:
             raise InputError(f"tolerance is {self.tolerance}; give metres from 1e-10 to 0.1")
-        if self.iterations < 1:
-            raise InputError(f"iterations is {self.iterations}; give 1 or more")
+        if self.iterations < 1 or self.restarts < 0:
+            raise InputError(f"iterations {self.iterations} and restarts {self.restarts}; give at least 1 and 0")
         if self.algebra not in NAMES:
             raise UnknownNameError("linear algebra", self.algebra, NAMES)
         if self.inequalities not in ("slack", "barrier"):
@@ -91,36 +93,22 @@ class Newton:
         Raises:
             InputError: the problem has a term that this method has no equations for.
         """
-        return self.follow(problem, problem.scene.figure.clamp(problem.start))
+        began = time.perf_counter()
+        search = Search(self._prepared(problem), self._settings())
+        found = search.everywhere(problem.scene.figure.clamp(problem.start))
+        return self._answer(search, found, began)
 
     def follow(self, problem: Problem, q: Array) -> Solution:
-        """The same from the posture q (nq,), for goals that move from call to call: what was laid out is kept.
+        """The straight way from the posture q (nq,), for goals that move from call to call.
+
+        What was laid out is kept, and no other starts are tried.
 
         Raises:
             InputError: the problem has a term that this method has no equations for.
         """
         began = time.perf_counter()
-        course = self._prepared(problem)
-        found = reach(
-            course,
-            course.variables(q),
-            tolerance=SHARPER * self.tolerance,
-            iterations=self.iterations,
-            kind=self.inequalities,
-        )
-        q = course.bodies.posture(found.x)
-        judgement = assess(problem, q)
-        status = _status(found, judgement, self.tolerance)
-        return Solution(
-            q=q,
-            status=status,
-            seconds=time.perf_counter() - began,
-            iterations=found.iterations,
-            assessment=judgement,
-            trace=tuple(Iterate(error, 0.0, 0.0, 0.0) for error in found.residuals),
-            method=f"newton/{course.algebra.name}",
-            message=_message(status, judgement, found, course) + _reported(course),
-        )
+        search = Search(self._prepared(problem), self._settings())
+        return self._answer(search, search.from_here(q), began)
 
     def step(self, problem: Problem, q: Array, tolerance: float = FRAME_TOLERANCE) -> NewtonStep:
         """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
@@ -131,11 +119,12 @@ class Newton:
             InputError: the problem has a term that this method has no equations for.
         """
         course = self._prepared(problem)
-        course.anchor(q)
+        course.objective.anchor(q)
         found = reach(
             course,
             course.variables(q),
-            tolerance=tolerance,
+            tolerance=SHARPER * self.tolerance,
+            goal_tolerance=tolerance,
             iterations=FRAME_ITERATIONS,
             kind=self.inequalities,
         )
@@ -151,6 +140,9 @@ class Newton:
             raise InputError("nothing has been solved yet; call solve(problem) first")
         return self._course.system.pattern
 
+    def _settings(self) -> Settings:
+        return Settings(self.tolerance, self.iterations, self.restarts, self.seed, self.inequalities)
+
     def _prepared(self, problem: Problem) -> FigureCourse:
         """The equations of the problem with its present goals; laid out anew where they are others."""
         problem.check_fresh()
@@ -158,34 +150,58 @@ class Newton:
         if course is None or course.problem is not problem:
             course = self._course = FigureCourse(problem, self.algebra)
         course.retarget()
-        course.anchor(problem.start)
+        course.objective.follow()
         return course
 
+    def _answer(self, search: Search, found: Found, began: float) -> Solution:
+        course, judgement = search.course, found.judgement
+        status = _status(found, search.settings)
+        return Solution(
+            q=found.q,
+            status=status,
+            seconds=time.perf_counter() - began,
+            iterations=search.iterations,
+            assessment=judgement,
+            trace=tuple(Iterate(error, 0.0, 0.0, 0.0) for error in search.residuals),
+            method=f"newton/{course.algebra.name}",
+            message=_message(status, found, search) + _reported(course),
+        )
 
-def _status(found: Reached, judgement: Assessment, tolerance: float) -> Status:
-    # the assessment measures with other arithmetic (coal's tolerance is 1e-6 m), so it may find a little more
-    slack = 1.05 * tolerance + 1e-6
-    if not judgement.holds(slack):
-        return "infeasible" if found.stationary else "stalled"
-    if judgement.met(slack):
+
+def _status(found: Found, settings: Settings) -> Status:
+    if not found.judgement.holds(settings.counted):
+        return "infeasible" if found.reached.stationary else "stalled"
+    if found.judgement.met(settings.counted):
         return "solved"
-    return "unreachable" if found.stationary else "stalled"
+    return "unreachable" if found.reached.stationary else "stalled"
 
 
-def _message(status: Status, judgement: Assessment, found: Reached, course: FigureCourse) -> str:
+def _message(status: Status, found: Found, search: Search) -> str:
+    judgement = found.judgement
     left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
     if status == "solved":
-        return f"solved in {found.iterations} iterations"
+        return f"solved in {search.iterations} iterations{found.how}"
     if status == "unreachable":
         return f"not reachable from here: nothing is violated, {left}"
-    if status == "stalled":
+    if judgement.holds(search.settings.counted):
         return f"ran out of iterations: {left}"
-    residual = np.abs(np.where(course.system.inequality, np.minimum(course.system.residual(found.x), 0.0), 0.0))
-    residual = np.where(course.system.inequality, residual, np.abs(course.system.residual(found.x)))
-    worst = int(np.where(course.system.goal, 0.0, residual).argmax())
-    return f"what must hold cannot all hold: {course.system.label(worst)} is missed by {residual[worst]:.3g} m or rad"
+    name, missed = _worst(search.course.problem, found)
+    why = "what must hold cannot all hold" if status == "infeasible" else "ran out of iterations"
+    return f"{why}: {name} is missed by {missed:.3g} m or rad"
+
+
+def _worst(problem: Problem, found: Found) -> tuple[str, float]:
+    """What is farthest from holding, and by how much."""
+    state = problem.scene.state(found.q)
+    worst = ("the clearance of a pair", max(found.judgement.clearance_lack, found.judgement.penetration))
+    for number, term in enumerate(problem.constraints):
+        value = np.atleast_1d(term.value(state))
+        missed = float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0))
+        if missed > worst[1]:
+            worst = (f"constraints[{number}], {type(term).__name__}", missed)
+    return worst
 
 
 def _reported(course: FigureCourse) -> str:
-    names = ", ".join(course.reported)
+    names = ", ".join(course.objective.reported)
     return f"; {names} is reported, not minimised" if names else ""

@@ -27,20 +27,17 @@ class System:
         inequality: (m,) rows that are to be at least zero.
         share: (m,) root of each goal's weight, as a share of the greatest; 1 for what must hold.
         objective: (m,) rows whose squares are to be small, the pluggable part of the objective.
-        stiffness: (m,) their factors.
+        stiffness: (m,) their factors, 1 until others are written into it.
         weight: (7 n,) weight of each variable in the least motion.
     """
 
-    def __init__(
-        self, count: int, batches: Sequence[tuple[Batch, Key]], weight: Array, stiffness: Array | None = None
-    ) -> None:
+    def __init__(self, count: int, batches: Sequence[tuple[Batch, Key]], weight: Array) -> None:
         """Lay out rows and pattern.
 
         Args:
             count: bodies, without the world.
             batches: equations; those without members are left out.
             weight: (7 count,).
-            stiffness: (k,) factors of the rows of batches of the kind "objective", in their order.
         """
         keys = [key for batch, key in batches if len(batch)]
         self.count = count
@@ -53,8 +50,6 @@ class System:
         self.inequality = np.repeat([key.one_sided for key in keys], sizes).astype(bool)
         self.objective = np.repeat([key.kind == OBJECTIVE for key in keys], sizes).astype(bool)
         self.stiffness = np.ones(len(self.objective))
-        if stiffness is not None:
-            self.stiffness[self.objective] = stiffness
         weights = np.repeat([key.weight if key.goal else 0.0 for key in keys], sizes)
         self.share = np.where(self.goal, np.sqrt(weights / weights.max(initial=1e-300)), 1.0)
         rows, columns = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
@@ -68,7 +63,7 @@ class System:
             rows.append(np.broadcast_to(row, mask.shape)[mask])
             columns.append(np.broadcast_to(column[:, None, :], mask.shape)[mask])
         self.pattern = Pattern(np.concatenate(rows), np.concatenate(columns), int(self.starts[-1]), 7 * count)
-        self._curvature_places = self._lay_curvature()
+        self._curvature_places: tuple[Indices, Indices, list[Indices]] | None = None
 
     def bodies(self, x: Array) -> Array:
         """The variables (7 n,) as bodies (n + 1, 7), the world last."""
@@ -90,6 +85,8 @@ class System:
     def curvature(self, x: Array, force: Array) -> tuple[Indices, Indices, Array]:
         """Second derivative of force (m,) times residual: rows, columns and values, to be summed where they repeat."""
         bodies = self.bodies(x)
+        if self._curvature_places is None:
+            self._curvature_places = self._lay_curvature()
         rows, columns, keeps = self._curvature_places
         values = [np.zeros(0)]
         for batch, start, stop, keep in zip(self.batches, self.starts, self.starts[1:], keeps, strict=False):

@@ -1,0 +1,74 @@
+"""The measures as rows of joint angles whose squares are to be small.
+
+A measure f with gradient g and diagonal second derivative h at angles theta is, to second order, a sum of squares of
+angles from theta - g / h, with the factors h / 2. For `Effort` and `Displacement` that is exact.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.system import System
+from wholebody.problem import Problem
+from wholebody.tasks import Discomfort, Displacement, Effort
+
+Array = NDArray[np.float64]
+
+CAN = (Effort, Displacement, Discomfort)
+STIFFNESS = 10.0  # m^2 a unit of effort [rad^2]: what bodies' motion counts against it; larger = nearer to least effort
+LEAST_STIFFNESS = 0.03  # rad^-2: half of the least second derivative that a joint counts as having
+
+
+class Objective:
+    """Rows for the measures of a problem.
+
+    Attributes:
+        rows: the joints' angles, each from where the measures ask it to be.
+        minimised: the measures in it.
+        reported: names of the others.
+    """
+
+    def __init__(self, problem: Problem, bodies: FigureBodies) -> None:
+        """Lay the rows out for the figure's turning joints."""
+        self._scene, self._bodies = problem.scene, bodies
+        self.minimised = [term for term in problem.measures if isinstance(term, CAN)]
+        self.reported = [type(term).__name__ for term in problem.measures if not isinstance(term, CAN)]
+        self.rows, self._tangent = bodies.distance(problem.start)
+        self._follows = True
+        self.stiffness = np.full(len(self.rows), STIFFNESS * LEAST_STIFFNESS)
+
+    def value(self, x: Array) -> float:
+        """The minimised measures at the bodies x (7 n,)."""
+        state = self._scene.state(self._bodies.posture(x))
+        return sum(term.weight * term.value(state) for term in self.minimised)
+
+    def anchor(self, q: Array) -> None:
+        """Count from the posture q (nq,) from now on, by the measures' second derivatives: the last state of a drag."""
+        self._model_at(q)
+        self.rows.bound = self._bodies.angles_at(q)
+        self._follows = False
+
+    def follow(self) -> None:
+        """Model the measures anew wherever the figure is."""
+        self._follows = True
+
+    def renew(self, q: Array) -> None:
+        """Model the measures at the posture q (nq,), unless they are counted from another."""
+        if self._follows:
+            self._model_at(q)
+
+    def enter(self, system: System) -> None:
+        """Put the present factors into a system."""
+        system.stiffness[system.objective] = self.stiffness
+
+    def _model_at(self, q: Array) -> None:
+        state = self._scene.state(q)
+        gradient, curvature = np.zeros(state.model.nv), np.zeros(state.model.nv)
+        for term in self.minimised:
+            gradient += term.weight * term.gradient(state)
+            curvature += term.weight * term.curvature(state)
+        half = np.maximum(0.5 * curvature[self._tangent], LEAST_STIFFNESS)
+        self.rows.bound = self._bodies.angles_at(q) - 0.5 * gradient[self._tangent] / half
+        self.stiffness = STIFFNESS * half

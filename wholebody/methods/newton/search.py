@@ -1,0 +1,143 @@
+"""The ways that are tried for one problem: straight from the start, from bent limbs, from other postures.
+
+They are bounded by counts of iterations and not by seconds, so that the answer does not depend on the machine's load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.assessment import Assessment, assess
+from wholebody.methods.newton.figure_course import FigureCourse
+from wholebody.methods.newton.inequalities import Kind
+from wholebody.methods.newton.polishing import polish
+from wholebody.methods.newton.reaching import Reached, reach
+from wholebody.methods.starts import bent, restarts
+
+Array = NDArray[np.float64]
+
+SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessment adds the rows of a goal up
+SLACK = 1.05  # times the tolerance: an assessment measures with other arithmetic, and coal's own accuracy is 1e-6 m
+COAL_ACCURACY = 1e-6  # m
+TRIAL = 60  # iterations that another start is given to come nearer than the best so far
+ALIKE = 1e-5  # share of a goal's error by which two ends may differ and count as equally near
+
+
+class Settings(NamedTuple):
+    """What a search is bounded by; see `Newton`."""
+
+    tolerance: float
+    iterations: int
+    restarts: int
+    seed: int
+    inequalities: Kind
+
+    @property
+    def counted(self) -> float:
+        """Error below which an assessment counts as good."""
+        return SLACK * self.tolerance + COAL_ACCURACY
+
+
+class Found(NamedTuple):
+    """Where one way ended.
+
+    Attributes:
+        q: (nq,) the posture.
+        judgement: its assessment.
+        reached: how the iteration ended.
+        how: from where it came, in words.
+    """
+
+    q: Array
+    judgement: Assessment
+    reached: Reached
+    how: str
+
+
+class Search:
+    """All ways for one problem, remembering the best end."""
+
+    def __init__(self, course: FigureCourse, settings: Settings) -> None:
+        """Set up for the problem of a course."""
+        self.course, self.settings = course, settings
+        self.iterations = 0
+        self.residuals: list[float] = []
+
+    def from_here(self, q: Array) -> Found:
+        """The end of the straight way from a posture (nq,)."""
+        return self._go(q, "", self.settings.iterations)
+
+    def everywhere(self, q: Array) -> Found:
+        """The best end of all ways, the measures brought to their least there if it serves."""
+        best = self.from_here(q)
+        if not self._serves(best):
+            for start, how in self._starts(q):
+                found = self._go(start, how, min(TRIAL, self.settings.iterations))
+                if self._better(found, best) and not found.reached.stationary and not self._serves(found):
+                    found = self._go(found.q, how, self.settings.iterations)
+                if self._better(found, best):
+                    best = found
+                if self._serves(best):
+                    break
+        if self._serves(best) and self.course.objective.minimised:
+            best = self._polished(best)
+        return best
+
+    def _starts(self, q: Array) -> Iterator[tuple[Array, str]]:
+        problem = self.course.problem
+        start = bent(problem, q)
+        if start is not None:
+            yield start, " from a start with bent joints"
+        rng = np.random.default_rng(self.settings.seed)
+        for start in restarts(problem, q, rng, self.settings.restarts):
+            yield start, " from another start"
+
+    def _go(self, q: Array, how: str, iterations: int) -> Found:
+        course, settings = self.course, self.settings
+        reached = reach(
+            course,
+            course.variables(q),
+            tolerance=SHARPER * settings.tolerance,
+            iterations=iterations,
+            kind=settings.inequalities,
+        )
+        self.iterations += reached.iterations
+        self.residuals += reached.residuals
+        return self._judged(reached, how)
+
+    def _polished(self, found: Found) -> Found:
+        """The same with lower measures, if they can be lowered."""
+        course, tolerance = self.course, self.settings.tolerance
+        x, spent = polish(course, found.reached.x, course.objective.value, tolerance=tolerance)
+        self.iterations += spent
+        lower = self._judged(found.reached._replace(x=x), found.how)
+        return lower if self._serves(lower) and self._better(lower, found) else found
+
+    def _judged(self, reached: Reached, how: str) -> Found:
+        q = self.course.bodies.posture(reached.x)
+        return Found(q, assess(self.course.problem, q), reached, how)
+
+    def _serves(self, found: Found) -> bool:
+        return found.judgement.holds(self.settings.counted) and found.judgement.met(self.settings.counted)
+
+    def _better(self, one: Found, other: Found) -> bool:
+        """Whether one end is better: in what must hold, then in the goals, then in the measures."""
+        enough = self.settings.counted
+        for left, right in ((_broken(one), _broken(other)), (_missed(one), _missed(other))):
+            left, right = max(left, enough), max(right, enough)
+            if abs(left - right) > max(enough, ALIKE * min(left, right)):
+                return left < right
+        return one.judgement.measure < other.judgement.measure
+
+
+def _broken(found: Found) -> float:
+    judged = found.judgement
+    return max(judged.limit_violation, judged.constraint_violation, judged.clearance_lack, judged.penetration)
+
+
+def _missed(found: Found) -> float:
+    return float(np.linalg.norm(found.judgement.goal_errors))
