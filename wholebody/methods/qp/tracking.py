@@ -116,7 +116,8 @@ class Tracker:
         Returns:
             The displacement (nv,) and its share.
         """
-        short = self._shortfall(at, displacement)
+        began = np.minimum(at.contacts.distance, at.clearance[: len(at.contacts.distance)])
+        short = self._shortfall(at, displacement, np.maximum(began, self._foreseen(at, rows, displacement)))
         if short.max(initial=0.0) <= UNSEEN:
             return displacement, share
         groups = np.zeros(rows.groups)
@@ -127,19 +128,26 @@ class Tracker:
         share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
         displacement = share * again.x
         for _ in range(CUTS):
-            if self._shortfall(at, displacement).max(initial=0.0) <= UNSEEN:
+            if self._shortfall(at, displacement, began).max(initial=0.0) <= UNSEEN:
                 return displacement, share
             displacement, share = 0.5 * displacement, 0.5 * share
         return 0.0 * displacement, 0.0
 
-    def _shortfall(self, at: Linearisation, displacement: Array) -> Array:
-        """By how much each contact (k,) is nearer after a displacement (nv,) than it was and than is asked."""
-        scene, count = self.problem.scene, len(at.contacts.distance)
+    def _foreseen(self, at: Linearisation, rows: Rows, displacement: Array) -> Array:
+        """Distance (k,) that each contact has after a displacement (nv,) as its rows have it, at most what is asked."""
+        lack = np.zeros(rows.groups)
+        np.maximum.at(lack, rows.group, rows.lack - rows.elastic @ displacement)
+        count = len(at.contacts.distance)
+        foreseen: Array = at.clearance[:count] - lack[rows.groups - count :]
+        return foreseen
+
+    def _shortfall(self, at: Linearisation, displacement: Array, kept: Array) -> Array:
+        """By how much each contact (k,) is nearer after a displacement (nv,) than the distances (k,) it should keep."""
+        scene = self.problem.scene
         state = self._lineariser.state.update(pin.integrate(scene.model, at.q, displacement))
         near = scene.proximity.near(state.data, float(at.clearance.max(initial=0.0)) + UNSEEN)
         after = np.full(len(scene.proximity.pairs), np.inf)
         after[near.number] = near.distance
-        kept = np.minimum(at.contacts.distance, at.clearance[:count])
         short: Array = np.maximum(kept - after[at.contacts.number], 0.0)
         return short
 
