@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -119,6 +120,33 @@ def test_mujoco_has_the_same_human(short_free: Track) -> None:
 
 
 def test_mjcf_refuses_what_it_does_not_know() -> None:
-    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
-    with pytest.raises(InputError, match="floor"):
+    scene = wb.Scene(wb.load("human")).add(wb.Ellipsoid((0.1, 0.2, 0.3)), name="egg")
+    with pytest.raises(InputError, match="egg"):
         mjcf(scene)
+
+
+def test_mujoco_has_the_same_arm_and_floor(root: Path) -> None:
+    """A joint that turns for ever, limits and a half-space that leans, by another engine."""
+    mujoco = pytest.importorskip("mujoco")
+    figure = wb.load(root / "tests/data/arm/arm.urdf")
+    lean = pin.SE3(pin.utils.rotate("x", 0.4), np.array([0.0, 0.0, -0.6]))
+    scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor", at=lean)
+    tip = figure.model.names[-1]
+    model = mujoco.MjModel.from_xml_string(mjcf(scene, [tip]))
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(2)
+    for _ in range(4):
+        q = figure.clamp(pin.integrate(figure.model, figure.neutral, rng.normal(size=figure.model.nv)))
+        for name, value in figure.joint_values(q).items():
+            data.qpos[model.joint(name).qposadr[0]] = value
+        mujoco.mj_forward(model, data)
+        place = scene.state(q).frame(figure.frame_id(tip)).translation
+        assert np.allclose(data.site(tip).xpos, place, atol=1e-9)
+        near = scene.contacts(q, within=5.0)
+        names = scene.piece_names
+        for (first, second), distance in zip(near.pair, near.distance, strict=True):
+            if "floor:0" in (names[first], names[second]) and distance > 1e-3:
+                theirs = mujoco.mj_geomDistance(
+                    model, data, model.geom(names[first]).id, model.geom(names[second]).id, 6.0, None
+                )
+                assert theirs == pytest.approx(distance, abs=1e-5)

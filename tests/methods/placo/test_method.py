@@ -72,7 +72,9 @@ def test_every_term_that_it_takes_means_what_ours_means(human: wb.Figure) -> Non
             wb.Relative("left_hand", "thorax", thorax.actInv(hand)),
             wb.Orientation("thorax", thorax.rotation),
         ],
-        constraints=[*feet(), wb.Balance(margin=0.01), wb.Plane("pelvis", (0.0, 1.0, 0.3)), wb.Freeze("right_hip_rotation")],
+        constraints=[
+            *feet(), wb.Balance(margin=0.01), wb.Plane("pelvis", (0.0, 1.0, 0.3)), wb.Freeze("right_hip_rotation"),
+        ],
         measures=[wb.Effort(), wb.Displacement(0.1)],
     )  # fmt: skip
     solution = wb.Placo().solve(problem)

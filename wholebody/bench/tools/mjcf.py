@@ -23,7 +23,7 @@ def mjcf(scene: Scene, frames: Sequence[str] = ()) -> str:
     without mass get a millionth of a kilogram, because MuJoCo refuses none; kinematics do not see it.
 
     Args:
-        scene: a figure with a free root and revolute joints, and things.
+        scene: a figure with turning and sliding joints, on a free root or fixed, and things.
         frames: names of the frames that become sites.
 
     Raises:
@@ -60,16 +60,27 @@ def _body(model: Any, index: int, parent: ElementTree.Element) -> ElementTree.El
         ElementTree.SubElement(body, "inertial", pos="0 0 0", mass="1e-6", diaginertia="1e-9 1e-9 1e-9")
     if joint.nq == 7:
         ElementTree.SubElement(body, "freejoint", name=name)
-    elif joint.nq == 1 and joint.shortname().startswith("JointModelR"):
-        # the axis is what the joint's own motion turns about
-        data = joint.createData()
-        joint.calc(data, pin.neutral(model))
-        axis = np.array(data.S)[3:].ravel()
-        limits = (model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q])
-        ElementTree.SubElement(body, "joint", name=name, axis=_text(axis), range=_text(limits))
+    elif joint.nv == 1 and joint.shortname().startswith(("JointModelR", "JointModelP")):
+        ElementTree.SubElement(body, "joint", {"name": name} | _motion(model, joint))
     else:
-        raise InputError(f"joint {name!r} is a {joint.shortname()}; MJCF is written for free roots and revolute joints")
+        raise InputError(
+            f"joint {name!r} is a {joint.shortname()}; MJCF is written for free roots, turning and sliding joints"
+        )
     return body
+
+
+def _motion(model: Any, joint: Any) -> dict[str, str]:
+    """Kind, axis and limits of a joint of one degree of freedom."""
+    data = joint.createData()
+    joint.calc(data, pin.neutral(model))
+    motion = np.array(data.S).ravel()  # what the joint's own motion slides along and turns about
+    slides = joint.shortname().startswith("JointModelP")
+    attributes = {"type": "slide" if slides else "hinge", "axis": _text(motion[:3] if slides else motion[3:])}
+    if joint.nq == 1:
+        limits = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+        if np.isfinite(limits).all():
+            attributes["range"] = _text(limits)
+    return attributes
 
 
 def _geom(piece: Any, body: ElementTree.Element, assets: ElementTree.Element) -> None:
@@ -85,11 +96,21 @@ def _geom(piece: Any, body: ElementTree.Element, assets: ElementTree.Element) ->
         points = np.array([shape.point(k) for k in range(shape.num_points)])
         ElementTree.SubElement(assets, "mesh", name=piece.name, vertex=_text(points.ravel()))
         attributes |= {"type": "mesh", "mesh": piece.name}
+    elif isinstance(shape, coal.Halfspace):
+        attributes |= {"type": "plane", "size": "0 0 1"} | _place(piece.placement * _surface(shape))
     else:
         raise InputError(
-            f"{piece.name!r} is a {type(shape).__name__}; MJCF is written for spheres, capsules, boxes, hulls"
+            f"{piece.name!r} is a {type(shape).__name__}; MJCF is written for spheres, capsules, boxes, hulls and "
+            "half-spaces"
         )
     ElementTree.SubElement(body, "geom", attributes)
+
+
+def _surface(shape: Any) -> Any:
+    """Placement of the surface of a half-space n . x <= d: z along n, the origin at d n."""
+    normal = np.array(shape.n)
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal)
+    return pin.SE3(turn.matrix(), shape.d * normal)
 
 
 def _place(placement: Any) -> dict[str, str]:
