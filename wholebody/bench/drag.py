@@ -20,8 +20,8 @@ COLORS = {"newton": "#d55e00", "qp": "#0072b2", "ccd": "#009e73"}
 
 COLUMNS = (
     "task", "method", "frames", "frame ms, mean", "p95", "max", "CPU mean", "iterations/frame",
-    "left to the goal mm, mean", "max", "at the end", "deepest in a frame mm", "between frames mm", "beyond limits rad", "holds off mm",
-    "jerk, median", "end",
+    "left to the goal mm, mean", "max", "at the end", "deepest in a frame mm", "between frames mm",
+    "beyond limits rad", "holds off mm", "jerk, median", "end",
 )  # fmt: skip
 
 
@@ -79,10 +79,10 @@ class DragRow:
         """The row as text, in the order of `COLUMNS`."""
         between = f"{self.between_mm:.2g}" if np.isfinite(self.between_mm) else "passes"
         return (
-            self.task, self.method, str(self.frames), f"{self.mean_ms:.2f}", f"{self.p95_ms:.2f}", f"{self.max_ms:.1f}",
-            f"{self.cpu_mean_ms:.2f}", f"{self.iterations:.1f}", f"{self.error_mean_mm:.3f}",
-            f"{self.error_max_mm:.2f}", f"{self.end_error_mm:.1e}", f"{self.depth_mm:.4f}", between, f"{self.limit_rad:.0e}", f"{self.hold_mm:.3f}",
-            f"{self.jerk:.0f}", self.status,
+            self.task, self.method, str(self.frames), f"{self.mean_ms:.2f}", f"{self.p95_ms:.2f}",
+            f"{self.max_ms:.1f}", f"{self.cpu_mean_ms:.2f}", f"{self.iterations:.1f}", f"{self.error_mean_mm:.3f}",
+            f"{self.error_max_mm:.2f}", f"{self.end_error_mm:.1e}", f"{self.depth_mm:.4f}", between,
+            f"{self.limit_rad:.0e}", f"{self.hold_mm:.3f}", f"{self.jerk:.2g}", self.status,
         )  # fmt: skip
 
 
@@ -134,9 +134,10 @@ def drag_report(rows: Sequence[DragRow], facts: Mapping[str, str]) -> str:
         [
             markdown(COLUMNS, [row.cells for row in rows]),
             "Left to the goal is the distance of what is dragged to where the goal is in that frame (its angle, in "
-            "mrad, where that is more). Depths are found by coal over every pair of pieces; between frames stands a bound, found by a continuous sweep, on how much "
-            "deeper any pair gets on the way than at its deeper end. Jerk is the third difference of the joint angles, "
-            "rad/s³. CPU is the time that the processor worked on a frame. Holds are in mm or mrad.",
+            "mrad, where that is more). Depths are found by coal over every pair of pieces; between frames stands a "
+            "bound, found by a continuous sweep, on how much deeper any pair gets on the way than at its deeper end. "
+            "Jerk is the third difference of the joint angles, rad/s³; CPU is the time that the processor worked on a "
+            "frame; holds are in mm or mrad.",
             sentence(facts),
         ]
     )
