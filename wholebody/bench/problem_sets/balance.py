@@ -56,7 +56,6 @@ def make(number: int, seed: int) -> Case:
         start,
         goals=[wb.Point(goal.frame, place_of(figure, witness, goal.frame).translation) for goal in goals],
         constraints=[*held_feet(), wb.Balance(margin=MARGIN)],
-        measures=[wb.Effort()],
         clearance=CLEARANCE,
     )
     return Case(NAME, number, problem, witness)

@@ -40,7 +40,6 @@ def reach_among(figure: wb.Figure, tip: str, rng: np.random.Generator) -> tuple[
         start,
         goals=[wb.Point(tip, place_of(figure, witness, tip).translation)],
         constraints=held_feet(),
-        measures=[wb.Effort()],
         clearance=CLEARANCE,
     )
     return problem, witness

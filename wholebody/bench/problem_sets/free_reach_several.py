@@ -36,7 +36,6 @@ def make(number: int, seed: int) -> Case:
         start,
         goals=goals[number % len(goals)],
         constraints=held_feet(),
-        measures=[wb.Effort()],
         clearance=CLEARANCE,
     )
     return Case(NAME, number, problem, witness)
