@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf
 
 from wholebody.bench.entrants.base import Budget
 
@@ -102,11 +102,6 @@ class Record:
     def false_claim(self) -> bool:
         """Whether the method calls solved what is judged to be off by more than it was asked for, and than 1 mm."""
         return self.status == "solved" and self.worst > max(COARSE, 1.05 * self.tolerance)
-
-    @property
-    def comparable(self) -> bool:
-        """Whether its measure may be compared: an answer that cheats on what must hold can be cheaper than any."""
-        return self.success(FINE) and isfinite(self.measure)
 
 
 def budget_text(level: Budget) -> str:

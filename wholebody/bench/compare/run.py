@@ -11,7 +11,10 @@ from wholebody.bench.compare.jobs import Task, compute
 from wholebody.bench.compare.plan import Plan
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk, Store
+from wholebody.bench.entrants.base import Entrant
 from wholebody.errors import WholebodyError
+
+TURN = 5  # methods by which the order is turned from case to case: far apart, so that a family does not stay together
 
 
 class Progress(NamedTuple):
@@ -67,11 +70,17 @@ def _tasks(settings: Settings, plan: Plan, done: set[tuple[str, int]]) -> Iterat
             allowed = plan.allowed()
             solves = tuple(
                 (entrant, tuple(settings.ladder(entrant, family.moving)) if number < given.sweep else ())
-                for entrant in settings.entrants
+                for entrant in turned(settings.entrants, number)
                 if number < (given := allowed[family.name, entrant.name]).cases
             )
             if solves:
                 yield Task(family, number, settings.seed, solves, settings.cap)
+
+
+def turned(entrants: tuple[Entrant, ...], number: int) -> tuple[Entrant, ...]:
+    """The methods in another order for every case: nobody is always the first to wake a cold cache."""
+    first = TURN * number % len(entrants)
+    return entrants[first:] + entrants[:first]
 
 
 def _seconds(chunk: Chunk) -> float:

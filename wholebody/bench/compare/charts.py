@@ -1,0 +1,158 @@
+"""The charts of a comparison: speed against accuracy by set and quantity, and the share solved within a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from wholebody.bench import style
+from wholebody.bench.compare.curves import Point, curve, profile
+from wholebody.bench.compare.looks import look
+from wholebody.bench.compare.record import COARSE, FINE
+from wholebody.bench.compare.results import Quantity, Results
+
+BAND = 30.0  # where points are drawn whose median is no answer: above all values, which are metres, radians, shares
+GREY = "#666666"
+MS = 1e3
+
+
+def speed_accuracy(results: Results, family: str, title: str, path: Path) -> tuple[Path, Path]:
+    """One panel a quantity: median error over median time at every budget, quartiles and 95 % of the time as bars.
+
+    The line of a method joins its best budgets; those that are slower and no more accurate stand beside it, small.
+    """
+    quantities = results.quantities(family)
+    columns = 2
+    rows = -(-len(quantities) // columns)
+    chart, axes = style.figure(rows, columns, (11.0, 3.9 * rows + 0.7))
+    panels = [axes[place // columns][place % columns] for place in range(rows * columns)]
+    for panel in panels[len(quantities) :]:
+        panel.set_visible(False)
+    drawn: dict[str, Any] = {}
+    for panel, quantity in zip(panels, quantities, strict=False):
+        for entrant in reversed(results.entrants):
+            points = curve(results, family, entrant, quantity)
+            if points:
+                drawn[entrant] = _draw(panel, points, entrant, quantity)
+        _dress(panel, quantity, "a frame" if results.moving(family) else "a solve")
+    chart.suptitle(title, x=0.01, ha="left", fontsize=13)
+    _legend(chart, results, drawn)
+    return style.save(chart, path)
+
+
+def _draw(panel: Any, points: list[Point], entrant: str, quantity: Quantity) -> Any:
+    seen = look(entrant)
+    order = 3 if seen.principal else 2
+    width, size = (1.8, 6.0) if seen.principal else (0.9, 4.0)
+    x = [MS * point.seconds for point in points]
+    y = [min(point.value, BAND) for point in points]
+    best = lowest(points)
+    (line,) = panel.plot(
+        [MS * point.seconds for point in best], [min(point.value, BAND) for point in best], color=seen.color,
+        marker=seen.marker, linewidth=width, markersize=size, zorder=order,
+    )  # fmt: skip
+    panel.plot(x, y, color=seen.color, marker=seen.marker, linestyle="", markersize=0.6 * size, alpha=0.5, zorder=order)
+    failing = [place for place, point in enumerate(points) if point.value == inf]
+    panel.plot(
+        [x[k] for k in failing], [BAND] * len(failing), linestyle="", marker=seen.marker, markersize=size,
+        color=seen.color, markerfacecolor="white", zorder=order + 1,
+    )  # fmt: skip
+    if seen.principal:
+        for point in points:
+            if point.value < inf:
+                at, high = MS * point.seconds, min(point.high, BAND)
+                bar = {"color": seen.color, "linewidth": 0.9, "alpha": 0.4, "zorder": 1}
+                panel.plot([at, at], [point.low, high], **bar)
+                panel.plot([at, MS * point.seconds_p95], [point.value, point.value], **bar)
+    return line
+
+
+def lowest(points: list[Point]) -> list[Point]:
+    """Points than which no other of the same method is both faster and more accurate, from the fastest on."""
+    kept: list[Point] = []
+    for point in points:
+        if not kept or point.value < kept[-1].value:
+            kept.append(point)
+    return kept
+
+
+def _dress(panel: Any, quantity: Quantity, what: str) -> None:
+    from matplotlib.ticker import LogLocator
+
+    _time_axis(panel)
+    panel.set_yscale("log")
+    panel.yaxis.set_major_locator(LogLocator(numticks=12))
+    panel.set_ylim(0.5 * quantity.floor, 2.0 * BAND)
+    panel.axhspan(0.35 * BAND, 2.0 * BAND, color="#f4dddd", zorder=0)
+    panel.axhline(COARSE, color=GREY, linewidth=0.9, linestyle="--", zorder=1)
+    panel.text(0.995, BAND, "half of the answers or more are none ", fontsize=8, color=GREY, ha="right", va="center",
+               transform=panel.get_yaxis_transform())  # fmt: skip
+    panel.set_title(quantity.title, loc="left", fontsize=10)
+    panel.set_xlabel(f"time of {what} [ms]")
+    panel.set_ylabel(quantity.label)
+
+
+def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Path, Path]:
+    """Share of the cases solved within a time at the default budget, to a millimetre and to a tenth of one."""
+    chart, axes = style.figure(1, 2, (11.0, 4.6))
+    drawn: dict[str, Any] = {}
+    for panel, tolerance in zip(axes[0], (COARSE, FINE), strict=True):
+        lasts = [times[-1] for entrant in results.entrants if (times := profile(results, family, entrant, COARSE)[0])]
+        end = 1.5 * MS * max(lasts, default=1.0)
+        for entrant in reversed(results.entrants):
+            times, cases = profile(results, family, entrant, tolerance)
+            if not cases:
+                continue
+            seen = look(entrant)
+            shares = [100.0 * (place + 1) / cases for place in range(len(times))]
+            x = [MS * time for time in times]
+            begin = x[0] if x else end
+            (drawn[entrant],) = panel.step(
+                [begin, *x, end], [0.0, *shares, shares[-1] if shares else 0.0], where="post",
+                color=seen.color, linewidth=1.9 if seen.principal else 0.9, zorder=3 if seen.principal else 2,
+            )  # fmt: skip
+        panel.axhline(98.0, color=GREY, linewidth=0.9, linestyle="--", zorder=1)
+        _time_axis(panel)
+        panel.set_ylim(0.0, 103.0)
+        panel.set_title(f"solved to {tolerance:g} m and rad", loc="left", fontsize=10)
+        panel.set_xlabel(f"time of {'a frame' if results.moving(family) else 'a solve'} [ms]")
+        panel.set_ylabel("cases solved within the time [%]")
+    chart.suptitle(title, x=0.01, ha="left", fontsize=13)
+    _legend(chart, results, drawn)
+    return style.save(chart, path)
+
+
+def _time_axis(panel: Any) -> None:
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    panel.set_xscale("log")
+    panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    panel.xaxis.set_major_formatter("{x:g}")
+    panel.xaxis.set_minor_locator(NullLocator())
+
+
+def _legend(chart: Any, results: Results, drawn: dict[str, Any]) -> None:
+    names = [entrant for entrant in results.entrants if entrant in drawn]
+    if names:
+        chart.legend(
+            [drawn[name] for name in names], names, loc="outside lower center", ncols=min(len(names), 6),
+            frameon=False, fontsize=9,
+        )  # fmt: skip
+
+
+def draw_all(results: Results, titles: Iterable[tuple[str, str]], folder: Path) -> dict[str, tuple[Path, Path]]:
+    """All charts of a comparison: name -> its SVG and PNG.
+
+    Args:
+        results: what was found.
+        titles: name and title of every set.
+        folder: where they go.
+    """
+    drawn = {}
+    for family, title in titles:
+        name = family.replace("_", "-")
+        drawn[f"compare-{name}"] = speed_accuracy(results, family, title, folder / f"compare-{name}")
+        drawn[f"compare-{name}-profile"] = profiles(results, family, title, folder / f"compare-{name}-profile")
+    return drawn

@@ -1,0 +1,101 @@
+"""Whether a method is on the front of speed and accuracy, and by how much it is not.
+
+The time of a method to an accuracy a is
+
+    t(a) = min over its budgets of the median over the cases of (seconds where the error is at most a, else infinite),
+
+so that a failure is infinitely slow, and a method that fails in half of the cases is nowhere. A method is on the front
+of a chart where no other has a smaller t(a) at any accuracy a from 1e-3 down to 1e-8: nobody is both faster and as
+accurate. Two methods are compared on the cases that both solved at all their budgets.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.bench.compare.results import Quantity, Results, middle
+
+ACCURACIES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 1e-7, 1e-8)
+"""From where an accuracy is worth the name to where coal's distances end."""
+
+OURS = "qp/osqp"
+"""What `wb.QP()` is."""
+
+FAMILY = "qp/"
+"""The same method with other solvers, which is not another method."""
+
+
+class Rival(NamedTuple):
+    """The worst that another method does to ours in one chart.
+
+    Attributes:
+        set, quantity: which chart.
+        method: which other method; empty where none is faster at any accuracy.
+        accuracy: at which the ratio is greatest.
+        ratio: our time over the other's there; up to 1 we are on the front. Infinite where we do not get there.
+        ours, other: seconds.
+        cases: compared.
+    """
+
+    set: str
+    quantity: str
+    method: str
+    accuracy: float
+    ratio: float
+    ours: float
+    other: float
+    cases: int
+
+    @property
+    def on_front(self) -> bool:
+        """Whether no other method is faster at any accuracy."""
+        return self.ratio <= 1.0
+
+
+def time_to(
+    results: Results, family: str, entrant: str, quantity: Quantity, accuracy: float, cases: frozenset[int]
+) -> float:
+    """Seconds of a method to an accuracy; infinite where it gets there in less than half of the cases."""
+    times = [inf]
+    for level in results.levels(family, entrant):
+        seconds, values = results.values(family, entrant, level, quantity, cases)
+        times.append(middle(np.where(values <= accuracy, seconds, inf)) if len(seconds) else inf)
+    return min(times)
+
+
+def front(results: Results, family: str, quantity: Quantity, ours: str = OURS) -> Rival | None:
+    """The method that comes nearest to ours in a chart, or beats it most; None where ours did not take part."""
+    own = results.swept(family, ours)
+    if not own:
+        return None
+    worst: Rival | None = None
+    for other in results.entrants:
+        if other == ours or other.startswith(FAMILY):
+            continue
+        cases = own & results.swept(family, other)
+        if not cases:
+            continue
+        for accuracy in ACCURACIES:
+            if accuracy < quantity.floor:
+                continue
+            there = time_to(results, family, other, quantity, accuracy, cases)
+            if there == inf:
+                continue
+            here = time_to(results, family, ours, quantity, accuracy, cases)
+            rival = Rival(family, quantity.name, other, accuracy, here / there, here, there, len(cases))
+            if worst is None or rival.ratio > worst.ratio:
+                worst = rival
+    if worst is None:
+        return Rival(family, quantity.name, "", 0.0, 0.0, 0.0, inf, len(own))
+    return worst
+
+
+def fronts(results: Results, ours: str = OURS) -> list[Rival]:
+    """One row for every chart in which our method took part."""
+    found = [
+        front(results, family, quantity, ours) for family in results.sets for quantity in results.quantities(family)
+    ]
+    return [rival for rival in found if rival is not None]

@@ -1,0 +1,112 @@
+"""The figures of every method in every set at the default budget, as one row each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, nan
+
+from wholebody.bench.compare.record import COARSE, FAILED, FINE, OVERTIME, REFUSED
+from wholebody.bench.compare.results import Results, effort_excess, middle
+
+GOOD = 0.98  # share of the cases that a method has to solve to be called dependable
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One method in one set.
+
+    Attributes:
+        set, entrant: which.
+        cases: given to it; fewer than asked for where it is too slow for the time there is.
+        swept: of these, solved at all its budgets.
+        refused, failed, overtime: cases without an answer: said so, broke, or took too long.
+        said: the first refusal or exception.
+        success, success_fine: share of the cases not refused that are solved to 1e-3 and to 1e-4, as judged.
+        false_claims: answers called solved that are off by more than 1 mm.
+        median_ms, p95_ms: of a call (of a frame where goals move) [ms], over all answers.
+        cpu_median_ms: of the processor.
+        setup_ms: to build a model of its own, median.
+        iterations: median.
+        worst_median: median of the worst error [m or rad].
+        deepest_mm: deepest overlap of all answers [mm].
+        effort: above the best known, median over the successes, as a share.
+        frame_p95_ms, error_mm, jerk, turns: where goals move: 95 % of the frames, tracking error, trembling.
+    """
+
+    set: str
+    entrant: str
+    cases: int
+    swept: int
+    refused: int
+    failed: int
+    overtime: int
+    said: str
+    success: float
+    success_fine: float
+    false_claims: int
+    median_ms: float
+    p95_ms: float
+    cpu_median_ms: float
+    setup_ms: float
+    iterations: float
+    worst_median: float
+    deepest_mm: float
+    effort: float
+    frame_p95_ms: float
+    error_mm: float
+    jerk: float
+    turns: float
+
+    @property
+    def dependable(self) -> bool:
+        """Whether it takes all cases and solves as many as a dependable method does."""
+        return not self.refused and self.success >= GOOD
+
+
+def summaries(results: Results) -> list[Summary]:
+    """All rows, of methods that were given a case."""
+    return [
+        _summary(results, family, entrant)
+        for family in results.sets
+        for entrant in results.entrants
+        if results.default(family, entrant)
+    ]
+
+
+def _summary(results: Results, family: str, entrant: str) -> Summary:
+    mine, taken = results.default(family, entrant), results.taken(family, entrant)
+    answered = [record for record in mine if record.answered]
+    efforts = [value for record in answered if (value := effort_excess(record, results.best(record))) < inf]
+    silent = [record for record in mine if not record.answered]
+
+    def share(tolerance: float) -> float:
+        return sum(record.success(tolerance) for record in taken) / len(taken) if taken else nan
+
+    def count(outcome: str) -> int:
+        return sum(record.outcome == outcome for record in mine)
+
+    return Summary(
+        set=family,
+        entrant=entrant,
+        cases=len(mine),
+        swept=len(results.swept(family, entrant)),
+        refused=count(REFUSED),
+        failed=count(FAILED),
+        overtime=count(OVERTIME),
+        said=silent[0].said if silent else "",
+        success=share(COARSE),
+        success_fine=share(FINE),
+        false_claims=sum(record.false_claim for record in mine),
+        median_ms=1e3 * middle([record.seconds for record in answered]),
+        p95_ms=1e3 * middle([record.seconds for record in answered], 0.95),
+        cpu_median_ms=1e3 * middle([record.cpu_seconds for record in answered]),
+        setup_ms=1e3 * middle([record.setup_seconds for record in answered]),
+        iterations=middle([record.iterations for record in answered]),
+        worst_median=middle([record.worst for record in answered]),
+        deepest_mm=1e3 * max((record.penetration for record in answered), default=nan),
+        effort=middle(efforts),
+        frame_p95_ms=1e3 * middle([record.frame_p95 for record in answered], 0.95),
+        error_mm=1e3 * middle([record.missed for record in answered]),
+        jerk=middle([record.jerk for record in answered]),
+        turns=middle([record.turns for record in answered]),
+    )
