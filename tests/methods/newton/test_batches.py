@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
+import wholebody as wb
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Angle, Batch, Coincide, Slide, Turn, Unit
+from wholebody.methods.newton.directions import Cone, Toward
+from wholebody.methods.newton.mass_center import MassCenter
 
 K, N, H = 5, 6, 1e-6
 
@@ -30,6 +34,19 @@ def _forms(rng: np.random.Generator) -> np.ndarray:
     return quat.relative_forms(quat.axes_with_z(directions[0]), quat.axes_with_z(directions[1]))
 
 
+def _rotations(rng: np.random.Generator) -> np.ndarray:
+    return np.array([pin.Quaternion(e).toRotationMatrix() for e in _bodies(rng)[:K, 3:]])
+
+
+def _units(rng: np.random.Generator) -> np.ndarray:
+    directions = rng.normal(size=(K, 3))
+    return directions / np.linalg.norm(directions, axis=1)[:, None]
+
+
+def _cones() -> list[Any]:
+    return [cone.cone for cone in wb.load("human").cones.values()] * K
+
+
 NAMES = [""] * K
 EYES = np.broadcast_to(np.eye(3), (K, 3, 3))
 MAKERS: dict[str, Callable[[np.random.Generator], Batch]] = {
@@ -43,16 +60,32 @@ MAKERS: dict[str, Callable[[np.random.Generator], Batch]] = {
     "revolute": lambda g: Turn(_pairs(g), NAMES, _forms(g)[:, :2]),
     "fixed": lambda g: Turn(_pairs(g), NAMES, _forms(g)[:, :3]),
     "slide": lambda g: Slide(_pairs(g), NAMES, g.normal(size=(K, 2, 3)), g.normal(size=(K, 3)), g.normal(size=(K, 2))),
+    "toward": lambda g: Toward(
+        _pairs(g)[:, :1], NAMES, _rotations(g), g.normal(size=(K, 3)), 3.0 * g.normal(size=(K, 3))
+    ),
+    "cone": lambda g: Cone(_pairs(g), NAMES, _cones()[:K], _rotations(g), _units(g)),
+    "mass center": lambda g: MassCenter(
+        np.array([[0, 2, 3]]),
+        NAMES,
+        np.array((0.5, 0.3, 0.2)),
+        g.normal(size=(3, 3)),
+        g.normal(size=(4, 3)),
+        g.normal(size=4),
+    ),
     "angle": lambda g: Angle(_pairs(g), NAMES, _forms(g)[:, 2:], np.zeros(K), np.zeros(K), np.sign(g.normal(size=K))),
 }
+
+
+WITHOUT_CURVATURE = ("toward", "cone", "mass center")
 
 
 @pytest.mark.parametrize("name", MAKERS)
 def test_derivatives_are_those_of_differences(name: str) -> None:
     rng = np.random.default_rng(3)
     batch, x = MAKERS[name](rng), _bodies(rng)
-    force = rng.normal(size=(K, batch.size))
-    jacobian, curvature = batch.jacobian(x), batch.curvature(x, force)
+    force = rng.normal(size=(len(batch), batch.size))
+    jacobian = batch.jacobian(x)
+    curvature = batch.curvature(x, force) if name not in WITHOUT_CURVATURE else None
     assert (jacobian[:, ~batch.pattern] == 0.0).all()
     for i, bodies in enumerate(batch.bodies):
         for column in range(jacobian.shape[2]):
@@ -61,6 +94,8 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
             minus[bodies[column // 7], column % 7] -= H
             slope = (batch.residual(plus) - batch.residual(minus))[i] / (2 * H)
             assert jacobian[i, :, column] == pytest.approx(slope, abs=1e-7)
+            if curvature is None:
+                continue
             bend = ((batch.jacobian(plus) - batch.jacobian(minus))[i] * force[i][:, None]).sum(axis=0) / (2 * H)
             assert curvature[i, :, column] == pytest.approx(bend, abs=1e-7)
 

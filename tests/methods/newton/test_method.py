@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -11,6 +12,9 @@ import pytest
 
 import wholebody as wb
 from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.figure_course import FigureCourse
+from wholebody.methods.newton.reaching import reach
+from wholebody.tasks.base import Goal
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +102,7 @@ def test_two_hands_on_one_box_close_a_loop(human: wb.Figure) -> None:
 
 def test_a_goal_out_of_reach_is_approached_and_said_to_be(human: wb.Figure) -> None:
     problem = _standing(wb.Scene(human), wb.Point("right_index_tip", (3.0, 0.0, 1.0)))
-    solution = wb.Newton().solve(problem)
+    solution = wb.Newton(restarts=1).solve(problem)
     assert solution.status in ("unreachable", "stalled")
     assert solution.assessment.holds(1.2e-5)
     reached = wb.QP().solve(problem).assessment.goal_error
@@ -118,12 +122,67 @@ def test_frozen_joints_stay(human: wb.Figure) -> None:
     assert np.abs(pin.difference(human.model, problem.start, solution.q)[still]).max() < 1e-5
 
 
+class _Height(Goal):
+    """A goal of somebody's own."""
+
+    def error(self, state: Any) -> np.ndarray:
+        return state.frame(1).translation[2:]
+
+    def jacobian(self, state: Any) -> np.ndarray:
+        return np.zeros((1, state.model.nv))
+
+
 def test_what_it_has_no_equations_for_is_refused_by_name(human: wb.Figure) -> None:
-    with pytest.raises(wb.InputError, match=r"goals\[0\], CenterOfMass"):
-        wb.Newton().solve(_standing(wb.Scene(human), wb.CenterOfMass((0, 0, 1.0))))
+    with pytest.raises(wb.InputError, match=r"goals\[0\], _Height"):
+        wb.Newton().solve(_standing(wb.Scene(human), _Height()))
     with pytest.raises(wb.InputError, match="tolerance"):
         wb.Newton(tolerance=0.0)
+    with pytest.raises(wb.InputError, match="restarts"):
+        wb.Newton(restarts=-1)
     with pytest.raises(wb.UnknownNameError):
         wb.Newton(algebra="cholesky")
-    problem = _standing(wb.Scene(human), wb.Point("right_palm", (0.3, -0.3, 1.0)), measures=[wb.Discomfort()])
-    assert "Discomfort is reported, not minimised" in wb.Newton().solve(problem).message
+    problem = _standing(wb.Scene(human), wb.Point("right_palm", (0.3, -0.3, 1.0)), measures=[wb.PotentialEnergy()])
+    assert "PotentialEnergy is reported, not minimised" in wb.Newton().solve(problem).message
+
+
+def test_nothing_is_jumped_over(human: wb.Figure, least_distance: Callable[..., float]) -> None:
+    # a plate a millimetre thick between the hand and its goal; steps of the hand are up to eight centimetres
+    scene = wb.Scene(human).add(wb.Box((0.001, 0.6, 0.6)), name="plate", at=(0.4, -0.25, 1.1))
+    problem = _standing(scene, wb.Point("right_index_tip", (0.5, -0.25, 1.1)))
+    course = FigureCourse(problem, "auto")
+    visited = [problem.start]
+    arrive = course.arrive
+
+    def watched(x: Any) -> bool:
+        changed = arrive(x)
+        visited.append(course.q.copy())
+        return changed
+
+    course.arrive = watched  # type: ignore[method-assign]
+    reach(course, course.variables(problem.start), tolerance=1e-5, iterations=60)
+    assert len(visited) > 10
+    for before, after in itertools.pairwise(visited):
+        way = [least_distance(scene, pin.interpolate(human.model, before, after, t)) for t in np.linspace(0, 1, 9)]
+        assert min(way) > -2e-3
+
+
+def test_constraints_that_cannot_all_hold_end_near_all_of_them_and_in_nothing(human: wb.Figure) -> None:
+    problem = _standing(wb.Scene(human).add(wb.HalfSpace(), name="floor"))
+    impossible = wb.Problem(
+        problem.scene,
+        "standing",
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Hold("head", at=(0.0, 0.0, 2.5))],
+    )
+    solution = wb.Newton(restarts=1).solve(impossible)
+    assert solution.status in ("infeasible", "stalled")
+    assert "Hold" in solution.message
+    assert solution.assessment.penetration < 1e-4
+    assert solution.assessment.constraint_violation < 0.7  # the head stands at 1.7 m
+
+
+def test_a_barrier_goes_where_slacks_go(human: wb.Figure) -> None:
+    problem = _standing(wb.Scene(human), wb.Point("right_index_tip", (0.6, -0.2, 0.3)))
+    slack, barrier = (wb.Newton(inequalities=kind).solve(problem) for kind in ("slack", "barrier"))
+    assert slack.solved
+    assert barrier.solved
+    assert slack.assessment.measure == pytest.approx(barrier.assessment.measure, rel=1e-4)

@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.errors import InputError
 from wholebody.methods.newton import quaternions as quat
 
 Array = NDArray[np.float64]
@@ -53,9 +54,13 @@ class Batch(ABC):
     def jacobian(self, x: Array) -> Array:
         """(k, size, 7 b) its derivative."""
 
-    @abstractmethod
     def curvature(self, x: Array, force: Array) -> Array:
-        """(k, 7 b, 7 b) second derivative of the sum over rows of force (k, size) times residual."""
+        """(k, 7 b, 7 b) second derivative of the sum over rows of force (k, size) times residual.
+
+        Raises:
+            InputError: this type has none; assemblies use only types that have.
+        """
+        raise InputError(f"{self.labels[0]}: it has no second derivatives; leave the nearest place out")
 
 
 class Unit(Batch):

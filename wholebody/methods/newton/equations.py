@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,6 +31,19 @@ class EquationSet:
 
     def __init__(self) -> None:
         self.rows: dict[Key, list[Row]] = {}
+        self.made: list[tuple[Callable[[int], Batch], Key]] = []
+
+    def add(
+        self,
+        make: Callable[[int], Batch],
+        kind: str,
+        *,
+        goal: bool = False,
+        one_sided: bool = False,
+        weight: float = 1.0,
+    ) -> None:
+        """A batch of its own, made when the index of the world among the bodies is known."""
+        self.made.append((make, Key(kind, goal, one_sided, weight)))
 
     def coincide(
         self, a: int, b: int, label: str, first: Array, second: Array, *, goal: bool = False, weight: float = 1.0
@@ -44,10 +58,20 @@ class EquationSet:
         self._add(f"turn{size}", a, b, label, first.coeffs(), second.coeffs(), goal=goal, weight=weight)
 
     def slide(
-        self, a: int, b: int, label: str, normal: Array, place: Array, height: float, *, above: bool = False
+        self,
+        a: int,
+        b: int,
+        label: str,
+        normal: Array,
+        place: Array,
+        height: float,
+        *,
+        above: bool = False,
+        goal: bool = False,
+        weight: float = 1.0,
     ) -> None:
         """A point (3,) of the second body in a plane of the first, or above it."""
-        self._add("slide", a, b, label, normal, place, height, one_sided=above)
+        self._add("slide", a, b, label, normal, place, height, one_sided=above, goal=goal, weight=weight)
 
     def limit(self, a: int, b: int, label: str, first: Any, second: Any, low: float, high: float) -> None:
         """The angle about z of two axes (pin.Quaternion) stays between bounds; infinite ones are none."""
@@ -58,24 +82,25 @@ class EquationSet:
                 self._add("angle", a, b, label, *parts, one_sided=True)
 
     def angle(
-        self,
-        a: int,
-        b: int,
-        label: str,
-        first: Any,
-        second: Any,
-        value: float,
-        *,
-        goal: bool = False,
-        weight: float = 1.0,
+        self, a: int, b: int, label: str, first: Any, second: Any, center: float, value: float, weight: float
     ) -> None:
-        """The angle about z of two axes (pin.Quaternion) has a value."""
-        self._add("angle", a, b, label, first.coeffs(), second.coeffs(), value, value, 1.0, goal=goal, weight=weight)
+        """A goal: the angle about z of two axes (pin.Quaternion), on the turn nearest the center, has a value."""
+        parts = (first.coeffs(), second.coeffs(), center, value, 1.0)
+        self._add("angle", a, b, label, *parts, goal=True, weight=weight)
 
     def without_goals(self) -> EquationSet:
         """A copy that has none."""
         result = EquationSet()
         result.rows = {key: list(rows) for key, rows in self.rows.items() if not key.goal}
+        result.made = [(make, key) for make, key in self.made if not key.goal]
+        return result
+
+    def yielding(self) -> EquationSet:
+        """A copy whose equalities are goals."""
+        result = EquationSet()
+        for key, rows in self.rows.items():
+            result.rows.setdefault(key._replace(goal=not key.one_sided), []).extend(rows)
+        result.made = [(make, key._replace(goal=not key.one_sided)) for make, key in self.made]
         return result
 
     def system(self, count: int, names: list[str], weight: Array) -> System:
@@ -86,7 +111,8 @@ class EquationSet:
 
     def batches(self, count: int) -> list[tuple[Batch, Key]]:
         """The groups of `count` bodies in batches."""
-        return [(_batch(key.kind, rows, count), key) for key, rows in self.rows.items()]
+        listed = [(_batch(key.kind, rows, count), key) for key, rows in self.rows.items()]
+        return [*listed, *((make(count), key) for make, key in self.made)]
 
     def _add(
         self,

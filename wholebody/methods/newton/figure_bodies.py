@@ -128,6 +128,33 @@ class FigureBodies:
         result: Array = self.figure.clamp(q)
         return result
 
+    def ask(self, equations: EquationSet, label: str, q: Array, dofs: set[int], weight: float) -> None:
+        """Goals that bring the joints of some degrees of freedom to where the posture q (nq,) has them."""
+        model = self.model
+        turning = {row[0]: k for k, row in enumerate(self._turning)}
+        for joint in range(1, model.njoints):
+            kind, a, b = model.joints[joint], int(model.parents[joint]) - 1, joint - 1
+            if kind.idx_v not in dofs:
+                continue
+            if joint in turning:
+                k = turning[joint]
+                first, second = (pin.Quaternion(part) for part in self._turning[k][2:])
+                center = float(self.angles.center[k])
+                equations.angle(a, b, label, first, second, center, float(q[kind.idx_q]), weight)
+                continue
+            pin.forwardKinematics(model, self.data, q)
+            here = self.data.oMi[a + 1].actInv(self.data.oMi[joint])
+            if kind.shortname().startswith("JointModelP"):
+                along = model.jointPlacements[joint].rotation @ _axis(kind)
+                height = float(along @ here.translation)
+                equations.slide(a, b, label, along, np.zeros(3), height, goal=True, weight=weight)
+                continue
+            identity = pin.Quaternion.Identity()
+            equations.turn(a, b, label, pin.Quaternion(here.rotation), identity, 3, goal=True, weight=weight)
+            if kind.nq == 7:
+                place = np.array(here.translation)
+                equations.coincide(a, b, label, place, np.zeros(3), goal=True, weight=weight)
+
     def _add(self, joint: int) -> None:
         model, equations = self.model, self.equations
         kind, parent, placement = model.joints[joint], int(model.parents[joint]), model.jointPlacements[joint]

@@ -13,7 +13,7 @@ from wholebody.methods.newton.keys import OBJECTIVE, Key
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
 from wholebody.methods.newton.objective import Objective
 from wholebody.methods.newton.system import System
-from wholebody.methods.newton.terms import constraint_equations, goal_equations
+from wholebody.methods.newton.terms import bound_equations, constraint_equations, goal_equations
 from wholebody.problem import Problem
 
 Array = NDArray[np.float64]
@@ -30,16 +30,22 @@ class FigureCourse(Course):
     drift, limits always hold, and what is reached is a posture.
 
     Attributes:
+        algebra_name: as asked for.
         structures: how often the pattern was laid out and analysed.
     """
 
-    def __init__(self, problem: Problem, algebra: str) -> None:
+    def __init__(self, problem: Problem, algebra: str, *, yielding: bool = False) -> None:
         """State the equations.
+
+        Args:
+            problem: what is asked.
+            algebra: name of the factorisation.
+            yielding: look for the least violation of the constraints, in place of the goals.
 
         Raises:
             InputError: a term or a joint that has no equations here.
         """
-        self.problem, self._name = problem, algebra
+        self.problem, self.algebra_name = problem, algebra
         self.bodies = FigureBodies(problem.scene.figure)
         self.contacts = ContactSet(problem) if len(problem.scene.proximity.pairs) else None
         self.longest = LONGEST if self.contacts else np.inf
@@ -48,8 +54,12 @@ class FigureCourse(Course):
         self._limits = self.bodies.limits()
         self._fixed: list[tuple[Batch, Key]] = [(unit, HARD), (self._limits, ONE_SIDED)]
         self._fixed += self.bodies.equations.batches(count)
-        self._fixed += constraint_equations(problem).batches(count)
-        self._goals = goal_equations(problem, problem.goals).batches(count)
+        self._fixed += bound_equations(problem).batches(count)
+        self._yielding = yielding
+        if not yielding:
+            self._fixed += constraint_equations(problem, self.bodies).batches(count)
+        self._goals: list[tuple[Batch, Key]] = []
+        self.retarget()
         self.objective = Objective(problem, self.bodies)
         self._fixed.append((self.objective.rows, Key(OBJECTIVE, False, False, 1.0)))
         self.q = self._left = problem.start
@@ -64,7 +74,12 @@ class FigureCourse(Course):
 
     def retarget(self) -> None:
         """Take the problem's new goals."""
-        self._goals = goal_equations(self.problem, self.problem.goals).batches(self.bodies.count)
+        problem = self.problem
+        if self._yielding:
+            asked = constraint_equations(problem, self.bodies).yielding()
+        else:
+            asked = goal_equations(problem, self.bodies, problem.goals)
+        self._goals = asked.batches(self.bodies.count)
 
     def retract(self, x: Array) -> Array:
         """The bodies of the nearest posture."""
@@ -103,7 +118,7 @@ class FigureCourse(Course):
         if changed:
             self._laid = laid
             self.system = System(self.bodies.count, batches, self.bodies.weight)
-            self.algebra = linear_algebra(self.system.pattern, self._name)
+            self.algebra = linear_algebra(self.system.pattern, self.algebra_name)
             self.structures += 1
         else:
             self.system.batches = [batch for batch, _ in batches if len(batch)]

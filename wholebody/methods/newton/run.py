@@ -140,7 +140,7 @@ class Run:
             gain = before[1] - promised[1]
             if mend or before[1] - after[1] >= GOOD * gain:
                 damping = damping * DAMPING_DOWN if damping > FIRST_DAMPING else 0.0
-            elif before[1] - after[1] < POOR * gain:
+            elif gain > self.goal_tolerance and before[1] - after[1] < POOR * gain:
                 damping = max(FIRST_DAMPING, damping * DAMPING_UP)
             share, pull = min(1.0, 2.0 * share), min(PULL, 2.0 * pull)
             if stagnant >= PATIENCE:
@@ -240,7 +240,8 @@ class Run:
         if hard + goal <= 0.1 * self.tolerance:
             return True
         gain = before[1] - promised[1]
-        if hard <= funnel and gain > 0.0 and before[1] - goal >= WORTH * gain:
+        bend = min(before[1] * before[1], WIDEST)  # what a full step towards the goals leaves of equations that bend
+        if hard <= max(funnel, bend) and gain > 0.0 and before[1] - goal >= WORTH * gain:
             return True
         return hard < 0.9 * before[0] and (before[0] > self.tolerance or goal <= before[1])
 

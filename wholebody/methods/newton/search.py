@@ -83,6 +83,8 @@ class Search:
                     best = found
                 if self._serves(best):
                     break
+        if not best.judgement.holds(self.settings.counted):
+            best = self._least_violation(best, q)
         if self._serves(best) and self.course.objective.minimised:
             best = self._polished(best)
         return best
@@ -116,6 +118,16 @@ class Search:
         self.iterations += spent
         lower = self._judged(found.reached._replace(x=x), found.how)
         return lower if self._serves(lower) and self._better(lower, found) else found
+
+    def _least_violation(self, best: Found, q: Array) -> Found:
+        """The nearest to all constraints, if that breaks less: where they cannot all hold."""
+        whole = self.course
+        self.course = FigureCourse(whole.problem, whole.algebra_name, yielding=True)
+        found = self._go(q, best.how, self.settings.iterations)
+        self.course = whole
+        stationary = best.reached.stationary or found.reached.stationary
+        found = found._replace(reached=found.reached._replace(stationary=stationary))
+        return found if self._better(found, best) else best
 
     def _judged(self, reached: Reached, how: str) -> Found:
         q = self.course.bodies.posture(reached.x)

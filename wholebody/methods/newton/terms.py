@@ -3,23 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.errors import InputError
+from wholebody.methods.newton.batches import Array, Batch
+from wholebody.methods.newton.directions import Cone, Toward
 from wholebody.methods.newton.equations import EquationSet
+from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.mass_center import MassCenter
 from wholebody.methods.newton.quaternions import axes_with_z
 from wholebody.problem import Problem
-from wholebody.tasks import Axis, Frame, Freeze, Hold, Orientation, Plane, Point, Relative, StepLimit
+from wholebody.tasks import (
+    Axis,
+    Balance,
+    CenterOfMass,
+    Frame,
+    Freeze,
+    Hold,
+    Orientation,
+    Plane,
+    Point,
+    Posture,
+    ReachCones,
+    Relative,
+    StepLimit,
+)  # fmt: skip
 from wholebody.tasks.base import Goal
 from wholebody.tasks.residuals import PlacementResidual
 
-CAN = "Point, Frame, Orientation, Relative, Axis(direction=...), Hold, Plane, Freeze"
+CAN = "Point, Frame, Orientation, Relative, Axis, CenterOfMass, Posture; Hold, Plane, Balance, ReachCones; Freeze"
 
 
-def goal_equations(problem: Problem, goals: Sequence[Goal]) -> EquationSet:
+def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]) -> EquationSet:
     """Equations of goals.
 
     Raises:
@@ -34,18 +53,21 @@ def goal_equations(problem: Problem, goals: Sequence[Goal]) -> EquationSet:
             result.coincide(place.joint - 1, -1, label, point, goal._target, goal=True, weight=goal.weight)
         elif isinstance(goal, (Frame, Orientation, Relative)):
             _placement(result, problem, goal._residual, label, goal=True, weight=goal.weight)
-        elif isinstance(goal, Axis) and goal.toward is None:
-            local = _local(problem, goal._place.frame)
-            ours = pin.Quaternion(axes_with_z((local.rotation @ goal._basis[2])[None])[0])
-            wanted = pin.Quaternion(axes_with_z(goal._wanted[None])[0])
-            result.turn(goal._place.joint - 1, -1, label, ours, wanted, 2, goal=True, weight=goal.weight)
+        elif isinstance(goal, Axis):
+            _axis(result, problem, goal, label)
+        elif isinstance(goal, CenterOfMass):
+            directions = np.eye(3)[: len(goal.axes)]
+            make = partial(_mass_center, bodies, label, directions, goal._target)
+            result.add(make, "mass center", goal=True, weight=goal.weight)
+        elif isinstance(goal, Posture):
+            bodies.ask(result, label, goal._q, set(goal._dofs.tolist()), goal.weight)
         else:
             raise _refused(label)
     return result
 
 
-def constraint_equations(problem: Problem) -> EquationSet:
-    """Equations of constraints and bounds.
+def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
+    """Equations of constraints.
 
     Raises:
         InputError: one that has none here.
@@ -59,14 +81,64 @@ def constraint_equations(problem: Problem) -> EquationSet:
             place = np.array(_local(problem, term._place.frame).translation)
             above = term.side == "above"
             result.slide(-1, term._place.joint - 1, label, term._normal, place, term._height, above=above)
+        elif isinstance(term, Balance):
+            normals = np.column_stack([term._normals, np.zeros(len(term._normals))])
+            make = partial(_mass_center, bodies, label, normals, term._offsets + term.margin)
+            result.add(make, "mass center", one_sided=True)
+        elif isinstance(term, ReachCones):
+            result.add(partial(_cones, problem, term, label), "cone", one_sided=True)
         else:
             raise _refused(label)
+    return result
+
+
+def bound_equations(problem: Problem) -> EquationSet:
+    """Equations of bounds.
+
+    Raises:
+        InputError: one that has none here.
+    """
+    result = EquationSet()
     for bound in problem.bounds:
         if isinstance(bound, Freeze):
             _frozen(result, problem, bound)
         elif not isinstance(bound, StepLimit):  # a solve is not tied to time, so a step limit bounds nothing
             raise _refused(type(bound).__name__)
     return result
+
+
+def _axis(equations: EquationSet, problem: Problem, goal: Axis, label: str) -> None:
+    """An axis along a direction, or towards a place."""
+    local, joint = _local(problem, goal._place.frame), goal._place.joint
+    if goal.toward is None:
+        ours = pin.Quaternion(axes_with_z((local.rotation @ goal._basis[2])[None])[0])
+        wanted = pin.Quaternion(axes_with_z(goal._wanted[None])[0])
+        equations.turn(joint - 1, -1, label, ours, wanted, 2, goal=True, weight=goal.weight)
+        return
+    axes, point, place = goal._basis @ local.rotation.T, np.array(local.translation), goal._wanted
+
+    def make(world: int) -> Batch:
+        body = np.array([[joint - 1 if joint else world]])
+        return Toward(body, [label], axes[None], point[None], place[None])
+
+    equations.add(make, "toward", goal=True, weight=goal.weight)
+
+
+def _mass_center(bodies: FigureBodies, label: str, directions: Array, height: Array, world: int) -> Batch:
+    inertias = list(bodies.model.inertias)[1:]
+    mass = np.array([inertia.mass for inertia in inertias])
+    heavy = np.flatnonzero(mass > 0.0)
+    centers = np.array([inertias[k].lever for k in heavy])
+    return MassCenter(heavy[None], [label], mass[heavy] / mass.sum(), centers, directions, height)
+
+
+def _cones(problem: Problem, term: ReachCones, label: str, world: int) -> Batch:
+    limbs = term._limbs
+    pairs = np.array([(limb.reference.joint - 1, limb.limb.joint - 1) for limb in limbs], dtype=np.intp)
+    pairs[pairs < 0] = world
+    turns = np.array([_local(problem, limb.reference.frame).rotation for limb in limbs])
+    axes = np.array([_local(problem, limb.limb.frame).rotation @ limb.axis for limb in limbs])
+    return Cone(pairs, [label] * len(limbs), [limb.cone for limb in limbs], turns, axes)
 
 
 def _placement(

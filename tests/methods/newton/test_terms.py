@@ -1,0 +1,118 @@
+"""Terms as equations of bodies: what they say at random postures, and what solves with them find."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.objective import Objective
+from wholebody.methods.newton.terms import constraint_equations, goal_equations
+
+
+@pytest.fixture(scope="module")
+def human() -> wb.Figure:
+    return wb.load("human")
+
+
+def _postures(figure: wb.Figure, count: int = 5) -> list[np.ndarray]:
+    rng = np.random.default_rng(5)
+    lower, upper = figure.tangent_bounds(figure.neutral)
+    moves = (rng.uniform(np.maximum(lower, -0.8), np.minimum(upper, 0.8)) for _ in range(count))
+    return [figure.clamp(pin.integrate(figure.model, figure.neutral, move)) for move in moves]
+
+
+def _residual(problem: wb.Problem, q: np.ndarray) -> np.ndarray:
+    """Of the goals and constraints alone."""
+    bodies = FigureBodies(problem.scene.figure)
+    everything = np.concatenate([bodies.variables(q), (0, 0, 0, 0, 0, 0, 1.0)]).reshape(-1, 7)
+    sets = goal_equations(problem, bodies, problem.goals), constraint_equations(problem, bodies)
+    batches = [batch for one in sets for batch, _ in one.batches(bodies.count)]
+    return np.concatenate([batch.residual(everything).ravel() for batch in batches])
+
+
+def test_the_centre_of_mass_is_pinocchios(human: wb.Figure) -> None:
+    target = np.array((0.1, -0.2, 0.9))
+    problem = wb.Problem(wb.Scene(human), "standing", goals=[wb.CenterOfMass(target)])
+    for q in _postures(human):
+        center = pin.centerOfMass(human.model, human.model.createData(), q)
+        assert _residual(problem, q) == pytest.approx(center - target, abs=1e-9)
+
+
+@pytest.mark.parametrize("term", [wb.Balance(margin=0.01), wb.ReachCones()])
+def test_constraints_say_what_their_terms_say(human: wb.Figure, term: Any) -> None:
+    problem = wb.Problem(wb.Scene(human), "standing", constraints=[term])
+    resolved = problem.constraints[0]
+    for q in _postures(human):
+        wanted = resolved.value(problem.scene.state(q)) - resolved.lower
+        assert _residual(problem, q) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_an_axis_towards_a_place_says_its_angle(human: wb.Figure) -> None:
+    place = np.array((1.0, 0.5, 0.3))
+    problem = wb.Problem(wb.Scene(human), "standing", goals=[wb.Axis("head", (1, 0, 0), toward=place)])
+    for q in _postures(human):
+        head = problem.scene.state(q).frame(human.frame_id("head"))
+        way = place - head.translation
+        angle = np.arccos(head.rotation[:, 0] @ way / np.linalg.norm(way))
+        assert np.linalg.norm(_residual(problem, q)) == pytest.approx(2.0 * np.sin(angle / 2.0), abs=1e-9)
+
+
+def test_a_posture_goal_is_each_joints_distance(human: wb.Figure) -> None:
+    problem = wb.Problem(wb.Scene(human), "standing", goals=[wb.Posture("arms_forward", joints=["upper_body"])])
+    for q in _postures(human):
+        wanted = problem.goals[0].error(problem.scene.state(q))
+        assert np.sort(_residual(problem, q)) == pytest.approx(np.sort(wanted), abs=1e-9)
+    whole = wb.Problem(wb.Scene(human), "standing", goals=[wb.Posture("arms_forward")])
+    assert np.abs(_residual(whole, human.posture("arms_forward"))).max() < 1e-9
+
+
+def test_the_objective_has_the_measures_gradient(human: wb.Figure) -> None:
+    measures = [wb.Effort(0.5), wb.Displacement(), wb.Discomfort(2.0)]
+    problem = wb.Problem(wb.Scene(human), "standing", measures=measures)
+    bodies = FigureBodies(human)
+    objective = Objective(problem, bodies)
+    for q in _postures(human):
+        x = bodies.variables(q)
+        assert objective.value(x) == pytest.approx(wb.assess(problem, q).measure)
+        objective.renew(q)
+        everything = np.concatenate([x, (0, 0, 0, 0, 0, 0, 1.0)]).reshape(-1, 7)
+        force = objective.stiffness * objective.rows.residual(everything)[:, 0]
+        gradient = sum(term.weight * term.gradient(problem.scene.state(q)) for term in problem.measures)
+        joints = [j for j in human.model.joints[1:] if j.nq == 1 and j.shortname().startswith("JointModelR")]
+        assert force == pytest.approx(5.0 * gradient[[j.idx_v for j in joints]], rel=1e-6, abs=1e-9)
+
+
+CASES: dict[str, tuple[list[Any], list[Any], list[Any] | None]] = {
+    "center of mass": ([wb.CenterOfMass((0.03, 0.02, 0.85))], [], None),
+    "center above": (
+        [wb.CenterOfMass((0.05, 0.02, 0.0), axes="xy"), wb.Point("right_index_tip", (0.5, -0.2, 1.3))],
+        [],
+        None,
+    ),
+    "balance": ([wb.Point("right_index_tip", (0.75, -0.2, 0.7))], [wb.Balance(margin=0.02)], None),
+    "cones": ([wb.Point("right_index_tip", (-0.2, -0.4, 1.2))], [wb.ReachCones()], None),
+    "gaze": ([wb.Axis("head", (1, 0, 0), toward=(0.5, 0.8, 0.8))], [], None),
+    "posture": ([wb.Posture("arms_forward", joints=["left_arm"])], [], None),
+    "displacement": ([wb.Point("right_index_tip", (0.4, -0.3, 1.2))], [], [wb.Displacement()]),
+    "discomfort": ([wb.Point("right_index_tip", (0.4, -0.3, 1.2))], [], [wb.Effort(), wb.Discomfort(0.5)]),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_it_finds_no_worse_than_the_qp_method(human: wb.Figure, name: str) -> None:
+    goals, constraints, measures = CASES[name]
+    holds = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    problem = wb.Problem(
+        wb.Scene(human), "standing", goals=goals, constraints=[*holds, *constraints], measures=measures
+    )
+    ours, theirs = wb.Newton().solve(problem), wb.QP().solve(problem)
+    assert ours.status == theirs.status == "solved"
+    judged = wb.assess(problem, ours.q)
+    assert judged.holds(1.2e-5)
+    assert judged.met(1.2e-5)
+    assert judged.measure <= (1.0 + 1e-3) * theirs.assessment.measure  # the same least, or a lower one
