@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import subprocess
 import sys
@@ -16,11 +17,15 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.interaction.judging import overlaps
 
 Example = Callable[[str], ModuleType]
 
 SINGLE = ("shelf", "carry_box_past_table", "behind_the_back", "look_and_touch_overhead", "robot_arm_among_obstacles")
-OTHERS = ("chair", "console_two_people", "hand_on_table", "avatar_two_arms")
+OTHERS = (
+    *("chair", "console_two_people", "hand_on_table", "avatar_two_arms"),
+    *("sit_on_chair", "four_bar", "assemble_shelf"),
+)
 REST_ON = {("pelvis", "pouch"), ("lower_lumbar", "pouch")}  # what the figure wears lies on it
 
 
@@ -72,12 +77,20 @@ def test_solved_and_nothing_inside_anything(name: str, example: Example, tmp_pat
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("name", SINGLE)
+@pytest.mark.parametrize("name", [*SINGLE, "sit_on_chair"])
 def test_task_file_says_the_same(name: str, example: Example, root: Path) -> None:
     problem = example(name).build()
     task = wb.read_task(root / "examples" / "tasks" / f"{name}.toml")
     assert np.array_equal(task.problem.start, problem.start)
     assert task.problem.scene.piece_names == problem.scene.piece_names
+    for ours, theirs in zip(
+        problem.scene.geometry.geometryObjects, task.problem.scene.geometry.geometryObjects, strict=True
+    ):
+        assert ours.placement.isApprox(theirs.placement)
+        assert ours.geometry == theirs.geometry
+    if name == "sit_on_chair":  # what is asked there is the way
+        assert str(problem.goals) == str(task.problem.goals)
+        return
     np.testing.assert_allclose(wb.solve(task.problem).q, wb.solve(problem).q, atol=1e-6)
 
 
@@ -196,11 +209,82 @@ def test_what_is_tracked_goes_in_and_what_is_shown_does_not(
     assert not list(tmp_path.iterdir())
 
 
+def test_a_person_is_dragged_down_onto_a_chair(example: Example, tmp_path: Path, capsys: Any) -> None:
+    module = example("sit_on_chair")
+    drags = module.main(out=tmp_path, pictures=False)
+    problem = module.build()
+    place = places(problem, problem.start)
+    soles = [place(f"{side}_sole") for side in ("left", "right")]
+    assert set(drags) == {"newton", "qp"}
+    for dragged in drags.values():
+        assert dragged.end.status == "solved"
+        assert dragged.end.assessment.met(1e-5)
+        depth, _ = overlaps(problem.scene, dragged.q)
+        assert depth.max() < 1e-4
+        lowest = np.inf
+        for number, q in enumerate(dragged.q):
+            if number % 8 == 0:
+                least, where = deepest(problem, q)
+                assert least > -1e-4, where
+            place = places(problem, q)
+            lowest = min(lowest, place("pelvis").translation[2])
+            for side, sole in zip(("left", "right"), soles, strict=True):
+                assert np.linalg.norm(place(f"{side}_sole").translation - sole.translation) < 5e-4
+        assert lowest > module.SEATED[2] - 1e-3  # although the goal went 20 mm lower
+        for before, after in itertools.pairwise(dragged.q):
+            assert problem.scene.sweep(before, after) is None
+        gaps = {
+            tuple(problem.scene.piece_owner[piece] for piece in pair)
+            for pair in problem.scene.contacts(dragged.q[-1], within=1e-3).pair
+        }
+        assert ("pelvis", "seat") in gaps
+        knee = problem.scene.figure.joint_values(dragged.q[-1])["left_knee_flexion"]
+        assert abs(knee - np.pi / 2) < 0.1
+    assert "newton" in capsys.readouterr().out
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_four_bar_linkage_turns_as_its_closed_form_says(example: Example, tmp_path: Path, capsys: Any) -> None:
+    module = example("four_bar")
+    places = module.main(out=tmp_path, pictures=False)
+    assert len(places) == module.STEPS + 1
+    for place in places:  # the loop closes, and the joints' axes stay parallel: from the placements alone
+        tip = place["crank"].act(np.array((module.CRANK, 0.0, 0.0)))
+        end = place["coupler"].act(np.array((module.COUPLER, 0.0, 0.0)))
+        np.testing.assert_allclose(tip, place["coupler"].translation, atol=1e-9)
+        np.testing.assert_allclose(end, place["rocker"].act(np.array((module.ROCKER, 0.0, 0.0))), atol=1e-9)
+        np.testing.assert_allclose(place["rocker"].translation, (module.GROUND, 0.0, 0.0), atol=1e-9)
+        np.testing.assert_allclose(place["rocker"].rotation[:, 1], (0.0, 1.0, 0.0), atol=1e-9)
+    for angle in np.linspace(0.0, 2.0 * np.pi, 7):  # the closed form closes the loop
+        coupler, rocker = module.closed_form(angle)
+        tip = np.array([module.CRANK * np.cos(angle), module.CRANK * np.sin(angle)])
+        end = tip + module.COUPLER * np.array([np.cos(coupler), np.sin(coupler)])
+        other = np.array([module.GROUND, 0.0]) + module.ROCKER * np.array([np.cos(rocker), np.sin(rocker)])
+        np.testing.assert_allclose(end, other, atol=1e-12)
+        place = places[round(angle / (2.0 * np.pi) * module.STEPS)]
+        if abs(angle / (2.0 * np.pi) * module.STEPS % 1.0) < 1e-9:
+            assert module.angle_of(place["rocker"]) == pytest.approx(rocker, abs=1e-8)
+    assert "off their closed form" in capsys.readouterr().out
+
+
+def test_a_shelf_is_assembled_part_by_part(example: Example, tmp_path: Path) -> None:
+    module = example("assemble_shelf")
+    stages = module.main(out=tmp_path, pictures=False)
+    for name, before, after in zip((*module.LEVELS, "right side"), stages[:-1], stages[1:], strict=True):
+        for other in set(module.LOOSE) - {name}:
+            assert before[other].isApprox(after[other], 1e-8)
+    for name, level in module.LEVELS.items():
+        expected = pin.SE3(np.eye(3), np.array((0.0, 0.0, level + 0.5 * module.THICK)))
+        assert stages[-1][name].isApprox(expected, 1e-7)
+    y = -0.5 * (module.WIDTH - module.THICK)
+    assert stages[-1]["right side"].isApprox(pin.SE3(np.eye(3), np.array((0.0, y, 0.5 * module.HEIGHT))), 1e-7)
+
+
 def test_every_example_is_tested_and_listed(root: Path) -> None:
     folder = root / "examples"
     scripts = {path.stem for path in folder.glob("*.py")} - {"presenting"}
     assert scripts == {*SINGLE, *OTHERS}
-    assert {path.stem for path in (folder / "tasks").glob("*.toml")} == set(SINGLE)
+    assert {path.stem for path in (folder / "tasks").glob("*.toml")} == {*SINGLE, "sit_on_chair"}
     table = (folder / "README.md").read_text(encoding="utf-8")
     assert all(f"]({name}.py)" in table for name in scripts)
 

@@ -1,0 +1,143 @@
+"""Turn the crank of a four-bar linkage once: a closed loop, checked against its closed form."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+from presenting import DARK, LIGHT, OAK, STEEL, command_line
+
+import wholebody as wb
+from wholebody.view.parts import Part, Parts
+
+GROUND, CRANK, COUPLER, ROCKER = 0.40, 0.12, 0.36, 0.28  # m: a crank-rocker, for 0.12 + 0.40 < 0.36 + 0.28
+TRACER = np.array((0.18, 0.0, 0.16))  # m: the point of the coupler whose curve is drawn
+STEPS = 90  # of a turn
+Y = (0.0, 1.0, 0.0)  # all axes are along y; the linkage moves in the plane of x and z
+
+Array = NDArray[np.float64]
+
+
+def closed_form(angle: float) -> tuple[float, float]:
+    """Angles of coupler and rocker to x at a crank angle, radians, by the law of cosines; the open branch."""
+    joint = CRANK * np.array((np.cos(angle), np.sin(angle)))
+    across = np.array((GROUND, 0.0)) - joint
+    length = float(np.linalg.norm(across))
+    inner = np.arccos((length**2 + COUPLER**2 - ROCKER**2) / (2.0 * length * COUPLER))
+    coupler = np.arctan2(across[1], across[0]) + inner
+    end = joint + COUPLER * np.array((np.cos(coupler), np.sin(coupler)))
+    return float(coupler), float(np.arctan2(end[1], end[0] - GROUND))
+
+
+def bar(x: float, z: float, angle: float) -> pin.SE3:
+    """Placement of a bar whose first end is at (x, z), at an angle to x in the plane; turns about y lower z."""
+    return pin.SE3(pin.rpy.rpyToMatrix(0.0, -angle, 0.0), np.array((x, 0.0, z)))
+
+
+def angle_of(place: pin.SE3) -> float:
+    """Angle of a bar to x, radians."""
+    return float(np.arctan2(place.rotation[2, 0], place.rotation[0, 0]))
+
+
+def build() -> wb.Assembly:
+    """Three bars with four joints; the crank is driven by a goal for its tip."""
+    coupler, rocker = closed_form(0.0)
+    assembly = wb.Assembly()
+    assembly.body("crank", bar(0.0, 0.0, 0.0), size=CRANK)
+    assembly.body("coupler", bar(CRANK, 0.0, coupler), size=COUPLER)
+    assembly.body("rocker", bar(GROUND, 0.0, rocker), size=ROCKER)
+    assembly.revolute("world", "crank", at=(0.0, 0.0, 0.0), axis=Y)
+    assembly.revolute("crank", "coupler", at=(CRANK, 0.0, 0.0), axis=Y)
+    tip = assembly.placement("coupler").act(np.array((COUPLER, 0.0, 0.0)))
+    assembly.revolute("coupler", "rocker", at=tip, axis=Y)
+    return assembly.revolute("world", "rocker", at=(GROUND, 0.0, 0.0), axis=Y)
+
+
+def turn(assembly: wb.Assembly) -> tuple[Array, list[dict[str, pin.SE3]]]:
+    """Drive the crank once round: crank angles (n,), and where the bars are at each."""
+    angles, places = np.linspace(0.0, 2.0 * np.pi, STEPS + 1), []
+    for angle in angles:
+        tip = CRANK * np.array((np.cos(angle), 0.0, np.sin(angle)))
+        solution = assembly.drop_goals().point_goal("crank", tip, place=(CRANK, 0.0, 0.0)).solve(tolerance=1e-10)
+        if solution.status != "solved":
+            raise wb.WholebodyError(f"at {np.degrees(angle):.0f} degrees: {solution.message}")
+        places.append(solution.placements)
+    return angles, places
+
+
+def main(out: Path = Path("pictures"), pictures: bool = True) -> list[dict[str, pin.SE3]]:
+    """Turn, compare with the closed form, and draw."""
+    angles, places = turn(build())
+    found = np.unwrap([[angle_of(place[name]) for name in ("coupler", "rocker")] for place in places], axis=0)
+    exact = np.unwrap([closed_form(angle) for angle in angles], axis=0)
+    curve = np.array([place["coupler"].act(TRACER) for place in places])
+    print(f"A four-bar linkage: {STEPS} steps of {360 / STEPS:g} degrees, {len(places[0])} bodies, 4 joints, one loop")
+    print(f"  coupler and rocker are off their closed form by {np.abs(found - exact).max():.1e} rad at most")
+    print(f"  after a turn the coupler's point is {np.linalg.norm(curve[-1] - curve[0]):.1e} m from where it began")
+    print(f"  the rocker swings by {np.degrees(np.ptp(found[:, 1])):.1f} degrees")
+    if pictures:
+        draw(angles, places, found, exact, curve, out)
+    return places
+
+
+def shapes() -> Parts:
+    """What the bars look like; "post" stands for the ground."""
+    upright = (0.0, 0.5**0.5, 0.0, 0.5**0.5)  # the capsule's z along the bar's x
+
+    def rod(length: float, color: tuple[float, float, float, float], y: float) -> Part:
+        return Part(wb.Capsule(radius=0.012, length=length), (0.5 * length, y, 0.0, *upright), color)
+
+    long = float(np.linalg.norm(TRACER))
+    slope = 0.5 * (0.5 * np.pi - np.arctan2(TRACER[2], TRACER[0]))
+    arm = Part(wb.Capsule(radius=0.007, length=long), (*(0.5 * TRACER), 0.0, np.sin(slope), 0.0, np.cos(slope)), STEEL)
+    return Parts(
+        {
+            "crank": [rod(CRANK, DARK, -0.03)],
+            "coupler": [rod(COUPLER, STEEL, 0.0), arm, Part(wb.Sphere(0.014), tuple(TRACER), LIGHT)],
+            "rocker": [rod(ROCKER, OAK, -0.03)],
+            "ground": [
+                Part(wb.Box((0.06, 0.1, 0.03)), (0.0, 0.0, -0.03), DARK),
+                Part(wb.Box((0.06, 0.1, 0.03)), (GROUND, 0.0, -0.03), DARK),
+            ],
+        }
+    )
+
+
+def draw(
+    angles: Array, places: list[dict[str, pin.SE3]], found: Array, exact: Array, curve: Array, out: Path
+) -> None:  # fmt: skip
+    """Write four_bar.html, which plays the turn, and four_bar.png: the coupler's curve and the rocker's angle."""
+    from matplotlib import pyplot
+
+    out.mkdir(parents=True, exist_ok=True)
+    parts = shapes()
+    with wb.Viewer(parts, title="four_bar") as viewer:
+        viewer.look(eye=(0.2, -1.2, 0.35), target=(0.18, 0.0, 0.12))
+        viewer.play([parts.posture(place | {"ground": pin.SE3.Identity()}) for place in places], dt=1 / 30)
+        print(f"  {viewer.save(out / 'four_bar.html')}")
+    chart, (left, right) = pyplot.subplots(1, 2, figsize=(9.6, 4.2), layout="constrained")
+    for place, shade in zip(places[:-1:15], (0.8, 0.7, 0.6, 0.5, 0.4, 0.3), strict=True):
+        joints = [np.zeros(3), place["coupler"].translation, place["coupler"].act(np.array((COUPLER, 0.0, 0.0)))]
+        joints.append(np.array((GROUND, 0.0, 0.0)))
+        x, _, z = np.array(joints).T
+        left.plot(x, z, "-o", color=str(shade), markersize=3, linewidth=1.2)
+        x, _, z = np.array([joints[1], place["coupler"].act(TRACER), joints[2]]).T
+        left.plot(x, z, color=str(shade), linewidth=0.7)
+    left.plot(curve[:, 0], curve[:, 2], color="#d55e00", linewidth=1.8, label="a point of the coupler")
+    left.set(aspect="equal", xlabel="x [m]", ylabel="z [m]", title="six positions of the linkage")
+    left.legend(loc="upper right", frameon=False)
+    right.plot(np.degrees(angles), np.degrees(exact[:, 1]), color="#0072b2", label="closed form")
+    right.plot(np.degrees(angles[::5]), np.degrees(found[::5, 1]), "o", color="#d55e00", markersize=4, label="solved")
+    right.set(xlabel="crank [degrees]", ylabel="rocker [degrees]", title="angle of the rocker", xlim=(0, 360))
+    right.set_xticks(range(0, 361, 90))
+    right.grid(color="#dddddd", linewidth=0.6)
+    right.legend(frameon=False)
+    chart.savefig(out / "four_bar.png", dpi=110)
+    pyplot.close(chart)
+    print(f"  {out / 'four_bar.png'}")
+
+
+if __name__ == "__main__":
+    command_line(main, __doc__)

@@ -1,0 +1,107 @@
+"""Rigid parts that no figure has, such as those of a `wholebody.Assembly`, as something the viewer can show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.geometry.placement import PlacementLike, placement
+from wholebody.geometry.shapes import Shape
+from wholebody.view.style import Color
+
+Array = NDArray[np.float64]
+
+
+class Part(NamedTuple):
+    """One shape of a part.
+
+    Attributes:
+        shape: what it is.
+        at: where in the part's frame.
+        color: red, green, blue, alpha; the viewer's choice if left out.
+    """
+
+    shape: Shape
+    at: PlacementLike = (0.0, 0.0, 0.0)
+    color: Color | None = None
+
+
+@dataclass(frozen=True)
+class _Colored:
+    color: Color | None
+
+
+class _Nothing(NamedTuple):
+    """No contacts: what parts do to each other is not asked here."""
+
+    pair: NDArray[np.intp] = np.zeros((0, 2), dtype=np.intp)
+    distance: Array = np.zeros(0)
+    normal: Array = np.zeros((0, 3))
+    point_a: Array = np.zeros((0, 3))
+    point_b: Array = np.zeros((0, 3))
+
+
+class Parts:
+    """Free rigid parts, for `Viewer(Parts(...))`; a posture is where each of them is, see `posture`.
+
+    Contacts are not computed.
+
+    Example:
+        >>> import wholebody as wb
+        >>> parts = Parts({"board": [Part(wb.Box((0.8, 0.3, 0.02)))]})
+        >>> parts.posture({"board": (0.0, 0.0, 1.0)}).shape
+        (7,)
+    """
+
+    revision = 0
+
+    def __init__(self, parts: Mapping[str, Iterable[Part]]) -> None:
+        """Take the shapes of each part, by the part's name.
+
+        Raises:
+            InputError: there is no part, or one has no shape or a placement that cannot be read.
+        """
+        if not parts:
+            raise InputError("there are no parts to show; give a mapping from names to shapes")
+        self.figure = None
+        self.model, self.geometry = pin.Model(), pin.GeometryModel()
+        owners, objects = [], {}
+        for name, shapes in parts.items():
+            joint = self.model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), name)
+            listed = [Part(*entry) for entry in shapes]
+            if not listed:
+                raise InputError(f"part {name!r} has no shape; give it one")
+            for number, part in enumerate(listed):
+                key = name if number == 0 else f"{name} {number + 1}"
+                base = placement(part.at, f"part {name!r}")
+                for count, piece in enumerate(part.shape.pieces()):
+                    made = pin.GeometryObject(f"{key}:{count}", joint, 0, base * piece.placement, piece.geometry)
+                    self.geometry.addGeometryObject(made)
+                    owners.append(key)
+                objects[key] = _Colored(part.color)
+        self.names = tuple(parts)
+        self.piece_owner = tuple(owners)
+        self.objects = MappingProxyType(objects)
+
+    def posture(self, placements: Mapping[str, Any]) -> Array:
+        """Where all parts are, (7 n,), from a placement for each name, as `AssemblySolution.placements` has them.
+
+        Raises:
+            UnknownNameError: a part has no placement.
+            InputError: a placement cannot be read.
+        """
+        for name in self.names:
+            if name not in placements:
+                raise UnknownNameError("placement", name, placements, "posture")
+        return np.concatenate([pin.SE3ToXYZQUAT(placement(placements[name], name)) for name in self.names])
+
+    def contacts(self, q: Array, within: float = 0.05) -> _Nothing:
+        """None: contacts are not computed here."""
+        return _Nothing()
