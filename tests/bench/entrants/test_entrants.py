@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,11 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.entrants import Entrant, entrants, missing, names, set_up
-from wholebody.errors import MissingPackageError, UnknownNameError
+from wholebody.bench.entrants import Entrant, Prepared, entrants, missing, names, set_up
+from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
 INSTALLED = entrants()
+CUBE = 0.05 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 
 
 by_name = pytest.mark.parametrize("entrant", INSTALLED, ids=lambda entrant: entrant.name)
@@ -50,6 +52,76 @@ def test_it_solves_a_free_reach_of_an_arm(entrant: Entrant, reach: wb.Problem) -
     assert judged.met(1.1e-4)
     assert judged.holds(1.1e-4)
     assert solution.assessment.goal_error == pytest.approx(judged.goal_error, abs=1e-12)
+
+
+@pytest.fixture(scope="module")
+def table() -> wb.Problem:
+    """Return a reach of a standing human to a place above a table, by a point of the hand."""
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.5, 1.0, 0.04)), name="table", at=(0.5, 0.0, 0.75))
+    return wb.Problem(
+        scene,
+        goals=[wb.Point("right_hand", (0.35, -0.2, 0.9), offset=(0.0, 0.0, -0.05))],
+        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")],
+        clearance=0.003,
+    )
+
+
+@by_name
+def test_it_solves_a_reach_of_a_human_or_refuses_or_says_what_is_wrong(entrant: Entrant, table: wb.Problem) -> None:
+    method = entrant.make(1e-4, None)
+    solution = method.solve(table)
+    judged = wb.assess(table, solution.q)
+    assert np.isfinite(solution.q).all()
+    assert table.scene.figure.within_limits(solution.q)
+    assert solution.solved == (judged.met(1.1e-4) and judged.holds(1.1e-4))
+    if entrant.name not in ("ccd", "dls", "newton/slack", "newton/barrier", "newton/kkt"):
+        assert solution.solved, solution.message
+
+
+@by_name
+def test_out_of_reach_by_a_metre_is_not_called_solved(entrant: Entrant, reach: wb.Problem) -> None:
+    figure = reach.scene.figure
+    problem = wb.Problem(wb.Scene(figure), goals=[wb.Point(figure.model.names[-1], (0.0, 2.2, 0.3))])
+    solution = entrant.make(1e-4, 60).solve(problem)
+    assert np.isfinite(solution.q).all()
+    assert figure.within_limits(solution.q)
+    assert solution.status in ("unreachable", "stalled")
+    assert wb.assess(problem, solution.q).goal_error > 0.9
+
+
+@by_name
+def test_what_it_cannot_express_is_refused_by_name(entrant: Entrant, table: wb.Problem) -> None:
+    if entrant.name.startswith("qp/"):
+        pytest.skip("it takes everything")
+    refused = [wb.Plane("head", (0, 0, 1), side="above"), wb.ReachCones()]
+    problem = wb.Problem(table.scene, goals=table.goals, constraints=refused)
+    with pytest.raises(InputError, match=r"Plane|ReachCones"):
+        entrant.make(1e-4, None).solve(problem)
+    method = entrant.make(1e-4, None)
+    if isinstance(method, Prepared):
+        with pytest.raises(InputError, match=r"Plane|ReachCones"):
+            method.prepare(problem)
+
+
+@by_name
+def test_objects_that_moved_are_where_they_are_now(entrant: Entrant, planar_arm: Callable[..., wb.Figure]) -> None:
+    if entrant.name == "dls":
+        pytest.skip("it sees no objects")
+    scene = wb.Scene(planar_arm((0.4, 0.3, 0.2))).add(wb.Hull(CUBE), name="cube", at=(3.0, 0.0, 0.0))
+    problem = wb.Problem(scene, np.array([0.3, 0.4, 0.4]), goals=[wb.Point("tip", (0.1, 0.7, 0.0))])
+    method = entrant.make(1e-4, None)
+    first = method.solve(problem)
+    assert first.solved, first.message
+    elbow = scene.state(first.q).frame(scene.frame_id("link2")).translation
+    scene.move("cube", at=tuple(elbow + (0.06, 0.0, 0.0)))
+    assert wb.assess(problem, first.q).penetration > 0.005
+    second = method.solve(problem)
+    inside = wb.assess(problem, second.q).penetration
+    if entrant.name == "mink":  # it drops pairs of the world and the body that hangs on it
+        assert inside < 1e-3 or second.status == "infeasible"
+    else:
+        assert inside < 1e-3
 
 
 def test_unknown_and_missing_entrants_are_named() -> None:

@@ -60,6 +60,18 @@ def _command(row: _Row) -> str:
     return f"pip install 'wholebody[{row.extra}]'"
 
 
+def _pink() -> Entrant:
+    from wholebody.bench.entrants.pink_entrant import pink_entrant
+
+    return pink_entrant()
+
+
+def _mink() -> Entrant:
+    from wholebody.bench.entrants.mink_entrant import mink_entrant
+
+    return mink_entrant()
+
+
 def _rows() -> dict[str, _Row]:
     from wholebody.methods.qp.solvers.base import solver_names
 
@@ -73,4 +85,6 @@ def _rows() -> dict[str, _Row]:
     rows["ccd"] = _Row(ccd_entrant)
     rows["dls"] = _Row(dls_entrant)
     rows["placo"] = _Row(placo_entrant, ("placo",), "compare")
+    rows["pink"] = _Row(_pink, ("pink", "daqp"), "compare")
+    rows["mink"] = _Row(_mink, ("mink", "mujoco", "daqp"), "compare")
     return rows
