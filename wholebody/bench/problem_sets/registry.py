@@ -5,20 +5,29 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from wholebody.bench.problem_sets import balance, closed_loop, clutter, free_reach, free_reach_several, self_contact
+from wholebody.bench.problem_sets import (
+    balance,
+    closed_loop,
+    clutter,
+    free_reach,
+    free_reach_several,
+    passage,
+    self_contact,
+)
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.errors import UnknownNameError
 
 SETS: Mapping[str, ProblemSet] = MappingProxyType(
     {
-        made.name: made
-        for made in (
-            free_reach.SET,
-            free_reach_several.SET,
-            clutter.SET,
-            self_contact.SET,
-            balance.SET,
-            closed_loop.SET,
+        module.SET.name: module.SET
+        for module in (
+            free_reach,
+            free_reach_several,
+            clutter,
+            self_contact,
+            balance,
+            closed_loop,
+            passage,
         )
     }
 )

@@ -70,7 +70,7 @@ class Touch:
 
 
 def make(number: int, seed: int) -> Case:
-    """In turn: a hand on the other elbow, both on the hips, arms crossed; in every second round turned as asked, too."""
+    """In turn: a hand on the other elbow, both on the hips, arms crossed; in every other round turned as asked."""
     rng, figure = generator(NAME, number, seed), human()
     start = figure.posture("standing")
     kind, turned = number % 3, number // 3 % 2 == 1
