@@ -82,7 +82,7 @@ def draw(scene: wb.Scene, drags: dict[str, Dragged], out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     for method, dragged in drags.items():
         with wb.Viewer(scene, title=f"sit_on_chair, {method}") as viewer:
-            viewer.look(eye=(1.5, -3.0, 1.3), target=(-0.2, 0.0, 0.8))
+            viewer.look(eye=(1.6, -3.2, 1.35), target=(-0.2, 0.0, 0.82))
             viewer.play(dragged)
             print(f"  {viewer.save(out / f'sit_on_chair_{method}.html')}")
             stages = [dragged.q[round(share * (len(dragged.q) - 1))] for share in STAGES]

@@ -1,0 +1,139 @@
+"""The challenge of Choi and Cremer 1999, figure 1: a standing person is dragged down onto a chair by the pelvis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.bench.drag import DragFrameRow, DragRow, drag_frames, drag_summary
+from wholebody.bench.machine import sentence
+from wholebody.bench.tables import markdown
+from wholebody.interaction.dragging import Dragged, drag_along, judge_drag, present_place
+from wholebody.interaction.paths import read_path, spread
+from wholebody.problem import Problem
+from wholebody.taskfile import read_task
+
+TASK = "sit_on_chair"
+METHODS = ("newton", "qp")
+FRAMES = 240
+
+COLUMNS = (
+    "method", "frames", "ms/frame, mean", "p95", "max", "CPU ms/frame", "iterations/frame", "deepest in a posture mm",
+    "between postures mm", "pelvis over the seat mm", "thorax to backrest mm", "feet drift mm",
+    "pelvis off its place mm", "end",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ChallengeRow:
+    """One method; milliseconds and millimetres. Depths are those of `DragRow`, distances those of the last posture.
+
+    Attributes:
+        seat_mm: from the pelvis to the seat.
+        back_mm: from the thorax to the backrest.
+        feet_mm: farthest that a sole is from where it stood, in any posture.
+    """
+
+    method: str
+    frames: int
+    mean_ms: float
+    p95_ms: float
+    max_ms: float
+    cpu_mean_ms: float
+    iterations: float
+    depth_mm: float
+    between_mm: float
+    seat_mm: float
+    back_mm: float
+    feet_mm: float
+    left_mm: float
+    status: str
+
+
+def measure(
+    task: Path, frames: int, say: Callable[[str], None]
+) -> tuple[list[ChallengeRow], dict[str, list[DragFrameRow]]]:
+    """Drag by each method; a row each, and the rows of all frames by method.
+
+    Args:
+        task: sit_on_chair.toml, with its path beside it.
+        frames: of the way.
+        say: takes a line about each method.
+    """
+    problem = read_task(task).problem
+    places = spread(np.vstack([present_place(problem), read_path(task.with_suffix(".csv"))]), frames)
+    rows, every = [], {}
+    for method in METHODS:
+        dragged = drag_along(problem, places, method)
+        judged = judge_drag(problem, dragged)
+        rows.append(_row(problem, dragged, drag_summary(TASK, dragged, judged)))
+        every[dragged.method] = drag_frames(TASK, dragged, judged)
+        say(f"{rows[-1].method}: {rows[-1].mean_ms:.1f} ms a frame, {rows[-1].seat_mm:.2f} mm over the seat")
+    return rows, every
+
+
+def report(rows: Sequence[ChallengeRow], facts: Mapping[str, str]) -> str:
+    """The table as Markdown."""
+    cells = [
+        (
+            row.method, str(row.frames), f"{row.mean_ms:.2f}", f"{row.p95_ms:.2f}", f"{row.max_ms:.1f}",
+            f"{row.cpu_mean_ms:.2f}", f"{row.iterations:.1f}", f"{row.depth_mm:.4f}", f"{row.between_mm:.2g}",
+            f"{row.seat_mm:.2f}", f"{row.back_mm:.2f}", f"{row.feet_mm:.3f}", f"{row.left_mm:.1e}", row.status,
+        )
+        for row in rows
+    ]  # fmt: skip
+    return "\n\n".join(
+        [
+            markdown(COLUMNS, cells),
+            "Penetration is judged by coal over every pair of pieces in every posture; between postures stands a "
+            "bound, found by a continuous sweep, on how much deeper any pair gets on the way than at its deeper end. "
+            "The goal goes 20 mm into the seat and 10 mm towards the backrest before its place; the distances are those "
+            "of the last posture.",
+            sentence(facts),
+        ]
+    )
+
+
+def _row(problem: Problem, dragged: Dragged, row: DragRow) -> ChallengeRow:
+    return ChallengeRow(
+        method=row.method,
+        frames=row.frames,
+        mean_ms=row.mean_ms,
+        p95_ms=row.p95_ms,
+        max_ms=row.max_ms,
+        cpu_mean_ms=row.cpu_mean_ms,
+        iterations=row.iterations,
+        depth_mm=row.depth_mm,
+        between_mm=row.between_mm,
+        seat_mm=1e3 * _apart(problem, dragged, "pelvis", "seat"),
+        back_mm=1e3 * _apart(problem, dragged, "thorax", "backrest"),
+        feet_mm=1e3 * _drift(problem, dragged),
+        left_mm=row.end_error_mm,
+        status=row.status,
+    )
+
+
+def _apart(problem: Problem, dragged: Dragged, segment: str, thing: str) -> float:
+    """Distance of a segment to a thing in the last posture, metres."""
+    contacts, owner = problem.scene.contacts(dragged.q[-1], within=0.2), problem.scene.piece_owner
+    found = [
+        float(distance)
+        for pair, distance in zip(contacts.pair, contacts.distance, strict=True)
+        if {owner[piece] for piece in pair} == {segment, thing}
+    ]
+    return min(found, default=np.inf)
+
+
+def _drift(problem: Problem, dragged: Dragged) -> float:
+    """Farthest that a sole is from where it began, metres."""
+    model = problem.scene.model
+    data, frames = model.createData(), [problem.scene.frame_id(f"{side}_sole") for side in ("left", "right")]
+    places = []
+    for q in dragged.q:
+        pin.framesForwardKinematics(model, data, q)
+        places.append([np.array(data.oMf[frame].translation) for frame in frames])
+    return float(np.linalg.norm(np.array(places) - np.array(places[0]), axis=2).max())
