@@ -13,8 +13,48 @@ COLORS = {
     "placo": "#d55e00",
     "mink": "#009e73",
     "pink": "#cc79a7",
+    "qp/osqp": "#0072b2",
+    "qp/daqp": "#56b4e9",
+    "qp/quadprog": "#332288",
+    "qp/proxqp": "#44aaaa",
+    "qp/piqp": "#8888dd",
+    "newton/slack": "#e69f00",
+    "newton/barrier": "#996515",
+    "newton/kkt": "#f0d03c",
+    "ccd": "#000000",
+    "dls": "#888888",
 }
-"""Okabe and Ito's colours, which people with any colour vision tell apart."""
+"""Okabe and Ito's colours, which people with any colour vision tell apart; a family's others are shades of its own."""
+
+MARKERS = {
+    "qp/osqp": "o",
+    "qp/daqp": "s",
+    "qp/quadprog": "D",
+    "qp/proxqp": "p",
+    "qp/piqp": "h",
+    "newton/slack": "^",
+    "newton/barrier": "v",
+    "newton/kkt": "<",
+    "ccd": "X",
+    "dls": "x",
+    "placo": "P",
+    "pink": "*",
+    "mink": ">",
+}
+"""Markers of the methods, so that charts are read without colours too."""
+
+OTHER_COLOR, OTHER_MARKER = "#bbbbbb", "."
+
+
+def color(name: str) -> str:
+    """The colour of a tool or method; grey for a QP solver that only this machine has."""
+    return COLORS.get(name, OTHER_COLOR)
+
+
+def marker(name: str) -> str:
+    """The marker of a method; a dot for one that has none."""
+    return MARKERS.get(name, OTHER_MARKER)
+
 
 _SETTINGS = {
     "svg.hashsalt": "wholebody",  # names inside the file do not depend on chance

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.bench import style
 from wholebody.bench.entrants import Entrant, Prepared, entrants, missing, names, set_up
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
@@ -92,8 +93,8 @@ def test_out_of_reach_by_a_metre_is_not_called_solved(entrant: Entrant, reach: w
 
 @by_name
 def test_what_it_cannot_express_is_refused_by_name(entrant: Entrant, table: wb.Problem) -> None:
-    if entrant.name.startswith("qp/"):
-        pytest.skip("it takes everything")
+    if entrant.name.startswith(("qp/", "newton/")):
+        pytest.skip("it takes every term that there is")
     refused = [wb.Plane("head", (0, 0, 1), side="above"), wb.ReachCones()]
     problem = wb.Problem(table.scene, goals=table.goals, constraints=refused)
     with pytest.raises(InputError, match=r"Plane|ReachCones"):
@@ -133,3 +134,9 @@ def test_unknown_and_missing_entrants_are_named() -> None:
         assert command.startswith("pip install")
         with pytest.raises(MissingPackageError, match="pip install"):
             entrants([name])
+
+
+def test_every_entrant_has_a_colour_and_a_marker_of_its_own() -> None:
+    known = [name for name in names() if name in style.MARKERS]
+    assert {"qp/osqp", "qp/daqp", "newton/slack", "ccd", "dls", "placo", "pink", "mink"} <= set(known)
+    assert len({style.color(name) for name in known}) == len({style.marker(name) for name in known}) == len(known)

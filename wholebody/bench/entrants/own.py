@@ -92,10 +92,10 @@ def newton_entrant(way: str) -> Entrant:
         name=f"newton/{way}",
         make=partial(_newton, way),
         loose=(*_few(3, 6, 12, 25), *LADDER[1:]),
-        setup=f"wb.Newton() with {_NEWTON_SETUPS[way]}; at most 200 iterations, one start.",
+        setup=f"wb.Newton() with {_NEWTON_SETUPS[way]}; all else as it comes. A budget of few iterations has one "
+        "start.",
         differences=(
-            "newton minimises no measure but Effort, as the least motion from the start",
-            "newton has no equations for CenterOfMass, Balance, Posture, ReachCones and Axis(toward=...)",
+            "newton minimises measures up to what the stopping of its iteration leaves, and PotentialEnergy not at all",
         ),
     )
 
@@ -125,7 +125,7 @@ def _newton(way: str, tolerance: float, iterations: int | None) -> Method:
 
     if iterations is None:
         return Newton(tolerance=tolerance, **NEWTONS[way])
-    return Newton(tolerance=tolerance, iterations=iterations, **NEWTONS[way])
+    return Newton(tolerance=tolerance, iterations=iterations, restarts=0, **NEWTONS[way])
 
 
 def _dls(tolerance: float, iterations: int | None) -> Method:
