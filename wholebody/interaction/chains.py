@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.interaction.removal import Removal
@@ -14,20 +15,39 @@ Array = NDArray[np.float64]
 NOTED = 1e-3
 """Depth left, metres, that a frame's note speaks of."""
 
+SPEED = 4.0
+"""rad/s at which a joint may be displaced from the tracked one, or be drawn back: fast enough to be back from 2 rad in
+half a second, and slow enough not to look like a jump."""
+
+ROOT_SPEED = 2.0  # m/s
+
 
 class LimbByLimb:
     """Follows tracked postures by the loop of Schmidl and Lin, see `wholebody.methods.ccd.overlap`."""
 
     graze = 8e-4
 
-    def __init__(self, scene: Scene, seed: int) -> None:
-        """Set up; the seed is of the order of the chains."""
+    def __init__(self, scene: Scene, shown: Array, dt: float, seed: int) -> None:
+        """Set up for frames of `dt` seconds.
+
+        Args:
+            scene: the figure among things.
+            shown: (nq,) where the figure is.
+            dt: seconds from frame to frame.
+            seed: of the order of the chains.
+        """
         self.scene = scene
+        self._pace = np.full(scene.model.nv, SPEED * dt)
+        if scene.figure.root == "free":
+            self._pace[:3] = ROOT_SPEED * dt
+        self._tracked = shown
         self._rng = np.random.default_rng(seed)
 
     def remove(self, shown: Array, tracked: Array) -> Removal:
         """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""
-        result = remove_overlap(self.scene, shown, tracked, self._rng)
+        pace = self._pace + np.abs(pin.difference(self.scene.model, self._tracked, tracked))
+        self._tracked = tracked
+        result = remove_overlap(self.scene, shown, tracked, self._rng, pace)
         note = f"{1e3 * result.deepest:.1f} mm of overlap are left" if result.deepest > NOTED else ""
         return Removal(
             ways=(result.q,),

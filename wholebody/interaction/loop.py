@@ -151,7 +151,7 @@ class FrameLoop:
             return AsAWhole(self.scene)
         from wholebody.interaction.chains import LimbByLimb
 
-        return LimbByLimb(self.scene, seed)
+        return LimbByLimb(self.scene, self.shown, dt, seed)
 
 
 def _clocks() -> tuple[float, float]:

@@ -96,6 +96,11 @@ class ConeGuard:
         self._stand: Placement = WORLD
         self._last: list[float] | None = None
 
+    def holds(self, data: Any) -> bool:
+        """Whether the limb is in its cone where the joints of Pinocchio's data are."""
+        base = data.oMi[self._base_joint].rotation @ self._base_placement.rotation
+        return self._polygon.contains(_three((data.oMi[self._limb_joint].rotation @ self._axis) @ base))
+
     def read(self, data: Any) -> None:
         """Take from Pinocchio's data what the nodes do not move; `limbs.read` and `limbs.forward` come before."""
         if not self.nodes:

@@ -17,6 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.errors import InputError
+from wholebody.methods.ccd.drawing import Drawer
 from wholebody.methods.ccd.passing import jump
 from wholebody.methods.ccd.remover import Remover, Tally
 from wholebody.scene import Scene
@@ -30,13 +31,11 @@ ENOUGH = 55  # looks and goals after which a frame makes no further step, and th
 LEAST = 15  # looks and goals for small steps, where larger ones led nowhere straight
 TOO_MANY = 20  # looks and goals beyond these after which no chain has another turn
 HALVINGS = 7  # of an interpolation: a step of 3 cm to a quarter of a millimetre
-LEAST_GAIN = 1e-7  # rad^2: a chain that gets no nearer than this to the tracked posture stays where it is
-HELD_UP = 0.4  # a part that gains less than this share of what drawing alone would have is held up (2 is all of it)
 SHAKES = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things came upon and that no joint's best value frees
 APART = 0.02  # m: how far a tip moves between two looks at the straight way from one shown posture to the next
 MOST_LOOKS = 5
 DIP = 4e-4  # m: how deep it may go in there
-ARRIVED = 1e-12  # rad^2: a chain this near is there
+TINY = 1e-12  # rad, m
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ class OverlapResult:
 
 
 def remove_overlap(
-    scene: Scene, q_free: Array, q_wanted: Array, rng: np.random.Generator, *, steps: int = STEPS
+    scene: Scene, q_free: Array, q_wanted: Array, rng: np.random.Generator, pace: Array | None = None
 ) -> OverlapResult:
     """The posture nearest to the wanted one that this frame can reach without overlap.
 
@@ -76,7 +75,8 @@ def remove_overlap(
         q_free: (nq,) the last posture without overlap: the one shown before.
         q_wanted: (nq,) the tracked posture. It may be in anything; limits and cones are kept for it.
         rng: of the order of the chains; the same seed gives the same answer.
-        steps: most steps of 3 cm that the frame may take; what is left waits for the next frame.
+        pace: (nv,) most that each degree of freedom may move, radians and metres; without end where None. What is left
+            waits for the next frame. Where things moved onto `q_free`, leaving them comes first.
 
     Returns:
         The posture, within limits and reach cones and never NaN. Where things moved onto `q_free`, that is removed
@@ -88,7 +88,7 @@ def remove_overlap(
     checked = [_posture(scene, q, what) for q, what in ((q_free, "q_free"), (q_wanted, "q_wanted"))]
     if scene not in _FRAMES or _FRAMES[scene].revision != scene.revision:
         _FRAMES[scene] = Frames(scene)
-    return _FRAMES[scene].remove(checked[0], checked[1], rng, steps)
+    return _FRAMES[scene].remove(checked[0], checked[1], rng, pace)
 
 
 class Frames:
@@ -100,23 +100,14 @@ class Frames:
         self._model, self._figure, self._proximity = scene.model, scene.figure, scene.proximity
         self._remover = Remover(scene, exact=False) if remover is None else remover
         self._sweeper = scene.sweeper
-        self._parts: list[tuple[NDArray[np.intp], Array]] = []
-        rest = np.ones(scene.model.nv, dtype=bool)
-        for chain in self._remover.chains.values():
-            joints = [scene.model.joints[joint] for joint in chain.limbs.joints]
-            dofs = np.array([joint.idx_v for joint in joints], dtype=np.intp)
-            fresh = rest[dofs]
-            rest[dofs] = False
-            self._parts.append((dofs[fresh], np.array(chain.reach)[fresh]))
-        size = max([float(reach.max(initial=0.5)) for _, reach in self._parts], default=0.5)
-        others = np.flatnonzero(rest)
-        reach = np.full(len(others), 2.0 * size)
-        if scene.figure.root == "free":
-            reach[others < 3] = 1.0
-        self._parts.append((others, reach))
+        self._drawer = Drawer(scene, self._remover)
+        self._parts = self._drawer.parts
 
-    def remove(self, q_free: Array, q_wanted: Array, rng: np.random.Generator, steps: int = STEPS) -> OverlapResult:
+    def remove(
+        self, q_free: Array, q_wanted: Array, rng: np.random.Generator, pace: Array | None = None
+    ) -> OverlapResult:
         """See `remove_overlap`."""
+        self._pace = np.full(self._model.nv, np.inf) if pace is None else pace
         remover = self._remover
         remover.tally = Tally()
         wanted = remover.into_cones(self._figure.clamp(q_wanted))
@@ -131,43 +122,57 @@ class Frames:
         if overlaps:
             return self._result(q if remover.look(wanted) else wanted)
         before = self._proximity.placements.copy()
-        if not remover.look(wanted) and not self._jumps(before, q, wanted) and self._clear(q, wanted):
-            self._swept &= not pushed
-            return self._result(wanted)
-        self._limit = remover.tally.work + ENOUGH
-        for self._step in (STEP, SMALL_STEP):
-            self._limit = max(self._limit, remover.tally.work + LEAST)
-            shown = self._straight(self._approach(q, wanted, before, rng, steps))
+        shown = None
+        if not remover.look(wanted) and not self._jumps(before, q, wanted):
+            shown = self._toward(q, wanted)
+        self._drawer.limit = remover.tally.work + ENOUGH + TOO_MANY
+        for self._drawer.step in (STEP, SMALL_STEP) if shown is None else ():
+            self._drawer.limit = max(self._drawer.limit, remover.tally.work + LEAST + TOO_MANY)
+            way = self._approach(q, wanted, before, rng)
+            chosen = dict.fromkeys((len(way) - 1, len(way) // 2, 0)) if way else ()
+            found = (self._toward(q, way[k]) for k in chosen)
+            shown = next((made for made in found if made is not None), None)
             if shown is not None:
-                self._swept &= not pushed
-                return self._result(shown)
-        self._swept = False
-        return self._result(q)
+                break
+        self._swept = shown is not None and not pushed
+        return self._result(q if shown is None else shown)
 
-    def _approach(self, q: Array, wanted: Array, before: Array, rng: np.random.Generator, steps: int) -> list[Array]:
+    def _approach(self, q: Array, wanted: Array, before: Array, rng: np.random.Generator) -> list[Array]:
         """From a free posture towards the wanted one, step by step: the postures on the way."""
         remover = self._remover
         settled = [False] * len(self._parts)
-        way = [q]
-        for _ in range(steps):
-            if remover.tally.work > self._limit:
+        way = []
+        for _ in range(STEPS):
+            if remover.tally.work > self._drawer.limit - TOO_MANY:
                 break
-            drawn = self._draw(q, wanted, settled)
+            drawn = self._drawer.draw(q, wanted, settled)
             if drawn is None:
                 break
-            trial, overlaps = remover.separate(drawn[0], rng, self._limit + TOO_MANY)
+            trial, overlaps = remover.separate(drawn[0], rng, self._drawer.limit)
             if overlaps:
                 trial = self._interpolate(q, trial)
             if self._jumps(before, q, trial):
                 trial = self._interpolate(q, self._hit)
-            q = self._keep_gains(q, trial, wanted, drawn[1], settled)
+            q = self._drawer.keep_gains(q, trial, wanted, drawn[1], settled)
             way.append(q)
             before = self._proximity.placements.copy()
         return way
 
-    def _straight(self, way: list[Array]) -> Array | None:
-        """The last posture of the way to which the first can go straight, as it will be shown, without dipping in."""
-        return next((q for q in way[:0:-1] if self._clear(way[0], q)), None)
+    def _toward(self, q0: Array, q1: Array) -> Array | None:
+        """As far from q0 straight towards q1 as a frame may go, without dipping in; None where that is not free.
+
+        Where the way is too long each part goes its own share of it, or else all of them the least of these.
+        """
+        way = np.asarray(pin.difference(self._model, q0, q1))
+        shares = np.minimum(1.0, self._pace / np.maximum(np.abs(way), TINY))
+        for dofs, _ in self._parts:
+            shares[dofs] = shares[dofs].min(initial=1.0)
+        for share in (shares, shares.min()) if shares.min() < 1.0 else (1.0,):
+            q = self._figure.clamp(np.asarray(pin.integrate(self._model, q0, share * way)))
+            q = self._remover.into_cones(q)
+            if not self._remover.look(q) and self._clear(q0, q):
+                return q
+        return None
 
     def _clear(self, q0: Array, q1: Array) -> bool:
         """Whether the straight way between two shown postures does not dip in; looks are cheap, the sweep is sure."""
@@ -178,74 +183,13 @@ class Frames:
             self._remover.look(np.asarray(pin.interpolate(self._model, q0, q1, (k + 1) / (looks + 1))))
             if self._remover.deepest > DIP:
                 return False
-        self._swept = self._sweeper.first_contact(q0, q1, None, 2.0 * DIP) is None
-        return self._swept
+        return self._sweeper.first_contact(q0, q1, None, 2.0 * DIP) is None
 
     def _shaken(self, q: Array, size: float, rng: np.random.Generator) -> Array:
         """Copy of a posture q (nq,) with its joints moved at random: a straight arm pushed along itself must bend."""
         step = size * rng.normal(size=self._model.nv)
         step[self._parts[-1][0]] = 0.0
         return self._remover.into_cones(self._figure.clamp(np.asarray(pin.integrate(self._model, q, step))))
-
-    def _draw(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
-        """Draw every part that is not settled a step towards the wanted posture; None where none is left to draw.
-
-        Returns:
-            The posture drawn, (nq,), and the share of its way that each part was drawn, (parts,).
-        """
-        way = np.asarray(pin.difference(self._model, q, wanted))
-        shares = np.zeros(len(self._parts))
-        for k, (dofs, reach) in enumerate(self._parts):
-            part = way[dofs]
-            length = float(np.abs(part) @ reach)
-            if not settled[k] and float(part @ part) >= ARRIVED:
-                shares[k] = min(1.0, self._step / length)
-            way[dofs] = part * shares[k]
-        if not shares.any():
-            return None
-        return np.asarray(pin.integrate(self._model, q, way)), shares
-
-    def _keep_gains(self, q: Array, trial: Array, wanted: Array, shares: Array, settled: list[bool]) -> Array:
-        """Undo what brought a part no nearer to the wanted posture, and draw joints one by one where a part is held up.
-
-        Where pushing undoes what drawing did, single joints may still be free: a shoulder that draws the whole arm
-        back, although the wrist cannot straighten yet. A part for which this gains nothing either is settled.
-        """
-        before = np.asarray(pin.difference(self._model, q, wanted))
-        after = np.asarray(pin.difference(self._model, trial, wanted))
-        back = np.zeros(self._model.nv, dtype=bool)
-        slow = []
-        for k, (dofs, _) in enumerate(self._parts):
-            old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
-            if shares[k] and old - new < LEAST_GAIN:
-                back[dofs] = True
-            if shares[k] and old - new < HELD_UP * shares[k] * old:
-                slow.append(k)
-        if back.any():
-            way = np.asarray(pin.difference(self._model, trial, q))
-            kept = np.asarray(pin.integrate(self._model, trial, np.where(back, way, 0.0)))
-            if not self._remover.look(kept):
-                trial = kept
-        for k in slow:
-            trial, gained = self._draw_joints(trial, wanted, k)
-            settled[k] = not gained
-        if len(slow) or back.any():
-            self._remover.look(trial)
-        return trial
-
-    def _draw_joints(self, q: Array, wanted: Array, part: int) -> tuple[Array, bool]:
-        """Draw one joint after the other, from the root outwards, where that is free; whether any moved."""
-        gained = False
-        for dof, reach in zip(*self._parts[part], strict=True):
-            way = float(pin.difference(self._model, q, wanted)[dof])
-            if way * way < LEAST_GAIN or self._remover.tally.work > self._limit + TOO_MANY:
-                continue
-            step = np.zeros(self._model.nv)
-            step[dof] = min(max(way, -self._step / reach), self._step / reach)
-            trial = np.asarray(pin.integrate(self._model, q, step))
-            if not self._remover.look(trial):
-                q, gained = trial, True
-        return q, gained
 
     def _interpolate(self, free: Array, q: Array) -> Array:
         """The last free posture on the way from a free one, by halving."""

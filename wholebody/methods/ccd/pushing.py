@@ -88,6 +88,10 @@ class ChainPusher:
         for guard in self._guards:
             guard.read(data)
 
+    def in_cones(self, data: Any) -> bool:
+        """Whether the limbs are in their reach cones where the joints of `data` are; `read` is not needed."""
+        return all(guard.holds(data) for guard in self._guards)
+
     def keep_cones(self) -> bool:
         """Bring limbs that have left their reach cones back into them; true if all are inside."""
         inside = [guard.keep() for guard in self._guards]

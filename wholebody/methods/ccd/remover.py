@@ -173,11 +173,13 @@ class Remover:
     def into_cones(self, q: Array) -> Array:
         """Copy of a posture q (nq,) with its limbs turned back into their reach cones."""
         q = q.copy()
+        pin.forwardKinematics(self.scene.model, self._data, q)
         for chain in self.chains.values():
-            pin.forwardKinematics(self.scene.model, self._data, q)
-            chain.read(q, self._data)
-            chain.keep_cones()
-            chain.limbs.write(q)
+            if not chain.in_cones(self._data):
+                chain.read(q, self._data)
+                chain.keep_cones()
+                chain.limbs.write(q)
+                pin.forwardKinematics(self.scene.model, self._data, q)
         return q
 
 
