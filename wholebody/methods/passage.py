@@ -52,7 +52,11 @@ def jumps(scene: Scene, before: Placed, after: Placed, q0: Array, q1: Array) -> 
         q0: (nq,) posture before the step.
         q1: (nq,) posture after it.
     """
-    doubtful = doubtful_pairs(scene.proximity, before, after)
+    moved = _far_moved(scene.proximity, before, after)
+    if not len(moved):
+        return False
+    moved = moved[~_passing_by(scene, before, after, q0, q1, moved)]
+    doubtful = _not_parted(scene.proximity, before, after, moved)
     return bool(len(doubtful)) and _jumps(scene, before, after, q0, q1, doubtful, HALVINGS)
 
 
@@ -87,6 +91,11 @@ def _sweep_jumps(scene: Scene, q0: Array, q1: Array, doubtful: Indices, end: Arr
 
 def doubtful_pairs(proximity: Proximity, before: Placed, after: Placed) -> Indices:
     """Pairs (indices into the collision pairs) that may have changed sides between two postures."""
+    return _not_parted(proximity, before, after, _far_moved(proximity, before, after))
+
+
+def _far_moved(proximity: Proximity, before: Placed, after: Placed) -> Indices:
+    """Pairs that moved against each other by more than lay between them."""
     motion = _motion(proximity, before.placements, after.placements)
     pairs = proximity.pairs
     way = motion[pairs[:, 0]] + motion[pairs[:, 1]]
@@ -96,8 +105,48 @@ def doubtful_pairs(proximity: Proximity, before: Placed, after: Placed) -> Indic
         return doubtful
     # pairs that were not measured are at least as far apart as their bounding spheres
     spheres = _spheres_apart(proximity, before, doubtful) + _spheres_apart(proximity, after, doubtful)
-    doubtful = doubtful[way[doubtful] > proximity.widths[doubtful] + spheres]
-    listed = np.full(len(pairs), -1, dtype=np.intp)
+    beyond = way[doubtful] > proximity.widths[doubtful] + spheres
+    doubtful, spheres = doubtful[beyond], spheres[beyond]
+    # neighbouring segments move far together: what counts is the way of one seen from the other
+    seen = np.minimum(
+        _relative_motion(proximity, before.placements, after.placements, pairs[doubtful, 0], pairs[doubtful, 1]),
+        _relative_motion(proximity, before.placements, after.placements, pairs[doubtful, 1], pairs[doubtful, 0]),
+    )
+    moved: Indices = doubtful[seen > proximity.widths[doubtful] + spheres]
+    return moved
+
+
+def _passing_by(scene: Scene, before: Placed, after: Placed, q0: Array, q1: Array, pairs: Indices) -> NDArray[np.bool_]:
+    """Which of these pairs keep their bounding spheres apart all the way, as a look at its middle has it.
+
+    The centres' way against each other is taken for the two chords that meet in the middle; what it leaves them by is
+    a quarter of what the middle is off the whole chord where the way is a parabola, and taken for twice that.
+    """
+    proximity = scene.proximity
+    proximity.place(scene.state(np.asarray(pin.interpolate(scene.model, q0, q1, 0.5))).data)
+    first, second = proximity.pairs[pairs, 0], proximity.pairs[pairs, 1]
+    start, middle, end = (
+        placements[first, 3] - placements[second, 3]
+        for placements in (before.placements, proximity.placements, after.placements)
+    )
+    bow = middle - 0.5 * (start + end)
+    room = np.minimum(_nearest(start, middle), _nearest(middle, end)) - 0.5 * np.sqrt(np.einsum("ij,ij->i", bow, bow))
+    apart: NDArray[np.bool_] = room > proximity.reach[first] + proximity.reach[second]
+    return apart
+
+
+def _nearest(start: Array, end: Array) -> Array:
+    """Least distance (k,) of the origin from the segments between points (k, 3)."""
+    along = end - start
+    share = -np.einsum("ij,ij->i", start, along) / np.maximum(np.einsum("ij,ij->i", along, along), 1e-30)
+    point = start + np.clip(share, 0.0, 1.0)[:, None] * along
+    nearest: Array = np.sqrt(np.einsum("ij,ij->i", point, point))
+    return nearest
+
+
+def _not_parted(proximity: Proximity, before: Placed, after: Placed, doubtful: Indices) -> Indices:
+    """Those of these pairs that no plane parts before and after."""
+    listed = np.full(len(proximity.pairs), -1, dtype=np.intp)
     listed[before.contacts.number] = np.arange(len(before.contacts.number))
     return np.array([k for k in doubtful if not _parted(proximity, before, after, int(listed[k]))], dtype=np.intp)
 
@@ -122,6 +171,22 @@ def _spheres_apart(proximity: Proximity, placed: Placed, pairs: Indices) -> Arra
     gap = np.sqrt(np.einsum("ij,ij->i", between, between)) - proximity.reach[first] - proximity.reach[second]
     apart: Array = np.maximum(gap, _apart(placed, len(proximity.pairs))[pairs])
     return apart
+
+
+def _relative_motion(proximity: Proximity, before: Array, after: Array, carrier: Indices, other: Indices) -> Array:
+    """Longest way (k,) that any point of the other pieces made in the axes of their carriers, metres."""
+    shift, turn = np.zeros((len(other), 3)), np.zeros((len(other), 3, 3))
+    for sign, placements in ((1.0, after), (-1.0, before)):
+        axes = placements[carrier, :3].transpose(0, 2, 1)
+        shift += sign * np.einsum("ij,ijk->ik", placements[other, 3] - placements[carrier, 3], axes)
+        turn += sign * (placements[other, :3] @ axes)
+    angle = np.sqrt(0.5 * np.einsum("ijk,ijk->i", turn, turn))
+    reach = proximity.reach[other]
+    motion: Array = ARC * (
+        np.sqrt(np.einsum("ij,ij->i", shift, shift))
+        + np.where(angle > 1e-12, angle, 0.0) * np.where(np.isfinite(reach), reach, 1e9)
+    )
+    return motion
 
 
 def _motion(proximity: Proximity, before: Array, after: Array) -> Array:
