@@ -140,6 +140,8 @@ def _legend(chart: Any, results: Results, drawn: dict[str, Any]) -> None:
             [drawn[name] for name in names], names, loc="outside lower center", ncols=min(len(names), 6),
             frameon=False, fontsize=9,
         )  # fmt: skip
+    chart.draw_without_rendering()
+    chart.set_layout_engine("none")  # laid out once, not for each of the files
 
 
 def draw_all(results: Results, titles: Iterable[tuple[str, str]], folder: Path) -> dict[str, tuple[Path, Path]]:

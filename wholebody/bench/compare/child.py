@@ -15,7 +15,7 @@ import sys
 from dataclasses import replace
 from typing import Any
 
-from wholebody.bench.compare.messages import Build, Solve, receive, send
+from wholebody.bench.compare.messages import Build, Draw, Solve, receive, send
 from wholebody.bench.entrants.base import Entrant
 
 BUILDING = 120.0  # s: to build a case and what belongs to its scene; compiling once included
@@ -42,7 +42,7 @@ class _Served:
         self._ready: Any = None
         self._warm: set[tuple[str, bool]] = set()
 
-    def answer(self, request: Build | Solve) -> Any:
+    def answer(self, request: Build | Solve | Draw) -> Any:
         from wholebody.bench.compare.solving import ready, sentence, solve
 
         if isinstance(request, Build):
@@ -54,6 +54,11 @@ class _Served:
             except Exception as error:
                 return f"{type(error).__name__}: {sentence(error)}"
             return None
+        if isinstance(request, Draw):
+            from wholebody.bench.compare.scenes import page
+
+            with _Alarm(2.0 * request.cap):
+                return page(request.good, request.bad, self._ready)
         entrant, level, cap = request
         self._warm_up(entrant, cap)
         with _Alarm(cap):

@@ -11,8 +11,8 @@ accurate. Two methods are compared on the cases that both solved at all their bu
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import inf
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,8 @@ FAMILY = "qp/"
 """The same method with other solvers, which is not another method."""
 
 
-class Rival(NamedTuple):
+@dataclass(frozen=True)
+class Rival:
     """The worst that another method does to ours in one chart.
 
     Attributes:

@@ -109,6 +109,20 @@ def compute(tasks: Iterator[Task], jobs: int, cluster: str | None = None) -> Ite
         yield from parallel(joblib.delayed(work)(task) for task in tasks)
 
 
+def threads(cluster: str) -> int:
+    """How many cases a cluster works on at a time.
+
+    Raises:
+        MissingPackageError: dask is not installed.
+        WholebodyError: the cluster does not answer, or has no workers.
+    """
+    with _client(cluster) as client:
+        found = sum(client.nthreads().values())
+    if not found:
+        raise WholebodyError(f"the dask scheduler at {cluster} has no workers; start some: dask worker {cluster}")
+    return int(found)
+
+
 def _client(address: str) -> AbstractContextManager[Any]:
     try:
         from distributed import Client

@@ -27,6 +27,14 @@ class Solve(NamedTuple):
     cap: float
 
 
+class Draw(NamedTuple):
+    """Request to draw two answers to the case that was built last; the answer is the HTML of a page."""
+
+    good: Entrant
+    bad: Entrant
+    cap: float
+
+
 def send(stream: IO[bytes], message: bytes) -> None:
     """Write one message."""
     stream.write(HEAD.pack(len(message)) + message)

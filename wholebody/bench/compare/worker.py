@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import wholebody
-from wholebody.bench.compare.messages import Build, Solve, receive, send
+from wholebody.bench.compare.messages import Build, Draw, Solve, receive, send
 from wholebody.errors import MissingPackageError, WholebodyError
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -63,6 +63,15 @@ class Worker:
             self._ask(self._built)
         return self._ask(request)
 
+    def draw(self, request: Draw) -> str:
+        """Draw two answers to the case that was built last; return a page.
+
+        Raises:
+            EndedError: the process has ended over it.
+        """
+        page: str = self._ask(request)
+        return page
+
     def close(self) -> None:
         """End the process."""
         if self._process is not None:
@@ -73,7 +82,7 @@ class Worker:
                     stream.close()
         self._process = self._errors = None
 
-    def _ask(self, request: Build | Solve) -> Any:
+    def _ask(self, request: Build | Solve | Draw) -> Any:
         process = self._process or self._start()
         assert process.stdin is not None
         assert process.stdout is not None

@@ -1,0 +1,109 @@
+"""`wholebody bench compare`: every method on every problem set, speed against accuracy."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from wholebody.cli.bench.publishing import check_count
+
+if TYPE_CHECKING:
+    from wholebody.bench.compare.settings import Settings
+
+DESCRIPTION = """\
+Solve problems with known answers by every method at many budgets, and chart speed against accuracy. Writes a report
+(report.html) that says which method to choose when, charts as SVG and PNG, and every solve as CSV. A run that was
+ended goes on where it was when it is called again with the same settings and folder; a finished one writes its report
+anew. --jobs works on cases beside each other through joblib; --cluster does so on a dask cluster."""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = commands.add_parser("compare", help="every method on every problem set", description=DESCRIPTION)
+    parser.add_argument("--quick", action="store_true", help="20 problems a set, within three minutes on two cores")
+    parser.add_argument("--sets", nargs="+", metavar="NAME", help="problem sets (default: all)")
+    parser.add_argument("--methods", nargs="+", metavar="NAME", help="methods (default: all that are installed)")
+    parser.add_argument("--cases", type=int, metavar="N", help="problems of each set (default: 200)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all problems (default: 0)")
+    parser.add_argument(
+        "--jobs", type=int, metavar="N", help="cases beside each other (default: 1, or all of the cluster)"
+    )
+    parser.add_argument("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/compare"), metavar="DIR", help="folder (default: out/compare)"
+    )
+    parser.add_argument(
+        "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
+        help="write the result into the documentation too (default folder: docs)",
+    )  # fmt: skip
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compare methods."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    from wholebody.bench.compare import run as comparison
+    from wholebody.bench.compare.advice import advice
+    from wholebody.bench.compare.publish import PAGE, publish
+    from wholebody.bench.entrants import missing
+
+    jobs = _jobs(arguments)
+    settings = _settings(arguments)
+    console = Console()
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("left"))
+    with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
+        task = bar.add_task("starting", total=60.0 * settings.minutes * jobs)
+
+        def tell(progress: comparison.Progress) -> None:
+            bar.update(task, completed=progress.done, total=progress.total, description=f"solved {progress.said}")
+
+        store = comparison.run(settings, arguments.out, jobs, arguments.cluster, tell)
+        given = publish(
+            settings,
+            store,
+            arguments.out,
+            _facts(jobs, arguments.cluster),
+            missing(),
+            arguments.update_docs,
+            lambda what: bar.update(task, description=f"making {what}"),
+        )
+        bar.update(task, completed=1.0, total=1.0, description="done")
+    for sentence in advice(given.results, given.rows):
+        console.print("- " + sentence.replace("**", "").replace("`", ""), highlight=False, markup=False)
+    console.print(f"wrote {arguments.out / PAGE}", highlight=False, soft_wrap=True)
+    return 0
+
+
+def _settings(arguments: argparse.Namespace) -> Settings:
+    from wholebody.bench.compare.settings import QUICK, Settings
+    from wholebody.bench.entrants import entrants
+    from wholebody.bench.problem_sets.registry import CASES, SETS, problem_set
+
+    sets = tuple(problem_set(name) for name in dict.fromkeys(arguments.sets or SETS))
+    chosen = None if arguments.methods is None else tuple(dict.fromkeys(arguments.methods))
+    amounts: dict[str, Any] = dict(QUICK) if arguments.quick else {"cases": CASES}
+    if arguments.cases is not None:
+        check_count(arguments.cases, "--cases")
+        amounts["cases"] = arguments.cases
+    return Settings(sets, entrants(chosen), seed=arguments.seed, **amounts)
+
+
+def _jobs(arguments: argparse.Namespace) -> int:
+    from wholebody.bench.compare.jobs import threads
+
+    if arguments.jobs is None:
+        return threads(arguments.cluster) if arguments.cluster else 1
+    check_count(arguments.jobs, "--jobs")
+    return int(arguments.jobs)
+
+
+def _facts(jobs: int, cluster: str | None) -> dict[str, str]:
+    from datetime import date
+
+    from wholebody.bench.machine import machine
+
+    where = f"the dask cluster {cluster}" if cluster else "this machine"
+    return machine() | {"date": date.today().isoformat(), "cases beside each other": f"{jobs} on {where}"}
