@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from wholebody.assessment import assess
+from wholebody.bench.entrants.base import Entrant
+from wholebody.problem import Problem, Solution, Status
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Fake:
+    """A method that answers with a posture and a status, whatever they are worth."""
+
+    answer: Callable[[Problem], Array]
+    status: Status
+    name: str = "fake"
+
+    def solve(self, problem: Problem) -> Solution:
+        q = self.answer(problem)
+        judged = assess(problem, np.where(np.isfinite(q), q, 0.0))
+        return Solution(q, self.status, 0.0, 1, judged, (), self.name, "as it is")
+
+
+@pytest.fixture
+def fake() -> Callable[..., Entrant]:
+    """Return a function: an answer to a problem, and a status -> an entrant."""
+
+    def made(answer: Callable[[Problem], Array], status: Status = "stalled") -> Entrant:
+        return Entrant("fake", lambda tolerance, iterations: Fake(answer, status), (), "made up")
+
+    return made

@@ -1,0 +1,156 @@
+"""Simple figures for hard cases: arms in a plane, an arm in space, and tools that slide and turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wholebody.figures.description import Description
+from wholebody.figures.figure import Figure
+from wholebody.geometry.shapes import Shape
+
+JOINTS = {
+    "rx": pin.JointModelRX, "ry": pin.JointModelRY, "rz": pin.JointModelRZ,
+    "px": pin.JointModelPX, "py": pin.JointModelPY, "pz": pin.JointModelPZ,
+}  # fmt: skip
+"""Kind of joint and its axis: r turns, p slides."""
+
+TURN = 2.9  # rad: limit of a joint if nothing else is said
+SLIDE = 2.0  # m
+COLOR = (0.62, 0.66, 0.70, 1.0)
+
+
+class Builder:
+    """Builds a figure joint by joint."""
+
+    def __init__(self, name: str) -> None:
+        """Begin with the world."""
+        self.name, self.model, self.geometry = name, pin.Model(), pin.GeometryModel()
+        self._segments: list[str] = []
+        self._frames: list[str] = []
+
+    def joint(
+        self, kind: str, name: str, *, parent: int = 0, at: Any = (0.0, 0.0, 0.0), limits: Sequence[float] | None = None
+    ) -> int:
+        """Add a joint and the segment that it carries, which has the joint's name; return its index."""
+        low, high = limits if limits is not None else (-TURN, TURN) if kind[0] == "r" else (-SLIDE, SLIDE)
+        bounds = [np.array([value]) for value in (100.0, 10.0, low, high)]
+        place = pin.SE3(np.eye(3), np.array(at, dtype=float))
+        index = int(self.model.addJoint(parent, JOINTS[kind](), place, name, *bounds))
+        self.model.appendBodyToJoint(index, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+        self.model.addFrame(pin.Frame(f"{name}_link", index, 0, pin.SE3.Identity(), pin.FrameType.BODY))
+        self._segments.append(f"{name}_link")
+        return index
+
+    def piece(self, joint: int, geometry: Any, place: pin.SE3) -> None:
+        """Give the segment of a joint a convex piece of coal's."""
+        segment = f"{self.model.names[joint]}_link"
+        name = f"{segment}:{sum(piece.parentJoint == joint for piece in self.geometry.geometryObjects)}"
+        made = pin.GeometryObject(name, joint, self.model.getFrameId(segment), place, geometry)
+        made.meshColor[:] = COLOR
+        self.geometry.addGeometryObject(made)
+
+    def shape(self, joint: int, shape: Shape, at: pin.SE3 | None = None) -> None:
+        """Give the segment of a joint a shape, centred at `at` in the joint's axes."""
+        base = pin.SE3.Identity() if at is None else at
+        for part in shape.pieces():
+            self.piece(joint, part.geometry, base * part.placement)
+
+    def rod(self, joint: int, end: Any, radius: float) -> None:
+        """Give the segment of a joint a capsule from the joint to `end` (3,)."""
+        way = np.array(end, dtype=float)
+        length = float(np.linalg.norm(way))
+        turn = pin.Quaternion.FromTwoVectors(np.array((0.0, 0.0, 1.0)), way / length).matrix()
+        self.piece(joint, coal.Capsule(radius, length), pin.SE3(turn, way / 2.0))
+
+    def frame(self, joint: int, name: str, at: Any) -> None:
+        """Name a place of a segment."""
+        place = pin.SE3(np.eye(3), np.array(at, dtype=float))
+        parent = self.model.getFrameId(f"{self.model.names[joint]}_link")
+        self.model.addFrame(pin.Frame(name, joint, parent, place, pin.FrameType.OP_FRAME))
+        self._frames.append(name)
+
+    def figure(self, *, pairs: bool = True) -> Figure:
+        """The figure; pieces of segments that are not neighbours can touch unless `pairs` is false."""
+        joints = [piece.parentJoint for piece in self.geometry.geometryObjects]
+        for second in range(len(joints) if pairs else 0):
+            for first in range(second):
+                a, b = joints[first], joints[second]
+                if a != b and self.model.parents[b] != a and self.model.parents[a] != b:
+                    self.geometry.addCollisionPair(pin.CollisionPair(first, second))
+        names = tuple(self.model.names)[1:]
+        description = Description(
+            groups={"all": names},
+            chains={},
+            frames=(*self._frames, *self._segments),
+            segments=tuple(self._segments),
+            postures={"neutral": _neutral},
+        )
+        return Figure(self.name, self.model, self.geometry, "own", description)
+
+
+def _neutral(figure: Figure) -> Any:
+    return figure.clamp(pin.neutral(figure.model))
+
+
+def planar_arm(
+    lengths: Iterable[float], radius: float = 0.03, *, limits: Sequence[float] | None = None, base: Any = (0, 0, 0)
+) -> Figure:
+    """An arm in the plane of x and z, along x at zero; joints "turn1", ..., frame "tip"."""
+    builder = Builder("planar arm")
+    joint, at = 0, base
+    for number, length in enumerate(lengths, start=1):
+        joint = builder.joint("ry", f"turn{number}", parent=joint, at=at, limits=limits)
+        at = (length, 0.0, 0.0)
+        builder.rod(joint, at, radius)
+    builder.frame(joint, "tip", at)
+    return builder.figure()
+
+
+def spatial_arm(radius: float = 0.04) -> Figure:
+    """An arm of six joints that stands upright at zero: base, shoulder, elbow and three of a wrist; frame "tip"."""
+    builder = Builder("arm of six joints")
+    base = builder.joint("rz", "base", at=(0.0, 0.0, 0.15))
+    builder.rod(base, (0.0, 0.0, 0.15), 1.5 * radius)
+    shoulder = builder.joint("ry", "shoulder", parent=base, at=(0.0, 0.0, 0.2))
+    builder.rod(shoulder, (0.0, 0.0, 0.4), radius)
+    elbow = builder.joint("ry", "elbow", parent=shoulder, at=(0.0, 0.0, 0.4))
+    builder.rod(elbow, (0.0, 0.0, 0.2), radius)
+    roll = builder.joint("rz", "roll", parent=elbow, at=(0.0, 0.0, 0.2))
+    builder.rod(roll, (0.0, 0.0, 0.15), 0.8 * radius)
+    pitch = builder.joint("ry", "pitch", parent=roll, at=(0.0, 0.0, 0.15))
+    builder.rod(pitch, (0.0, 0.0, 0.1), 0.7 * radius)
+    hand = builder.joint("rz", "hand", parent=pitch, at=(0.0, 0.0, 0.1))
+    builder.rod(hand, (0.0, 0.0, 0.08), 0.6 * radius)
+    builder.frame(hand, "tip", (0.0, 0.0, 0.08))
+    return builder.figure()
+
+
+def sliding_tool(*pieces: tuple[Shape, pin.SE3], turning: bool = False) -> Figure:
+    """A tool that slides along x, y and z, and turns about them where asked; frame "tool" at its middle."""
+    builder = Builder("sliding tool")
+    joint = 0
+    for kind in ("px", "py", "pz", *(("rz", "ry", "rx") if turning else ())):
+        joint = builder.joint(kind, f"{'slide' if kind[0] == 'p' else 'turn'}_{kind[1]}", parent=joint)
+    for shape, place in pieces:
+        builder.shape(joint, shape, place)
+    builder.frame(joint, "tool", (0.0, 0.0, 0.0))
+    return builder.figure()
+
+
+def human_arm(*, clavicle: bool = True) -> Figure:
+    """A person of whom only the right arm moves, with or without its clavicle; frame "right_index_tip"."""
+    from wholebody.figures.loading import load
+
+    figure = load("human")
+    joints = figure.groups["right_arm"]
+    return figure.reduced([name for name in joints if clavicle or "clavicle" not in name])
+
+
+def turned(axis: str, angle: float, at: Any = (0.0, 0.0, 0.0)) -> pin.SE3:
+    """A placement turned about an axis of the world [rad]."""
+    return pin.SE3(pin.utils.rotate(axis, angle), np.array(at, dtype=float))

@@ -1,0 +1,39 @@
+"""All hard cases by name, in the order of reports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from wholebody.bench.stability import contacts, goals, loops, numerics, singular, starts, streams
+from wholebody.bench.stability.case import HardCase
+from wholebody.errors import UnknownNameError
+
+_CASES: tuple[HardCase, ...] = tuple(
+    kind() for group in (singular, goals, starts, contacts, loops, numerics, streams) for kind in group.CASES
+)
+
+QUICK = (
+    "collinear-start", "goal-at-shoulder", "out-by-1-mm", "inside-obstacle", "start-5-cm-inside", "cancelling-normals",
+    "redundant-loop", "not-a-number", "thin-plate", "goal-jumps-1-m",
+)  # fmt: skip
+"""A few of every kind, for a short run."""
+
+
+def names() -> tuple[str, ...]:
+    """Names of all cases."""
+    return tuple(case.name for case in _CASES)
+
+
+def cases(chosen: Iterable[str] | None = None) -> tuple[HardCase, ...]:
+    """The cases of these names, in the order of reports; all of them where None.
+
+    Raises:
+        UnknownNameError: there is no such case.
+    """
+    if chosen is None:
+        return _CASES
+    wanted = tuple(chosen)
+    for name in wanted:
+        if name not in names():
+            raise UnknownNameError("case", name, names())
+    return tuple(case for case in _CASES if case.name in wanted)

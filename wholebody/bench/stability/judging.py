@@ -1,0 +1,141 @@
+"""Measures an answer on a question made anew, by the independent assessment and the sweep; decides nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.assessment import Assessment, assess
+from wholebody.bench.stability.answering import Answer
+from wholebody.bench.stability.case import Frame, HardCase, Nonsense, Posed, Stream
+from wholebody.problem import Problem
+from wholebody.tasks import Point
+
+Array = NDArray[np.float64]
+
+INSIDE = 1e-4  # m: deeper than this is inside
+DIP = 1e-3  # m: by which the straight way between two postures may go in deeper than its ends
+PARTS = 8  # of the way from frame to frame, where a thing moves along with the figure
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What an answer measures, the worst of all frames where there are several.
+
+    Attributes:
+        finite: whether it is made of numbers.
+        goal_error: largest goal error at the end [m, rad].
+        penetration: deepest overlap [m].
+        start_penetration: deepest overlap at the start [m]; 0 for a stream.
+        limit_violation: farthest out of a joint's limits [rad, m].
+        constraint_violation: farthest from what must hold [m, rad].
+        speed_excess: by how much the fastest joint is too fast, as a share of what is allowed.
+        passed: what it went through between frames, in words; "" for nothing.
+        misreported: largest difference between what it says is left and what is [m, rad].
+        worst: index of the posture to look at: where it went through something, the deepest, or the last.
+    """
+
+    finite: bool = True
+    goal_error: float = 0.0
+    penetration: float = 0.0
+    start_penetration: float = 0.0
+    limit_violation: float = 0.0
+    constraint_violation: float = 0.0
+    speed_excess: float = 0.0
+    passed: str = ""
+    misreported: float = 0.0
+    worst: int = 0
+
+
+def judge(case: HardCase, answer: Answer) -> Judged:
+    """Measure an answer; nothing where there is no posture."""
+    question = case.question()
+    if isinstance(question, Nonsense) or not len(answer.postures):
+        return Judged()
+    if not np.isfinite(answer.postures).all():
+        return Judged(finite=False, goal_error=float("nan"))
+    if isinstance(question, Posed):
+        return _posed(question.problem, answer)
+    return _stream(question, answer)
+
+
+def _posed(problem: Problem, answer: Answer) -> Judged:
+    found = assess(problem, answer.postures[0])
+    left = _left(found)
+    return Judged(
+        goal_error=left,
+        penetration=found.penetration,
+        start_penetration=assess(problem, problem.scene.figure.clamp(problem.start)).penetration,
+        limit_violation=found.limit_violation,
+        constraint_violation=found.constraint_violation,
+        misreported=abs(left - answer.left[0]),
+    )
+
+
+def _stream(question: Stream, answer: Answer) -> Judged:
+    problem, scene = question.problem, question.problem.scene
+    first = problem.goals[0]
+    assert isinstance(first, Point)
+    found: list[Assessment] = []
+    passed, through, excess, misreported = "", 0, 0.0, 0.0
+    before = scene.figure.clamp(problem.start)
+    allowed = question.speed * question.dt
+    for number, (frame, q) in enumerate(zip(question.frames, answer.postures, strict=True)):
+        if not passed:
+            passed, through = _passed(problem, frame, before, q, number), number
+        problem.retarget([Point(first.frame, frame.target)])
+        found.append(assess(problem, q))
+        misreported = max(misreported, abs(_left(found[-1]) - answer.left[number]))
+        step = np.abs(pin.difference(scene.model, before, q)).max()
+        excess = max(excess, float(step / allowed - 1.0))
+        before = q
+    deepest = int(np.argmax([each.penetration for each in found]))
+    inside = found[deepest].penetration > INSIDE
+    return Judged(
+        goal_error=_left(found[-1]),
+        penetration=found[deepest].penetration,
+        limit_violation=max(each.limit_violation for each in found),
+        constraint_violation=max(each.constraint_violation for each in found),
+        speed_excess=excess,
+        passed=passed,
+        misreported=misreported,
+        worst=through if passed else deepest if inside else len(found) - 1,
+    )
+
+
+def _passed(problem: Problem, frame: Frame, before: Array, q: Array, number: int) -> str:
+    """What is gone through on the way to a frame, with the things going where they are in it."""
+    scene = problem.scene
+    if frame.moved:
+        return _passed_while_moving(problem, frame, before, q, number)
+    contact = scene.sweeper.first_contact(before, q, tolerance=DIP)
+    if contact is None or not contact.certain:
+        return ""
+    owners = " and ".join(scene.piece_owner[piece] for piece in contact.pair)
+    return f"{owners}, frame {number}"
+
+
+def _passed_while_moving(problem: Problem, frame: Frame, before: Array, q: Array, number: int) -> str:
+    """The same by looking at parts of the way: figure and things move together, so neither can be swept alone."""
+    scene = problem.scene
+    placed = {name: np.array(scene.objects[name].placement.translation) for name in frame.moved}
+    ends = []
+    deepest, between = 0.0, ""
+    for part in np.linspace(0.0, 1.0, PARTS + 1):
+        for name, place in frame.moved.items():
+            scene.move(name, at=tuple(placed[name] + part * (np.array(place) - placed[name])))
+        contacts = scene.contacts(pin.interpolate(scene.model, before, q, float(part)), within=0.0)
+        depth = float(-contacts.distance[0]) if len(contacts.distance) else 0.0
+        if part in (0.0, 1.0):
+            ends.append(depth)
+        elif depth > deepest:
+            deepest = depth
+            between = " and ".join(scene.piece_owner[piece] for piece in contacts.pair[0])
+    return f"{between}, frame {number}" if deepest > max(ends) + DIP else ""
+
+
+def _left(found: Assessment) -> float:
+    return max(found.goal_error, found.goal_angle)

@@ -1,0 +1,116 @@
+"""The page "Where methods fail": case by case, with pictures, what is asked and what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from wholebody.bench.entrants.base import Entrant
+from wholebody.bench.machine import sentence
+from wholebody.bench.stability.case import HardCase
+from wholebody.bench.stability.pictures import Drawn
+from wholebody.bench.stability.rows import Result
+from wholebody.bench.stability.verdict import WORDS
+from wholebody.bench.tables import markdown
+
+CHART = "stability.svg"
+
+
+def report(result: Result, facts: Mapping[str, str]) -> str:
+    """The result in short: the counts, the cases by methods, and every wrong cell."""
+    return "\n\n".join([_counts(result), _matrix(result), _wrongs(result), sentence(facts)])
+
+
+def page(result: Result, entrants: Sequence[Entrant], facts: Mapping[str, str], drawn: Drawn, folder: str) -> str:
+    """The section of the page that is written by the command.
+
+    Args:
+        result: all cells.
+        entrants: who was asked.
+        facts: of the machine.
+        drawn: pictures by case.
+        folder: of the pictures, relative to the page.
+    """
+    parts = [
+        f"![{len(result.cases)} cases by {len(result.methods)} methods: a colour and a sign a cell]({folder}/{CHART})",
+        _counts(result),
+        _setups(entrants),
+    ]
+    group = ""
+    for case in result.cases:
+        if case.group != group:
+            group = case.group
+            parts.append(f"## {group}")
+        parts += _case(case, result, drawn.get(case.name, []), folder)
+    parts += ["## Every wrong answer", _wrongs(result), sentence(facts)]
+    return "\n\n".join(parts)
+
+
+def _counts(result: Result) -> str:
+    rows = [
+        [
+            f"`{method}`",
+            *(str(result.count(method, kind)) for kind in ("solved", "honest", "refusal")),
+            _strong(result.count(method, "wrong")),
+            str(result.acceptable(method)),
+        ]
+        for method in result.methods
+    ]
+    columns = ["method", *(WORDS[kind] for kind in ("solved", "honest", "refusal", "wrong")), "acceptable"]
+    return markdown(columns, rows) + f"\n\nOf {len(result.cases)} cases each."
+
+
+def _strong(count: int) -> str:
+    return f"**{count}**" if count else "0"
+
+
+def _matrix(result: Result) -> str:
+    rows = [[case.name, *(_brief(result, case.name, method) for method in result.methods)] for case in result.cases]
+    return markdown(["case", *result.methods], rows)
+
+
+def _brief(result: Result, case: str, method: str) -> str:
+    verdict = result.verdicts[case, method]
+    return f"{verdict.symbol} {verdict.brief}".strip()
+
+
+def _wrongs(result: Result) -> str:
+    rows = [
+        [f"`{method}`", f"`{case.name}`", result.verdicts[case.name, method].figure]
+        for method in result.methods
+        for case in result.cases
+        if result.verdicts[case.name, method].kind == "wrong"
+    ]
+    if not rows:
+        return "No answer was wrong."
+    head = ["method", "case", "what is wrong"]
+    lines = [head, ["---", "---", "---"], *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _setups(entrants: Sequence[Entrant]) -> str:
+    lines = ["How each method was set up, the others' as their own documentation has it:", ""]
+    for entrant in entrants:
+        differences = " ".join(f"{sentence[0].upper()}{sentence[1:]}." for sentence in entrant.differences)
+        lines.append(f"- `{entrant.name}`: {entrant.setup} {differences}".rstrip())
+    return "\n".join(lines)
+
+
+def _case(case: HardCase, result: Result, pictures: Sequence[tuple[Path, str]], folder: str) -> list[str]:
+    parts = [f"### {case.title}", case.why, f"*Acceptable.* {case.acceptable}"]
+    parts += [f"![{case.title}: {caption}]({folder}/{path.name})\n*{caption}*" for path, caption in pictures]
+    rows = []
+    for symbol, words, methods in _alike(case, result):
+        rows.append([f"{symbol} {words}", ", ".join(f"`{method}`" for method in methods)])
+    lines = [["verdict", "methods"], ["---", "---"], *rows]
+    return [*parts, "\n".join("| " + " | ".join(line) + " |" for line in lines)]
+
+
+def _alike(case: HardCase, result: Result) -> list[tuple[str, str, list[str]]]:
+    """Methods with the same verdict in one line, in the order in which they were asked."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for method in result.methods:
+        verdict = result.verdicts[case.name, method]
+        words = WORDS[verdict.kind] + (f": {verdict.figure}" if verdict.figure else "")
+        found.setdefault((verdict.symbol, words), []).append(method)
+    return [(symbol, words, methods) for (symbol, words), methods in found.items()]

@@ -1,0 +1,136 @@
+"""Pictures of hard cases: the figure at the start, transparent, and an answer, by the viewer and a headless browser."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.bench.stability.answering import Answer
+from wholebody.bench.stability.case import HardCase, Nonsense, Stream
+from wholebody.bench.stability.rows import Result
+from wholebody.problem import Problem
+from wholebody.tasks import Point
+from wholebody.view import Viewer
+from wholebody.view.studio import Studio
+
+Array = NDArray[np.float64]
+
+SIZE = (560, 420)  # pixels
+SAME = 1e-3  # rad: postures nearer than this are drawn once
+QUALITY = 82  # of the JPEG; such pictures are 10 to 30 kB
+MOST_FAILURES = 2  # pictures of failing answers of one case
+
+
+Drawn = dict[str, list[tuple[Path, str]]]
+"""Paths and captions of pictures, by the case's name."""
+
+
+def draw(result: Result, folder: Path, progress: Callable[[], None] = lambda: None) -> Drawn:
+    """Draw a picture of each case, and of answers that fail.
+
+    Args:
+        result: all cells.
+        folder: where the pictures are written.
+        progress: called after each case.
+
+    Returns:
+        Paths and captions by the case's name, the case's own picture first.
+
+    Raises:
+        MissingPackageError: there is no Chromium.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    studio = Studio()
+    drawn: Drawn = {}
+    try:
+        for case in result.cases:
+            drawn[case.name] = _case(case, result, folder, studio)
+            progress()
+    finally:
+        studio.close()
+    return drawn
+
+
+def _case(case: HardCase, result: Result, folder: Path, studio: Studio) -> list[tuple[Path, str]]:
+    best = _best(case, result)
+    answer = result.cells[case.name, best].answer if best is not None else None
+    before = "the frame before" if isinstance(case.question(), Stream) else "the start"
+    caption = f"The answer of {best}; transparent, {before}." if best is not None else "As it begins."
+    found = [(_picture(case, answer, None, folder / f"{case.name}.jpg", studio), caption)]
+    for number, method in enumerate(_failing(case, result)[:MOST_FAILURES], start=1):
+        cell, verdict = result.cells[case.name, method], result.verdicts[case.name, method]
+        path = folder / f"{case.name}-wrong-{number}.jpg"
+        found.append((_picture(case, cell.answer, cell.judged.worst, path, studio), f"{method}: {verdict.figure}."))
+    return found
+
+
+def _best(case: HardCase, result: Result) -> str | None:
+    """The first method with the best kind of answer that has a posture."""
+    for kind in ("solved", "honest"):
+        for method in result.methods:
+            verdict = result.verdicts[case.name, method]
+            if verdict.kind == kind and len(result.cells[case.name, method].answer.postures):
+                return method
+    return None
+
+
+def _failing(case: HardCase, result: Result) -> list[str]:
+    """Methods with a wrong answer that can be drawn, one of each family."""
+    found: dict[str, str] = {}
+    for method in result.methods:
+        cell = result.cells[case.name, method]
+        drawable = len(cell.answer.postures) and cell.judged.finite
+        if result.verdicts[case.name, method].kind == "wrong" and drawable:
+            found.setdefault(method.partition("/")[0], method)
+    return list(found.values())
+
+
+def _picture(case: HardCase, answer: Answer | None, index: int | None, path: Path, studio: Studio) -> Path:
+    """Draw one posture of an answer; the one that the case wants shown where `index` is None."""
+    question = case.question()
+    problem = question.problem
+    if index is None:
+        index = question.shown % len(question.frames) if isinstance(question, Stream) else 0
+    start = problem.scene.figure.clamp(problem.start)
+    q = start if answer is None else answer.postures[index]
+    before = start
+    if isinstance(question, Stream):
+        _set_scene(problem, question, index)
+        if answer is not None and index > 0:
+            before = answer.postures[index - 1]
+    if isinstance(question, Nonsense):
+        before = q
+    path.write_bytes(_jpeg(studio.picture(_page(problem, case.see_through, q, before), SIZE)))
+    return path
+
+
+def _set_scene(problem: Problem, question: Stream, index: int) -> None:
+    """Put the goal and the things where they are in a frame."""
+    first = problem.goals[0]
+    assert isinstance(first, Point)
+    for frame in question.frames[: index + 1]:
+        for name, place in frame.moved.items():
+            problem.scene.move(name, at=place)
+    problem.retarget([Point(first.frame, question.frames[index].target)])
+
+
+def _page(problem: Problem, see_through: tuple[str, ...], q: Array, before: Array) -> str:
+    """The page that shows a posture, with another one transparent."""
+    with Viewer(problem.scene, see_through=see_through) as viewer, tempfile.TemporaryDirectory() as folder:
+        if np.abs(q - before).max() > SAME:
+            viewer.ghosts([before])
+        viewer.show(q, problem=problem)
+        return viewer.save(Path(folder) / "scene.html").read_text(encoding="utf-8")
+
+
+def _jpeg(png: bytes) -> bytes:
+    from PIL import Image
+
+    written = io.BytesIO()
+    Image.open(io.BytesIO(png)).convert("RGB").save(written, "JPEG", quality=QUALITY, optimize=True)
+    return written.getvalue()

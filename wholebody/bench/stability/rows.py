@@ -1,0 +1,97 @@
+"""A line of the result, for the CSV file and for everything that is drawn and written from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from wholebody.bench.stability.case import HardCase, Kind
+from wholebody.bench.stability.running import Cell, known_best
+from wholebody.bench.stability.verdict import Verdict, decide
+
+
+@dataclass(frozen=True)
+class StabilityRow:
+    """One method's answer to one case.
+
+    Attributes:
+        case, method: who was asked what.
+        verdict: "solved", "honest", "refusal" or "wrong".
+        acceptable: whether the case accepts it.
+        figure: the worst figure, in a few words.
+        status: what the method says.
+        goal_error: largest goal error left [m, rad].
+        best: that of the best answer known [m, rad].
+        penetration: deepest overlap [m].
+        limit_violation: [rad, m].
+        constraint_violation: [m, rad].
+        frames: postures that were judged.
+        seconds: wall time of the method.
+        sentence: what the method says in words, or its refusal.
+    """
+
+    case: str
+    method: str
+    verdict: str
+    acceptable: bool
+    figure: str
+    status: str
+    goal_error: float
+    best: float
+    penetration: float
+    limit_violation: float
+    constraint_violation: float
+    frames: int
+    seconds: float
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Result:
+    """All cells with their verdicts.
+
+    Attributes:
+        cases: in the order of reports.
+        methods: in the order in which they were asked.
+        cells: by case's name and method.
+        verdicts: the same.
+        best: least goal error known, by case's name [m, rad].
+    """
+
+    cases: tuple[HardCase, ...]
+    methods: tuple[str, ...]
+    cells: dict[tuple[str, str], Cell]
+    verdicts: dict[tuple[str, str], Verdict]
+    best: dict[str, float]
+
+    def count(self, method: str, kind: Kind) -> int:
+        """How many of a method's verdicts are of one kind."""
+        return sum(self.verdicts[case.name, method].kind == kind for case in self.cases)
+
+    def acceptable(self, method: str) -> int:
+        """How many of a method's answers are acceptable."""
+        return sum(self.verdicts[case.name, method].acceptable for case in self.cases)
+
+    def rows(self) -> list[StabilityRow]:
+        """One a cell, case by case."""
+        return [self._row(case, method) for case in self.cases for method in self.methods]
+
+    def _row(self, case: HardCase, method: str) -> StabilityRow:
+        cell, verdict = self.cells[case.name, method], self.verdicts[case.name, method]
+        answer, judged = cell.answer, cell.judged
+        return StabilityRow(
+            case.name, method, verdict.kind, verdict.acceptable, verdict.figure, answer.status, judged.goal_error,
+            self.best.get(case.name, float("nan")), judged.penetration, judged.limit_violation,
+            judged.constraint_violation, len(answer.postures), answer.seconds, answer.refusal or answer.message,
+        )  # fmt: skip
+
+
+def result(cases: Sequence[HardCase], methods: Sequence[str], cells: Sequence[Cell]) -> Result:
+    """Decide all cells: each is compared with the best answer of all."""
+    best = known_best(cells)
+    best |= {case.name: case.best for case in cases if case.best is not None}
+    placed = {(cell.case.name, cell.method): cell for cell in cells}
+    verdicts = {
+        key: decide(cell.case, cell.answer, cell.judged, best.get(cell.case.name)) for key, cell in placed.items()
+    }
+    return Result(tuple(cases), tuple(methods), placed, verdicts, best)

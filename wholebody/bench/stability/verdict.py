@@ -1,0 +1,134 @@
+"""Decides what an answer is worth: solved, an honest best effort, a clear refusal, or WRONG; by rules, in order."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from wholebody.bench.stability.answering import Answer
+from wholebody.bench.stability.case import HardCase, Kind
+from wholebody.bench.stability.judging import INSIDE, Judged
+
+BEYOND = 1e-6  # rad, m: farther than this is out of limits
+BROKEN = 1e-4  # m, rad: farther than this a constraint does not hold
+FAST = 0.01  # share by which a joint may be faster than its bound: rounding, and steps along curves
+NOT_HELD = ("infeasible", "stalled")  # statuses that say that something may be violated
+SAME = 2e-5  # m: nearer to the best known answer than this is as good
+LEAST_SENTENCE = 15  # letters of a refusal that says anything
+
+SYMBOLS: dict[Kind, str] = {"solved": "✓", "honest": "○", "refusal": "–", "wrong": "✗"}
+WORDS: dict[Kind, str] = {
+    "solved": "solved",
+    "honest": "honest best effort",
+    "refusal": "clear refusal",
+    "wrong": "WRONG",
+}
+
+
+class Verdict(NamedTuple):
+    """What one method's answer to one case is worth.
+
+    Attributes:
+        kind: of the four.
+        figure: the worst figure, in a few words; "" where there is nothing to add.
+        brief: the same for the cell of a table.
+        acceptable: whether the case accepts it.
+    """
+
+    kind: Kind
+    figure: str
+    brief: str
+    acceptable: bool
+
+    @property
+    def symbol(self) -> str:
+        """One sign: an honest answer that is as good as can be is a full circle."""
+        return "●" if self.kind == "honest" and self.acceptable else SYMBOLS[self.kind]
+
+
+def decide(case: HardCase, answer: Answer, judged: Judged, best: float | None = None) -> Verdict:
+    """The verdict on an answer.
+
+    Args:
+        case: what was asked.
+        answer: what came.
+        judged: what it measures.
+        best: goal error of the best answer that any method found, for a case that knows none itself [m, rad].
+    """
+    wrong, brief = _wrong(case, answer, judged)
+    if wrong:
+        return Verdict("wrong", wrong, brief, False)
+    if answer.refusal:
+        return Verdict("refusal", "", "", case.accepts("refusal", math.inf))
+    known = case.best if case.best is not None else best
+    miss = judged.goal_error - (known or 0.0)
+    held = max(judged.penetration - INSIDE, judged.constraint_violation - BROKEN) <= 0.0
+    if held and judged.goal_error <= case.tolerance:
+        return Verdict("solved", "", "", case.accepts("solved", miss))
+    figure = _short(judged, known, miss)
+    return Verdict(
+        "honest", figure, figure.split(" inside")[0], (held or not case.can_hold) and case.accepts("honest", miss)
+    )
+
+
+def _wrong(case: HardCase, answer: Answer, judged: Judged) -> tuple[str, str]:
+    """What is wrong with an answer, the worst first, in words and in brief; empty for nothing."""
+    if answer.failure:
+        return answer.failure, answer.failure.split(":")[0] if answer.failure.startswith(
+            ("hangs", "crashes")
+        ) else "error"
+    if answer.taken:
+        return "takes " + ", ".join(answer.taken), "takes it"
+    if answer.refusal:
+        clear = len(answer.refusal) >= LEAST_SENTENCE
+        return ("", "") if clear else (f"refuses with {answer.refusal!r} only", "unclear")
+    if case.expected == "refusal":
+        return "answers", "answers"
+    if not judged.finite:
+        return "NaN", "NaN"
+    if judged.limit_violation > BEYOND:
+        return f"{judged.limit_violation:.2g} rad out of limits", f"{judged.limit_violation:.2g} rad"
+    if judged.passed:
+        return f"passes through {judged.passed}", "through"
+    return _missed(case, answer, judged)
+
+
+def _missed(case: HardCase, answer: Answer, judged: Judged) -> tuple[str, str]:
+    """What lengths tell: overlap, constraints, speed, and what the method says of them."""
+    deep, missed, left = length(judged.penetration), length(judged.constraint_violation), length(judged.goal_error)
+    doubts = answer.status in NOT_HELD
+    if judged.penetration > max(INSIDE, judged.start_penetration + INSIDE):
+        return f"{deep} inside{_said(answer)}", deep
+    if judged.penetration > INSIDE and not doubts:
+        return f"{deep} inside{_said(answer)}", deep
+    if judged.constraint_violation > BROKEN and (case.can_hold or not doubts):
+        return f"a constraint missed by {missed}{_said(answer)}", missed
+    if judged.speed_excess > FAST:
+        return f"{1.0 + judged.speed_excess:.1f} times too fast", f"{1.0 + judged.speed_excess:.0f} × speed"
+    if answer.status == "solved" and judged.goal_error > case.tolerance:
+        return f"claims solved, {left} left", f"claims {left}"
+    if judged.misreported > case.tolerance:
+        return f"misreports what is left by {length(judged.misreported)}", "misreports"
+    return "", ""
+
+
+def _said(answer: Answer) -> str:
+    return f", says {answer.status}" if answer.status else ""
+
+
+def _short(judged: Judged, known: float | None, miss: float) -> str:
+    """How far an honest answer is from the best known one."""
+    if judged.constraint_violation > BROKEN:
+        return f"{length(judged.constraint_violation)} missed"
+    if judged.penetration > INSIDE:
+        return f"{length(judged.penetration)} inside, not deeper"
+    if not known:
+        return f"{length(judged.goal_error)} left"
+    return "best known" if miss <= SAME else f"+{length(miss)}"
+
+
+def length(metres: float) -> str:
+    """A length with the unit that suits it: "1.2 m", "34 mm", "5 µm"."""
+    if metres >= 0.995:
+        return f"{metres:.3g} m"
+    return f"{1e3 * metres:.3g} mm" if metres >= 1e-4 else f"{1e6 * metres:.2g} µm"

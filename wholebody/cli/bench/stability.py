@@ -1,0 +1,126 @@
+"""`wholebody bench stability`: hard cases by methods, and where methods fail."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wholebody.cli.bench.publishing import add_common, check_count
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rich.progress import Progress
+
+    from wholebody.bench.entrants import Entrant
+    from wholebody.bench.stability.case import HardCase
+    from wholebody.bench.stability.pictures import Drawn
+    from wholebody.bench.stability.rows import Result
+
+PAGE = "where-methods-fail.md"
+ASSETS = "assets/stability"
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "stability",
+        help="hard cases by methods: where each fails, and how",
+        description="Ask every method every hard case, each in a process of its own, and judge the answers: solved, an "
+        "honest best effort, a clear refusal, or WRONG.",
+    )
+    parser.add_argument("--methods", nargs="+", metavar="NAME", help="methods (default: all that are installed)")
+    parser.add_argument("--cases", nargs="+", metavar="NAME", help="cases (default: all; with --quick a few)")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes at a time (default: 1)")
+    parser.set_defaults(run=run)
+    add_common(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Ask, judge, and write it down; 0 whatever the verdicts are."""
+    from wholebody.bench.entrants import entrants
+    from wholebody.bench.machine import machine
+    from wholebody.bench.stability import catalogue, chart, page
+    from wholebody.bench.tables import write_rows, write_text
+
+    check_count(arguments.jobs, "--jobs")
+    asked = entrants(arguments.methods)
+    chosen = catalogue.cases(arguments.cases or (catalogue.QUICK if arguments.quick else None))
+    facts = machine()
+    result = _asked(chosen, asked, arguments.jobs)
+    write_rows(arguments.out / "stability.csv", facts, result.rows())
+    report = page.report(result, facts)
+    write_text(arguments.out / "stability.md", report + "\n")
+    svg, _ = chart.matrix(result, arguments.out / "stability.svg")
+    _print(result)
+    print(f"wrote {arguments.out}")
+    if arguments.update_docs is not None:
+        pictures = _drawn(result, arguments.update_docs)
+        shutil.copyfile(svg, arguments.update_docs / ASSETS / page.CHART)
+        _write_page(arguments.update_docs, page.page(result, asked, facts, pictures, ASSETS))
+    return 0
+
+
+def _asked(cases: Sequence[HardCase], entrants: Sequence[Entrant], jobs: int) -> Result:
+    from wholebody.bench.stability.rows import result
+    from wholebody.bench.stability.running import run as ask_all
+
+    cells = []
+    with _bar() as bar:
+        work = bar.add_task("asking", total=len(cases) * len(entrants))
+        for cell in ask_all(cases, entrants, jobs):
+            cells.append(cell)
+            bar.update(work, advance=1, description=f"{cell.case.name}, {cell.method}")
+    return result(cases, [entrant.name for entrant in entrants], cells)
+
+
+def _drawn(result: Result, docs: Path) -> Drawn:
+    from wholebody.bench.stability.pictures import draw
+
+    with _bar() as bar:
+        work = bar.add_task("drawing", total=len(result.cases))
+        return draw(result, docs / ASSETS, lambda: bar.update(work, advance=1))
+
+
+def _bar() -> Progress:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    return Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4)
+
+
+def _print(result: Result) -> None:
+    """The matrix in signs, as narrow as it can be, and every wrong answer in words."""
+    from rich.console import Console
+
+    from wholebody.bench.stability.verdict import SYMBOLS, WORDS
+    from wholebody.cli.tables import table
+
+    console = Console()
+    letters = [chr(ord("a") + number) for number in range(len(result.methods))]
+    signs = table("case", *letters)
+    for case in result.cases:
+        signs.add_row(case.name, *(result.verdicts[case.name, method].symbol for method in result.methods))
+    console.print(signs)
+    counts = table("", "method", *WORDS.values(), "acceptable")
+    for letter, method in zip(letters, result.methods, strict=True):
+        found = (str(result.count(method, kind)) for kind in WORDS)
+        counts.add_row(letter, method, *found, f"{result.acceptable(method)} of {len(result.cases)}")
+    console.print(counts)
+    legend = ", ".join(f"{symbol} {WORDS[kind]}" for kind, symbol in SYMBOLS.items())
+    console.print(f"{legend}; ● honest and as good as can be", highlight=False)
+    for method in result.methods:
+        for case in result.cases:
+            verdict = result.verdicts[case.name, method]
+            if verdict.kind == "wrong":
+                console.print(f"WRONG: {method}, {case.name}: {verdict.figure}", highlight=False, markup=False)
+
+
+def _write_page(docs: Path, text: str) -> None:
+    from wholebody.bench.tables import replace_section
+
+    replace_section(docs / PAGE, "stability", text)
+    print(f"wrote {docs / PAGE}")
