@@ -83,9 +83,15 @@ def movable(figure: wb.Figure) -> NDArray[np.intp]:
 
 def place_of(figure: wb.Figure, q: Array, frame: str) -> Any:
     """Placement (pin.SE3) in the world of a frame in the posture q, shape (nq,)."""
-    data = figure.model.createData()
+    data = _data(figure)
     pin.forwardKinematics(figure.model, data, q)
     return pin.SE3(pin.updateFramePlacement(figure.model, data, figure.frame_id(frame)))
+
+
+@lru_cache(maxsize=8)
+def _data(figure: wb.Figure) -> Any:
+    """Pinocchio's scratch space for a figure."""
+    return figure.model.createData()
 
 
 def held_feet() -> list[wb.Hold]:

@@ -9,9 +9,11 @@ from wholebody.bench.problem_sets import (
     balance,
     closed_loop,
     clutter,
+    drag,
     free_reach,
     free_reach_several,
     passage,
+    robot_arm,
     self_contact,
 )
 from wholebody.bench.problem_sets.case import ProblemSet
@@ -28,6 +30,8 @@ SETS: Mapping[str, ProblemSet] = MappingProxyType(
             balance,
             closed_loop,
             passage,
+            drag,
+            robot_arm,
         )
     }
 )

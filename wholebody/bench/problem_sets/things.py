@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import coal
 import numpy as np
@@ -25,7 +25,7 @@ TRIES = 2000
 class Occupied:
     """The space that a figure takes up in some postures."""
 
-    def __init__(self, figure: wb.Figure, postures: Sequence[Array]) -> None:
+    def __init__(self, figure: wb.Figure, postures: Iterable[Array]) -> None:
         """Place the figure's pieces at each posture (nq,)."""
         geometry = figure.geometry
         data, placed = figure.model.createData(), pin.GeometryData(geometry)
@@ -35,7 +35,7 @@ class Occupied:
             pin.updateGeometryPlacements(figure.model, data, geometry, placed, q)
             self.places += [pin.SE3(place) for place in placed.oMg]
         self.centres = np.array([place.translation for place in self.places])
-        self.reach = np.tile([core_of(shape).reach for shape in self.shapes], len(postures))
+        self.reach = np.tile([core_of(shape).reach for shape in self.shapes], len(self.places) // len(self.shapes))
 
     def clear_of(self, shape: wb.Shape, at: Sequence[float] | pin.SE3, room: float) -> bool:
         """Whether a thing at a placement leaves this much room, metres, around the figure in every posture."""
