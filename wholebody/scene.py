@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.geometry.penetration import ObjectPenetration
     from wholebody.geometry.sweep import FirstContact, Sweep
+    from wholebody.problem import Problem
+    from wholebody.simplification.simplified import Simplified
 
 Array = NDArray[np.float64]
 
@@ -41,6 +43,14 @@ class Scene:
         self._built: SceneGeometry | None = None
         self._state: State | None = None
         self.revision = 0
+
+    @classmethod
+    def of_parts(cls, figure: Figure, objects: Iterable[SceneObject], built: SceneGeometry) -> Scene:
+        """A scene whose geometry is made already, with pairs of its own; made anew once things come or go."""
+        scene = cls(figure)
+        scene._objects = {thing.name: thing for thing in objects}
+        scene._built = built
+        return scene
 
     # ---- what is there
 
@@ -262,6 +272,24 @@ class Scene:
         Continuous: no object is too thin to be seen. See `wholebody.geometry.sweep`.
         """
         return self.sweeper.first_contact(q0, q1)
+
+    def simplified(self, problem: Problem) -> Simplified:
+        """A smaller problem whose answers are answers of this one: joints, pairs and corners that matter.
+
+        Args:
+            problem: a problem about this scene.
+
+        Returns:
+            The smaller problem, the way back to the whole figure, and what was left out with what that can change.
+
+        Raises:
+            InputError: the problem is about another scene, or objects came or left after it was stated.
+        """
+        from wholebody.simplification.simplify import simplify
+
+        if problem.scene is not self:
+            raise InputError("the problem is about another scene; call problem.scene.simplified(problem)")
+        return simplify(problem)
 
     # ---- building
 

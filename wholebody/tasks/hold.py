@@ -6,6 +6,7 @@ from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.placement import PlacementLike
@@ -50,6 +51,11 @@ class Hold(Constraint):
         base = inputs.find_base(scene, self.relative_to, self.frame, "Hold")
         at = self._at if self._at is not None else placement_between(scene, start, place, base)
         return filled(self, _residual=PlacementResidual.build(place, at, base, orientation=self.orientation))
+
+    @property
+    def kept_at(self) -> pin.SE3:
+        """Where the frame is kept, in the world or in the other frame, once resolved."""
+        return pin.SE3(self._residual.undo.rotation.T, self._residual.target)
 
     @property
     def lower(self) -> Array:

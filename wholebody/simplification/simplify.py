@@ -1,0 +1,226 @@
+"""From a problem to the smaller one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.figures.figure import ROOT_JOINT, Figure
+from wholebody.geometry.large_models import geometry_model
+from wholebody.problem import Array, Problem
+from wholebody.scene import Scene
+from wholebody.scene_geometry import SceneGeometry, SceneObject
+from wholebody.simplification.lifting import Embedding, on_smaller
+from wholebody.simplification.outer_pieces import coarser
+from wholebody.simplification.pairs import reachable_pairs
+from wholebody.simplification.participation import Participation, participation
+from wholebody.simplification.reach import Indices
+from wholebody.simplification.simplified import LeftOut, Simplified
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
+from wholebody.tasks.bounds import Freeze
+
+GROWTH = 2e-3  # m: how far a piece with fewer corners may reach out of the one it stands for
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What to leave out: each kind by itself, so that its gain can be measured.
+
+    Attributes:
+        joints: lock joints that take no part.
+        pairs: drop pairs that cannot come near, and things that are left without any.
+        growth: how far a piece with fewer corners may reach out of the one it holds, metres; 0 keeps all pieces.
+    """
+
+    joints: bool = True
+    pairs: bool = True
+    growth: float = GROWTH
+
+
+@dataclass(frozen=True)
+class _Smaller:
+    """What terms need to know of the smaller scene, before it is made."""
+
+    figure: Figure
+    geometry: pin.GeometryModel
+
+    @property
+    def model(self) -> pin.Model:
+        """The smaller figure's."""
+        return self.figure.model
+
+
+def simplify(problem: Problem, parts: Parts | None = None) -> Simplified:
+    """Leave out of a problem what it does not need.
+
+    Args:
+        problem: any problem; it is not changed.
+        parts: which kinds of things to leave out; all where None.
+
+    Raises:
+        InputError: objects came to or left the scene after the problem was stated.
+    """
+    problem.check_fresh()
+    parts = parts or Parts()
+    whole = problem.scene
+    part = participation(problem) if parts.joints else None
+    figure, geometry = _smaller_figure(problem, part)
+    embedding = Embedding(whole.model, figure.model, problem.start)
+    start = problem.start[embedding.idx_q]
+    numbers, rigid = _moving_pairs(problem, geometry)
+    terms = _terms(problem, _Smaller(figure, geometry), start, embedding)
+    if parts.pairs:
+        frozen = np.flatnonzero(part.frozen).tolist() if part is not None else []
+        still = [dof for j in frozen for dof in _dofs(figure, whole.model.names[j])]
+        near = reachable_pairs(
+            figure, list(geometry.geometryObjects), whole.proximity.reach, whole.proximity.pairs[numbers], start,
+            problem.clearances[numbers], terms[1], still,
+        )  # fmt: skip
+        numbers = numbers[near]
+    pieces, grown = _pieces(problem, geometry, numbers, parts.growth)
+    kept = _kept_pieces(whole, numbers) if parts.pairs else list(range(geometry.ngeoms))
+    small = _scene(whole, figure, geometry, kept, numbers, pieces)
+    made = Problem(
+        small, start, goals=terms[0], constraints=[*terms[1], *terms[2]], measures=terms[3], clearance=problem.clearance
+    )
+    made.clearances = problem.clearances[numbers]
+    made.measures_given = problem.measures_given
+    return Simplified(made, problem, _left_out(problem, made, part, len(numbers), rigid, grown), embedding)
+
+
+def _smaller_figure(problem: Problem, part: Participation | None) -> tuple[Figure, pin.GeometryModel]:
+    """The figure without the joints that take no part, and the scene's geometry on its joints."""
+    scene = problem.scene
+    if part is None or part.moving[1:].all():
+        return scene.figure, scene.geometry
+    names = scene.model.names
+    keep = ["root" if names[j] == ROOT_JOINT else names[j] for j in np.flatnonzero(part.moving).tolist()]
+    figure = scene.figure.reduced(keep, problem.start)
+    locked = [j for j in range(1, scene.model.njoints) if not part.moving[j]]
+    _, geometries = pin.buildReducedModel(scene.model, [scene.geometry], locked, problem.start)
+    return figure, geometries[0]
+
+
+def _moving_pairs(problem: Problem, geometry: pin.GeometryModel) -> tuple[Indices, int]:
+    """Numbers of the pairs whose pieces still move to each other, and how many do not."""
+    joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
+    pairs = problem.scene.proximity.pairs
+    moves = joint[pairs[:, 0]] != joint[pairs[:, 1]]
+    return np.flatnonzero(moves), int((~moves).sum())
+
+
+def _terms(
+    problem: Problem, small: _Smaller, start: Array, embedding: Embedding
+) -> tuple[list[Goal], list[Constraint], list[Bound], list[Measure]]:
+    """Goals, constraints, bounds and measures on the smaller figure."""
+    if small.figure is problem.scene.figure:
+        return list(problem.goals), list(problem.constraints), list(problem.bounds), list(problem.measures)
+
+    def restated(terms: tuple[Term, ...]) -> list[Term]:
+        found = [on_smaller(term, small, start, embedding) for term in terms]
+        return [term for term in found if term is not None]
+
+    bounds = tuple(bound for bound in problem.bounds if not isinstance(bound, Freeze))  # what they freeze is locked
+    return (
+        restated(problem.goals), restated(problem.constraints), restated(bounds), restated(problem.measures),
+    )  # type: ignore[return-value]  # fmt: skip
+
+
+def _pieces(
+    problem: Problem, geometry: pin.GeometryModel, numbers: Indices, growth: float
+) -> tuple[dict[int, pin.GeometryObject], dict[str, float]]:
+    """Pieces with fewer corners, by index; not where one would begin nearer to something than it may be."""
+    if growth <= 0.0:
+        return {}, {}
+    scene = problem.scene
+    pairs = scene.proximity.pairs
+    near = scene.proximity.near(scene.state(problem.start).data, problem.clearance + 2.0 * growth)
+    tight = near.distance < problem.clearances[near.number] + 2.0 * growth
+    crowded = set(near.pair[tight].ravel().tolist())
+    found, grown = {}, {}
+    for index in np.unique(pairs[numbers]).tolist():
+        piece = geometry.geometryObjects[index]
+        made = None if index in crowded else coarser(piece, growth)
+        if made is not None:
+            found[index], grown[piece.name] = made
+    return found, grown
+
+
+def _kept_pieces(scene: Scene, numbers: Indices) -> list[int]:
+    """All pieces of the figure, and those of things with a pair that is left."""
+    used = {scene.piece_owner[index] for index in np.unique(scene.proximity.pairs[numbers]).tolist()}
+    return [k for k, owner in enumerate(scene.piece_owner) if owner in used or owner not in scene.objects]
+
+
+def _scene(
+    whole: Scene,
+    figure: Figure,
+    geometry: pin.GeometryModel,
+    kept: range | list[int],
+    numbers: Indices,
+    coarse: dict[int, pin.GeometryObject] | None = None,
+) -> Scene:
+    """A scene of these pieces and pairs, in the order they had."""
+    place = {old: new for new, old in enumerate(kept)}
+    chosen = [(coarse or {}).get(old, geometry.geometryObjects[old]) for old in kept]
+    made = geometry_model([pin.GeometryObject(piece) for piece in chosen])
+    for first, second in whole.proximity.pairs[numbers].tolist():
+        made.addCollisionPair(pin.CollisionPair(place[first], place[second]))
+    owners = tuple(whole.piece_owner[old] for old in kept)
+    objects = [thing for name, thing in whole.objects.items() if name in set(owners)]
+    built = SceneGeometry(figure.model, made, owners, _places_in_things(objects, owners, geometry, kept, chosen))
+    return Scene.of_parts(figure, objects, built)
+
+
+def _places_in_things(
+    objects: list[SceneObject],
+    owners: tuple[str, ...],
+    geometry: pin.GeometryModel,
+    kept: range | list[int],
+    chosen: list[pin.GeometryObject],
+) -> dict[str, list[tuple[int, pin.SE3]]]:
+    """Index of each piece of a thing, and where it is in the thing."""
+    pieces: dict[str, list[int]] = {thing.name: [] for thing in objects}
+    for index, owner in enumerate(owners):
+        if owner in pieces:
+            pieces[owner].append(index)
+    places = {}
+    for thing in objects:
+        places[thing.name] = [
+            (index, part.placement * geometry.geometryObjects[kept[index]].placement.actInv(chosen[index].placement))
+            for index, part in zip(pieces[thing.name], thing.shape.pieces(), strict=True)
+        ]
+    return places
+
+
+def _dofs(figure: Figure, joint: str) -> list[int]:
+    """Degrees of freedom of a joint, none where it is not in this figure."""
+    index = list(figure.model.names).index(joint) if joint in list(figure.model.names) else 0
+    first = figure.model.joints[index].idx_v if index else 0
+    return list(range(first, first + figure.model.joints[index].nv)) if index else []
+
+
+def _left_out(
+    whole: Problem, small: Problem, part: Participation | None, pairs: int, rigid: int, grown: dict[str, float]
+) -> LeftOut:
+    names = list(whole.scene.model.names)
+    frozen = tuple(names[j] for j in np.flatnonzero(part.frozen & ~part.moving)) if part is not None else ()
+    locked = tuple(names[j] for j in range(1, len(names)) if not (part.moving[j] or part.frozen[j])) if part else ()
+    before = len(whole.scene.proximity.pairs)
+    return LeftOut(
+        locked=locked,
+        frozen=frozen,
+        helpers=part.helpers if part is not None else (),
+        excess=part.excess if part is not None else 0.0,
+        pairs=before - rigid - pairs,
+        rigid=rigid,
+        things=tuple(name for name in whole.scene.objects if name not in small.scene.objects),
+        pieces=grown,
+        counts={
+            "degrees of freedom": (whole.scene.model.nv, small.scene.model.nv),
+            "pairs": (before, pairs),
+            "pieces": (whole.scene.geometry.ngeoms, small.scene.geometry.ngeoms),
+        },
+    )
