@@ -91,7 +91,7 @@ def report(rows: Sequence[ChallengeRow], facts: Mapping[str, str]) -> str:
             markdown(COLUMNS, cells),
             "Penetration is judged by coal over every pair of pieces in every posture; between postures stands a "
             "bound, found by a continuous sweep, on how much deeper any pair gets on the way than at its deeper end. "
-            "The goal goes 20 mm into the seat and 10 mm towards the backrest before its place; the distances are those "
+            "The goal goes 20 mm into the seat and 10 mm towards the backrest before its place; distances are those "
             "of the last posture.",
             sentence(facts),
         ]

@@ -37,7 +37,9 @@ MOST_GOALS = 10_000
 ON_THE_WAY = 1e-3  # m, rad: to which a method that solves anew in every frame meets the goal before the end
 AT_THE_END = 1e-5  # m, rad
 WITHIN = 0.06  # m: pairs nearer than this are measured when a way is judged; larger = dearer, fewer left to a sweep
-SHARES = (1.0, 0.5, 0.25)  # of the way to a posture solved anew, tried when all of it would jump over something
+SHARES = (1.0, 0.5, 0.25)  # of the way to a posture, tried in turn where all of it goes into something
+GRAZE = 2e-4  # m: deeper than this a way goes into something
+SHORT = 0.03  # rad, m: a shorter way of joints whose every step was looked after dips in by less than GRAZE
 
 
 class DragFrame(NamedTuple):
@@ -60,7 +62,8 @@ class Drag:
     """Follows a goal that is moved from frame to frame.
 
     "qp" makes one quadratic program a frame, "newton" a few Newton steps; other methods solve every frame anew from the
-    posture at hand, to a millimetre, and stop where that would jump over something. No method restarts elsewhere.
+    posture at hand, "ccd" to a millimetre. No method restarts elsewhere. A posture that lies beyond something in the
+    way is approached as far as the way is free.
 
     Attributes:
         problem: what is asked; its goals are replaced as they move.
@@ -102,13 +105,13 @@ class Drag:
         retarget(self.problem, self._number, target)
         if isinstance(self.method, Newton):
             step = self.method.step(self.problem, self.q)
-            self.q, iterations = step.q, step.iterations
+            self.q, iterations = self._towards(step.q, SHORT), step.iterations
         elif isinstance(self.method, QP):
             answer = self.method.step(self.problem, self.q, self.dt)
             self.q, iterations = answer.q, 1
         else:
             solution = self._rough.solve(_from(self.problem, self.q))
-            self.q, iterations = self._towards(solution.q), solution.iterations
+            self.q, iterations = self._towards(solution.q, 0.0), solution.iterations
         return DragFrame(self.q, _error(self.problem, self.q), iterations, time.perf_counter() - began)
 
     def finish(self) -> Solution:
@@ -117,12 +120,14 @@ class Drag:
         self.q = solution.q
         return solution
 
-    def _towards(self, q: Array) -> Array:
-        """The posture q (nq,), or as far towards it as nothing is jumped over."""
-        model = self.problem.scene.model
+    def _towards(self, q: Array, short: float) -> Array:
+        """The posture q (nq,), or as far towards it as the way is free; ways up to `short` are taken as they are."""
+        scene = self.problem.scene
+        if np.abs(pin.difference(scene.model, self.q, q)).max() <= short:
+            return q
         for share in SHARES:
-            part = q if share == 1.0 else np.asarray(pin.interpolate(model, self.q, q, share))
-            if not _jumps(self.problem, self.q, part):
+            part = q if share == 1.0 else np.asarray(pin.interpolate(scene.model, self.q, q, share))
+            if scene.sweeper.first_contact(self.q, part, tolerance=GRAZE) is None:
                 return part
         return self.q
 
