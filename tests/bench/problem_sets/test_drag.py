@@ -11,7 +11,7 @@ from wholebody.bench.problem_sets.bodies import human
 from wholebody.bench.problem_sets.case import generator
 
 
-@pytest.mark.parametrize("number", (0, 1))
+@pytest.mark.parametrize("number", [0, 1])
 def test_a_known_posture_meets_each_frame(number: int) -> None:
     case, problem = drag.make(number, 0), drag.make(number, 0).problem
     postures = drag.way(human(), generator(drag.NAME, number, 0))
