@@ -58,13 +58,13 @@ def test_every_solver_gives_the_same_answer(random_program, name):
     for case in range(25):
         size = (int(rng.integers(2, 40)), int(rng.integers(0, 9)), int(rng.integers(0, 30)))
         program = random_program(rng, *size)
-        answer = solver.solve(program, None)
+        answer = solver.solve_cold(program)
         assert answer.exact, (case, size)
         assert ((answer.x >= program.lower) & (answer.x <= program.upper)).all()
         mild = replace(
             program, weight=np.minimum(program.weight, 1e5), elastic_weight=np.minimum(program.elastic_weight, 1e5)
         )
-        assert solver.solve(mild, None).x == pytest.approx(by_quadprog(mild), abs=1e-7)
+        assert solver.solve_cold(mild).x == pytest.approx(by_quadprog(mild), abs=1e-7)
         assert program.optimality(answer.x) < 1e-7  # weights of 1e10 leave so much rounding
 
 
@@ -75,8 +75,8 @@ def test_osqp_workspace_lives_through_changing_sizes(random_program):
     for rows in (0, 3, 8, 9, 30, 2, 0, 17):
         for n, m in ((12, 4), (12, 4), (7, 4), (12, 2)):
             program = random_program(rng, n, m, rows)
-            expected = make_solver("osqp").solve(program, None).x
-            assert solver.solve(program, None).x == pytest.approx(expected, abs=1e-9)
+            expected = make_solver("osqp").solve_cold(program).x
+            assert solver.solve_cold(program).x == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", solver_names())
@@ -85,7 +85,7 @@ def test_a_guess_changes_nothing_but_the_work(random_program, name):
     solver = make_solver(name)
     for _ in range(20):
         program = random_program(rng)
-        answer = solver.solve(program, None)
+        answer = solver.solve_cold(program)
         again = solver.solve(program, answer.active)
         assert (again.iterations, again.by) == (0, "last active set")
         assert again.x == pytest.approx(answer.x, abs=1e-11)
@@ -93,12 +93,25 @@ def test_a_guess_changes_nothing_but_the_work(random_program, name):
         assert solver.solve(program, wrong).x == pytest.approx(answer.x, abs=1e-9)
 
 
+def test_a_first_program_mostly_needs_no_solver(random_program):
+    rng = np.random.default_rng(12)
+    closed = []
+    for _ in range(40):
+        program = random_program(rng)
+        weight, elastic_weight = np.minimum(program.weight, 1e5), np.minimum(program.elastic_weight, 1e5)
+        program = replace(program, weight=weight, elastic_weight=elastic_weight)
+        answer = make_solver("osqp").solve(program, None)
+        assert answer.x == pytest.approx(by_quadprog(program), abs=1e-7)
+        closed.append(answer.by)
+    assert closed.count("first active set") > 20
+
+
 def test_active_set_method_needs_only_a_guess_that_is_near(random_program):
     rng = np.random.default_rng(10)
     settled = 0
     for _ in range(40):
         program = random_program(rng)
-        right = make_solver("daqp").solve(program, None).active
+        right = make_solver("daqp").solve_cold(program).active
         elastic = right.elastic.copy()
         elastic[rng.integers(len(elastic))] ^= True
         answer = solve_from(program, ActiveSet(right.lower, right.upper, elastic), 12)
@@ -112,7 +125,7 @@ def test_active_set_is_read_off_a_near_answer(random_program):
     rng = np.random.default_rng(12)
     for _ in range(10):
         program = replace(random_program(rng), weight=np.full(4, 10.0), elastic_weight=np.full(9, 10.0))
-        answer = make_solver("osqp").solve(program, None)
+        answer = make_solver("osqp").solve_cold(program)
         read = guess_active_set(program, by_quadprog(program), 1e-7)
         assert read.same(answer.active)
 
@@ -146,7 +159,7 @@ def test_programs_at_the_edge_of_sense(random_program, name):
     solver = make_solver(name)
     program = random_program(np.random.default_rng(5))
     fixed = replace(program, lower=np.zeros(12), upper=np.zeros(12))
-    assert np.array_equal(solver.solve(fixed, None).x, np.zeros(12))
+    assert np.array_equal(solver.solve_cold(fixed).x, np.zeros(12))
     twice = replace(  # rows that repeat each other, and rows that are zero
         program,
         rows=np.vstack([program.rows, program.rows, np.zeros((2, 12))]),
@@ -154,7 +167,7 @@ def test_programs_at_the_edge_of_sense(random_program, name):
         weight=np.concatenate([program.weight, program.weight, [1e8, 1e8]]),
     )
     single = replace(program, weight=2.0 * program.weight)
-    assert solver.solve(twice, None).x == pytest.approx(solver.solve(single, None).x, abs=1e-7)
+    assert solver.solve_cold(twice).x == pytest.approx(solver.solve_cold(single).x, abs=1e-7)
     against = replace(  # rows that contradict each other share what is left
         program,
         elastic=np.vstack([np.eye(12)[:1], -np.eye(12)[:1]]),
@@ -163,7 +176,7 @@ def test_programs_at_the_edge_of_sense(random_program, name):
         lower=np.full(12, -0.3),
         upper=np.full(12, 0.3),
     )
-    assert solver.solve(against, None).x[0] == pytest.approx(0.0, abs=1e-2)
+    assert solver.solve_cold(against).x[0] == pytest.approx(0.0, abs=1e-2)
 
 
 def test_unknown_solver_is_answered_with_the_names():

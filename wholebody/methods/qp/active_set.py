@@ -33,6 +33,12 @@ def guess_active_set(program: QuadraticProgram, x: Array, tolerance: float) -> A
     return ActiveSet(lower, upper, program.elastic @ x <= program.least + tolerance)
 
 
+def lacking(program: QuadraticProgram) -> ActiveSet:
+    """Active set to begin from where nothing is known: no bounds, and the elastic rows that x = 0 does not meet."""
+    free = np.zeros(program.size, dtype=bool)
+    return ActiveSet(free, free.copy(), program.least > 0.0)
+
+
 def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) -> QPSolution | None:
     """Exact answer by correcting a guess of the active set.
 
