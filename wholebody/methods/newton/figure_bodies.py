@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.memory_views import placement_view
-from wholebody.methods.newton.batches import Angle
+from wholebody.methods.newton.angles import Angle
 from wholebody.methods.newton.equations import EquationSet
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,7 @@ from wholebody.methods.newton.contacts import ContactSet
 from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.keys import OBJECTIVE, Key
+from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
 from wholebody.methods.newton.objective import Objective
 from wholebody.methods.newton.system import System
@@ -19,6 +22,7 @@ from wholebody.problem import Problem
 Array = NDArray[np.float64]
 
 LONGEST = 0.08  # m: longest way of a body in a step where there are pairs that can touch; larger = faster, less seen
+REMEMBERED = 32  # structures that are kept, for contacts that come and go; more = more memory
 HARD = Key("", False, False, 1.0)
 ONE_SIDED = Key("", False, True, 1.0)
 
@@ -31,7 +35,8 @@ class FigureCourse(Course):
 
     Attributes:
         algebra_name: as asked for.
-        structures: how often the pattern was laid out and analysed.
+        structures: how often a pattern was laid out and analysed.
+        laying: processor's time that took [s].
     """
 
     def __init__(self, problem: Problem, algebra: str, *, yielding: bool = False) -> None:
@@ -63,14 +68,23 @@ class FigureCourse(Course):
         self.objective = Objective(problem, self.bodies)
         self._fixed.append((self.objective.rows, Key(OBJECTIVE, False, False, 1.0)))
         self.q = self._left = problem.start
-        self.structures = 0
+        self.structures, self.laying = 0, 0.0
+        self._known: dict[tuple[object, ...], tuple[System, LinearAlgebra]] = {}
         self._ordered = np.zeros(0)
         self._laid: tuple[object, ...] = ()
         self.arrive(self.variables(problem.start))
 
     def variables(self, q: Array) -> Array:
-        """The bodies at the posture q (nq,)."""
-        return self.bodies.variables(q)
+        """Go to the posture q (nq,); the bodies there."""
+        self.q = q
+        self._ordered = self.bodies.variables(q)
+        if self.contacts is not None:
+            self.contacts.look(self.bodies.data)
+        return self._ordered
+
+    def posture(self, x: Array) -> Array:
+        """The posture (nq,) of the bodies x (7 n,)."""
+        return self.q if x is self._ordered else self.bodies.posture(x)
 
     def retarget(self) -> None:
         """Take the problem's new goals."""
@@ -83,11 +97,7 @@ class FigureCourse(Course):
 
     def retract(self, x: Array) -> Array:
         """The bodies of the nearest posture."""
-        self.q = self.bodies.posture(x)
-        self._ordered = self.bodies.variables(self.q)
-        if self.contacts is not None:
-            self.contacts.look(self.bodies.data)
-        return self._ordered
+        return x if x is self._ordered else self.variables(self.bodies.posture(x))
 
     def runs_into(self) -> bool:
         """Whether a pair that is no inequality overlaps where `retract` has just been."""
@@ -117,10 +127,15 @@ class FigureCourse(Course):
         changed = laid != self._laid
         if changed:
             self._laid = laid
-            self.system = System(self.bodies.count, batches, self.bodies.weight)
-            self.algebra = linear_algebra(self.system.pattern, self.algebra_name)
-            self.structures += 1
-        else:
-            self.system.batches = [batch for batch, _ in batches if len(batch)]
+            if laid not in self._known:
+                if len(self._known) >= REMEMBERED:
+                    self._known.clear()
+                began = time.process_time()
+                system = System(self.bodies.count, batches, self.bodies.weight)
+                self._known[laid] = (system, linear_algebra(system.pattern, self.algebra_name))
+                self.structures += 1
+                self.laying += time.process_time() - began
+            self.system, self.algebra = self._known[laid]
+        self.system.renew(batches)
         self.objective.enter(self.system)
         return changed

@@ -128,7 +128,7 @@ class Newton:
             iterations=FRAME_ITERATIONS,
             kind=self.inequalities,
         )
-        return NewtonStep(course.bodies.posture(found.x), found.iterations, found.systems, course.structures)
+        return NewtonStep(course.posture(found.x), found.iterations, found.systems, course.structures)
 
     def pattern(self) -> Pattern:
         """Where the Jacobian of the last problem can be other than zero.

@@ -130,7 +130,7 @@ class Search:
         return found if self._better(found, best) else best
 
     def _judged(self, reached: Reached, how: str) -> Found:
-        q = self.course.bodies.posture(reached.x)
+        q = self.course.posture(reached.x)
         return Found(q, assess(self.course.problem, q), reached, how)
 
     def _serves(self, found: Found) -> bool:

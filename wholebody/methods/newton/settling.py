@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 DAMPING = 1e-10  # redundant equations are tolerated at this loss of accuracy
 PENALTY = 2.0  # times the greatest multiplier: what an error of the equations counts against distance
 HALVINGS = 8  # of a step that does not serve
+FIRST_CONVEXITY = 1e-2  # of D that is added where the second derivatives are not convex along the equations
+MORE, LESS = 4.0, 0.3  # what it is multiplied by until they are, and from one step to the next
+MOST_CONVEXITY = 1e6
 DECREASE = 1e-4  # share of the promised decrease that a step must bring (Armijo)
 
 
@@ -56,6 +59,7 @@ def settle(system: System, x: Array, anchor: Array, *, tolerance: float, iterati
     y = np.zeros(system.pattern.height)
     residual, values = system.residual(x), system.values(x)
     errors: list[float] = []
+    convexity = 0.0
     trial, found = x, residual
     for number in range(iterations + 1):
         gradient = system.weight * (x - anchor)
@@ -67,8 +71,13 @@ def settle(system: System, x: Array, anchor: Array, *, tolerance: float, iterati
         try:
             second = -system.curvature(x, y)[2]
             step, multiplier = algebra.solve(task, second)
-            if not algebra.convex():  # far from the answer: without second derivatives there is always a way down
-                step, multiplier = algebra.solve(task, np.zeros(len(second)))
+            convexity = max(FIRST_CONVEXITY, LESS * convexity) if not algebra.convex() else 0.0
+            while convexity and convexity < MOST_CONVEXITY:  # far from the answer: more of D, until there is a way down
+                raised = task._replace(weight=(1.0 + convexity) * system.weight)
+                step, multiplier = algebra.solve(raised, second)
+                if algebra.convex():
+                    break
+                convexity *= MORE
         except SingularSystemError:
             break
         penalty = PENALTY * float(np.abs(multiplier).max(initial=1.0))

@@ -65,6 +65,10 @@ class System:
         self.pattern = Pattern(np.concatenate(rows), np.concatenate(columns), int(self.starts[-1]), 7 * count)
         self._curvature_places: tuple[Indices, Indices, list[Indices]] | None = None
 
+    def renew(self, batches: Sequence[tuple[Batch, Key]]) -> None:
+        """Take other numbers for equations of the same pattern."""
+        self.batches = [batch for batch, _ in batches if len(batch)]
+
     def bodies(self, x: Array) -> Array:
         """The variables (7 n,) as bodies (n + 1, 7), the world last."""
         if self._seen is None or self._seen[0] is not x:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from importlib.util import find_spec
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,18 +44,38 @@ class Gram:
         filled = np.unique(self._target)
         self._filled = filled
         self._starts = np.searchsorted(self._target, filled)
+        self._kernel = compiled_kernel()
+        if self._kernel is not None:
+            ends = np.append(self._starts, len(first))
+            listed = (self._first, self._second, ends, filled)
+            self._places = tuple(part.astype(np.int32) for part in listed)
 
     def refill(self, values: Array, weight: Array, damping: Array) -> None:
         """Compute the matrix for values (nnz,) of J, diagonals D and M."""
         scaled = values / weight[self.pattern.columns]
         data = self.matrix.data
         data[:] = 0.0
-        if len(self._first):
+        if self._kernel is not None:
+            self._kernel.sum_products(scaled, values, *self._places, data)
+        elif len(self._first):
             np.take(scaled, self._first, out=self._products)
             np.take(values, self._second, out=self._factors)
             self._products *= self._factors
             data[self._filled] = np.add.reduceat(self._products, self._starts)
         data[self._diagonal] += damping
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops where numba is installed (the extra "fast"), else None."""
+    if find_spec("numba") is None:
+        return None
+    from wholebody.methods.newton.linear_algebra import gram_kernel
+
+    none, places = np.zeros(0), np.zeros(0, dtype=np.int32)
+    # compiled, or read back: here, and not in the middle of a solve
+    gram_kernel.sum_products(none, none, places, places, np.zeros(1, dtype=np.int32), places, none)
+    return gram_kernel
 
 
 def _pairs(pattern: Pattern) -> tuple[Indices, Indices]:
