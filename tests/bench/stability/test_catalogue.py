@@ -35,7 +35,7 @@ def test_every_case_is_told_and_can_be_asked(case: HardCase) -> None:
         scene, start = question.problem.scene, question.problem.scene.figure.clamp(question.problem.start)
         inside = assess(question.problem, start).penetration
         depth = {"start-1-mm-inside": 1e-3, "start-5-cm-inside": 0.05, "start-30-cm-inside": 0.3}
-        depth |= {"cancelling-normals": 0.005, "coincident-centres": 0.1}
+        depth |= {"cancelling-normals": 0.015, "coincident-centres": 0.1}
         assert inside == pytest.approx(depth.get(case.name, 0.0), abs=2e-6)
         assert set(case.see_through) <= set(scene.objects)
 
@@ -61,7 +61,7 @@ def test_best_answers_that_are_known_are_possible() -> None:
     postures = {
         "out-by-1-mm": (-0.7, 0.0, 0.0),
         "out-by-1-m": (-0.7, 0.0, 0.0),
-        "cancelling-normals": (-0.04, 0.0, 0.5),
+        "cancelling-normals": (-0.12, 0.0, 0.5),
         "coincident-centres": (0.0, 0.1, 0.5),
         "edge-on-edge": (0.02, 0.01, 0.3 + 0.2 * np.sqrt(2.0)),
     }

@@ -96,6 +96,7 @@ class HardCase(ABC):
         tolerance: to which an answer counts as solved [m, rad].
         can_hold: whether all constraints can hold together.
         see_through: things that are drawn transparent because they would hide what is to be seen.
+        eye: (3,) direction from which one looks at it.
         near: for an honest best effort: by how much it may miss the best known answer and still be as good as it
             [m, rad].
     """
@@ -111,10 +112,15 @@ class HardCase(ABC):
     can_hold: ClassVar[bool] = True
     near: ClassVar[float] = 1e-3
     see_through: ClassVar[tuple[str, ...]] = ()
+    eye: ClassVar[tuple[float, float, float]] = (0.35, -1.0, 0.3)
 
     @abstractmethod
     def question(self) -> Question:
         """What is asked, made anew at each call: what a method does to it does not reach the judge."""
+
+    def drawn(self) -> Question:
+        """What is drawn with an answer's postures; another one only where it cannot be seen at its own size."""
+        return self.question()
 
     def accepts(self, kind: Kind, miss: float) -> bool:
         """Whether an answer is acceptable.

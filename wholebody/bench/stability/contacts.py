@@ -26,6 +26,7 @@ class Corner(HardCase):
         "once, their active set changes from step to step, and methods that leave one contact at a time go to and fro."
     )
     acceptable = "Solved: there is 1 mm of room."
+    eye = (-0.6, -1.0, 0.6)
 
     def question(self) -> Posed:
         """An arm over the corner."""

@@ -92,6 +92,7 @@ class BehindTheBack(HardCase):
         "ends at limits of the shoulder; the way round leads away from the goal first."
     )
     acceptable = "Solved: the place was taken from a posture without overlap within all limits."
+    eye = (-1.0, -0.7, 0.35)
 
     def question(self) -> Posed:
         """A person with the arm forward."""

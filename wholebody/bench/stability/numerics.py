@@ -35,12 +35,16 @@ class Small(HardCase):
         "Everything is a hundredth of the usual size: a tolerance of 0.1 mm is a whole link, and damping, trust "
         "regions and contact distances in metres are as large as the arm."
     )
-    acceptable = "Solved to 10 µm."
+    acceptable = "Solved to 10 µm. It is drawn a hundred times as large, its micrometre of overlap too."
     tolerance = 1e-5
 
     def question(self) -> Posed:
         """Over a box of 4 mm."""
         return Posed(_scaled(0.01))
+
+    def drawn(self) -> Posed:
+        """The same a hundred times as large."""
+        return Posed(_scaled(1.0))
 
 
 class Large(HardCase):

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.bench.stability.answering import Answer
@@ -17,10 +18,12 @@ from wholebody.problem import Problem
 from wholebody.tasks import Point
 from wholebody.view import Viewer
 from wholebody.view.studio import Studio
+from wholebody.view.style import FIELD_OF_VIEW
 
 Array = NDArray[np.float64]
 
 SIZE = (560, 420)  # pixels
+ROOM = 1.0  # times the radius of what is to be seen
 SAME = 1e-3  # rad: postures nearer than this are drawn once
 QUALITY = 82  # of the JPEG; such pictures are 10 to 30 kB
 MOST_FAILURES = 2  # pictures of failing answers of one case
@@ -45,6 +48,8 @@ def draw(result: Result, folder: Path, progress: Callable[[], None] = lambda: No
         MissingPackageError: there is no Chromium.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.jpg"):
+        old.unlink()
     studio = Studio()
     drawn: Drawn = {}
     try:
@@ -92,7 +97,7 @@ def _failing(case: HardCase, result: Result) -> list[str]:
 
 def _picture(case: HardCase, answer: Answer | None, index: int | None, path: Path, studio: Studio) -> Path:
     """Draw one posture of an answer; the one that the case wants shown where `index` is None."""
-    question = case.question()
+    question = case.drawn()
     problem = question.problem
     if index is None:
         index = question.shown % len(question.frames) if isinstance(question, Stream) else 0
@@ -105,7 +110,7 @@ def _picture(case: HardCase, answer: Answer | None, index: int | None, path: Pat
             before = answer.postures[index - 1]
     if isinstance(question, Nonsense):
         before = q
-    path.write_bytes(_jpeg(studio.picture(_page(problem, case.see_through, q, before), SIZE)))
+    path.write_bytes(_jpeg(studio.picture(_page(case, problem, q, before), SIZE)))
     return path
 
 
@@ -119,13 +124,38 @@ def _set_scene(problem: Problem, question: Stream, index: int) -> None:
     problem.retarget([Point(first.frame, question.frames[index].target)])
 
 
-def _page(problem: Problem, see_through: tuple[str, ...], q: Array, before: Array) -> str:
+def _page(case: HardCase, problem: Problem, q: Array, before: Array) -> str:
     """The page that shows a posture, with another one transparent."""
-    with Viewer(problem.scene, see_through=see_through) as viewer, tempfile.TemporaryDirectory() as folder:
-        if np.abs(q - before).max() > SAME:
-            viewer.ghosts([before])
+    shown = [q] if np.abs(q - before).max() <= SAME else [q, before]
+    with Viewer(problem.scene, see_through=case.see_through) as viewer, tempfile.TemporaryDirectory() as folder:
+        viewer.ghosts(shown[1:])
+        viewer.look(*_camera(problem, shown, np.array(case.eye)))
         viewer.show(q, problem=problem)
         return viewer.save(Path(folder) / "scene.html").read_text(encoding="utf-8")
+
+
+def _camera(problem: Problem, shown: list[Array], way: Array) -> tuple[Array, Array]:
+    """Eye and target (3,), from as far away as it takes to see the figure, its goals, and what is near."""
+    scene, points = problem.scene, []
+    for q in shown:
+        state = scene.state(q)
+        pieces, placed = scene.geometry.geometryObjects, pin.GeometryData(scene.geometry)
+        pin.updateGeometryPlacements(scene.model, state.data, scene.geometry, placed)
+        for piece, place in zip(pieces, placed.oMg, strict=True):
+            if piece.parentJoint:
+                points += [place.act(corner) for corner in _corners(piece)]
+        points += [np.array(goal.target) for goal in problem.goals if isinstance(goal, Point)]
+    cloud = np.array(points)
+    target = (cloud.min(axis=0) + cloud.max(axis=0)) / 2.0
+    radius = float(np.linalg.norm(cloud - target, axis=1).max()) * ROOM
+    return target + radius / np.sin(np.radians(FIELD_OF_VIEW) / 2.0) * way / np.linalg.norm(way), target
+
+
+def _corners(piece: pin.GeometryObject) -> Array:
+    """Corners (8, 3) of a piece's box in its own axes [m]."""
+    piece.geometry.computeLocalAABB()
+    low, high = piece.geometry.aabb_local.min_, piece.geometry.aabb_local.max_
+    return np.array([np.where(sides, high, low) for sides in np.ndindex(2, 2, 2)])
 
 
 def _jpeg(png: bytes) -> bytes:

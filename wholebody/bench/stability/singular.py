@@ -76,6 +76,7 @@ class AtTheShoulder(HardCase):
     )
     acceptable = "An honest best effort: nothing can be there; near the best known answer and outside the body."
     expected, best, near = "honest", None, 0.01
+    eye = (1.0, -0.8, 0.35)
 
     def question(self) -> Posed:
         """A person with the arm forward."""

@@ -23,7 +23,6 @@ class _Inside(HardCase):
 
     group = GROUP
     acceptable = "Solved: the goal is 10 cm above the block. Less good: an honest answer no deeper than the start."
-    see_through = ("block",)
     depth: float
 
     def question(self) -> Posed:
@@ -32,7 +31,7 @@ class _Inside(HardCase):
         scene = Scene(figure)
         tip = scene.state(POSTURE).frame(figure.frame_id("tip")).translation.copy()
         top = tip[2] - RADIUS + self.depth
-        scene.add(Box((2.0, 2.0, 1.2)), name="block", at=(0.8, 0.0, top - 0.6))
+        scene.add(Box((1.0, 0.8, 0.8)), name="block", at=(tip[0], 0.0, top - 0.4))
         return Posed(Problem(scene, POSTURE, goals=[Point("tip", (tip[0], 0.0, top + 0.1))]))
 
 
@@ -66,6 +65,7 @@ class InsideByThirtyCentimetres(_Inside):
         "way out is longer."
     )
     depth = 0.3
+    see_through = ("block",)
 
 
 class Cancelling(HardCase):
@@ -77,17 +77,17 @@ class Cancelling(HardCase):
         "the two normals are opposed and add up to nothing (figure 4b of Schmidl and Lin's paper), although the fork "
         "only has to be pulled back."
     )
-    acceptable = "An honest best effort: the fork pulled back by its 4 cm, off the plate."
-    expected, best, near = "honest", 0.04, 0.002
+    acceptable = "An honest best effort: the fork pulled back by its 12 cm, off the plate."
+    expected, best, near = "honest", 0.12, 0.002
     see_through = ("plate",)
 
     def question(self) -> Posed:
         """The goal keeps the fork where it is, so that nothing but the contact moves it."""
-        prong = Box((0.10, 0.04, 0.02))
-        handle = (Box((0.02, 0.04, 0.06)), pin.SE3(np.eye(3), np.array([-0.11, 0.0, 0.0])))
-        prongs = [(prong, pin.SE3(np.eye(3), np.array([-0.05, 0.0, z]))) for z in (0.02, -0.02)]
+        prong = Box((0.30, 0.12, 0.06))
+        handle = (Box((0.06, 0.12, 0.18)), pin.SE3(np.eye(3), np.array([-0.33, 0.0, 0.0])))
+        prongs = [(prong, pin.SE3(np.eye(3), np.array([-0.15, 0.0, z]))) for z in (0.06, -0.06)]
         scene = Scene(sliding_tool(handle, *prongs))
-        scene.add(Box((1.0, 1.0, 0.03)), name="plate", at=(0.46, 0.0, 0.5))
+        scene.add(Box((1.0, 1.0, 0.09)), name="plate", at=(0.38, 0.0, 0.5))
         start = np.array([0.0, 0.0, 0.5])
         return Posed(Problem(scene, start, goals=[Point("tool", (0.0, 0.0, 0.5))]))
 

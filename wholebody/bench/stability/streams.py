@@ -34,6 +34,7 @@ class ThinPlate(_Streamed):
     acceptable = "An honest best effort: the tip at the plate, on its side of it, in every frame and between them."
     expected, near = "honest", 0.01
     best = 0.8 - (0.598 - RADIUS)
+    eye = (-0.5, -1.0, 0.3)
     see_through = ("plate",)
 
     def question(self) -> Stream:

@@ -66,17 +66,15 @@ def decide(case: HardCase, answer: Answer, judged: Judged, best: float | None = 
     if held and judged.goal_error <= case.tolerance:
         return Verdict("solved", "", "", case.accepts("solved", miss))
     figure = _short(judged, known, miss)
-    return Verdict(
-        "honest", figure, figure.split(" inside")[0], (held or not case.can_hold) and case.accepts("honest", miss)
-    )
+    accepted = (held or not case.can_hold) and case.accepts("honest", miss)
+    return Verdict("honest", figure, figure.replace(" inside, not deeper", " in"), accepted)
 
 
 def _wrong(case: HardCase, answer: Answer, judged: Judged) -> tuple[str, str]:
     """What is wrong with an answer, the worst first, in words and in brief; empty for nothing."""
     if answer.failure:
-        return answer.failure, answer.failure.split(":")[0] if answer.failure.startswith(
-            ("hangs", "crashes")
-        ) else "error"
+        kind = answer.failure.partition(":")[0]
+        return answer.failure, kind if kind in ("hangs", "crashes") else "error"
     if answer.taken:
         return "takes " + ", ".join(answer.taken), "takes it"
     if answer.refusal:
