@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 from wholebody.bench.compare.messages import Build, Draw, Solve, receive, send
+from wholebody.bench.compare.record import DEFAULT
 from wholebody.bench.entrants.base import Entrant
 
 BUILDING = 120.0  # s: to build a case and what belongs to its scene; compiling once included
@@ -75,7 +76,7 @@ class _Served:
         self._warm.add(key)
         short = replace(self._ready, case=replace(case, frames=case.frames[:GLIMPSE]))
         with _Alarm(cap):
-            solve(entrant, entrant.loose[0], short)
+            solve(entrant, DEFAULT, short)
 
 
 class _Alarm:

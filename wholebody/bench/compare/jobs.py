@@ -25,6 +25,7 @@ class Task:
         family, number, seed: which case.
         solves: methods, each with its further budgets (none where only the default one is asked for).
         cap: seconds after which a solve is ended.
+        most: seconds that a sweep may be expected to take, by the solve before it; it is left out where it is more.
     """
 
     family: ProblemSet
@@ -32,6 +33,7 @@ class Task:
     seed: int
     solves: tuple[tuple[Entrant, tuple[Budget, ...]], ...]
     cap: float
+    most: float
 
 
 def work(task: Task) -> Chunk:
@@ -53,7 +55,7 @@ def work(task: Task) -> Chunk:
         records.append(first)
         between = time.perf_counter()
         spent[entrant.name] = between - began
-        if ladder:
+        if ladder and spent[entrant.name] * len(ladder) <= task.most:
             records += _sweep(worker, entrant, ladder, task, first)
             swept[entrant.name] = time.perf_counter() - between
     return Chunk(task.family.name, task.number, tuple(records), spent, swept, building)

@@ -38,6 +38,9 @@ class Plan:
         count = len(self._keys)
         self._spent, self._cases = np.zeros(count), np.zeros(count)
         self._swept, self._sweeps = np.zeros(count), np.zeros(count)
+        self._levels = np.array(
+            [len(settings.ladder(entrant, family.moving)) for family in settings.sets for entrant in settings.entrants]
+        )
         self._building: dict[str, list[float]] = {family.name: [] for family in settings.sets}
 
     def note(self, chunk: Chunk) -> None:
@@ -69,6 +72,11 @@ class Plan:
         cases, sweeps = share_out(one, sweep, most, np.minimum(most, settings.sweep), self._total - built)
         return {key: Allowed(int(cases[place]), int(sweeps[place])) for key, place in self._place.items()}
 
+    @property
+    def share(self) -> float:
+        """Seconds of a method in a set, if all had the same."""
+        return self._total / len(self._keys)
+
     def seconds(self, allowed: dict[tuple[str, str], Allowed]) -> float:
         """What all cases that are allowed will have taken."""
         one, sweep = self._costs()
@@ -78,11 +86,12 @@ class Plan:
 
     def _costs(self) -> tuple[Array, Array]:
         one = self._spent / np.maximum(self._cases, 1.0)
-        return one, self._swept / np.maximum(self._sweeps, 1.0)
+        known = self._swept / np.maximum(self._sweeps, 1.0)
+        return one, np.where(self._sweeps > 0, known, one * self._levels)  # as long at every budget, until it is known
 
 
 def share_out(one: Array, sweep: Array, most: Array, most_swept: Array, total: float) -> tuple[Array, Array]:
-    """Cases (n,) and sweeps (n,) of every method, at least one case and one sweep (of those asked for).
+    """Cases (n,) and sweeps (n,) of every method, at least one case, and a sweep where its share allows one.
 
     Args:
         one: (n,) seconds of a case at the default budget.
@@ -93,9 +102,10 @@ def share_out(one: Array, sweep: Array, most: Array, most_swept: Array, total: f
     """
 
     def parts(share: float) -> tuple[Array, Array]:
-        first = np.clip(0.5 * share, one, most * one)
-        second = np.clip(share - first, np.minimum(1.0, most_swept) * sweep, most_swept * sweep)
-        return np.clip(share - second, first, most * one), second
+        once = np.where((share - one >= sweep) & (most_swept > 0), sweep, 0.0)
+        second = np.clip(0.5 * share, once, np.maximum(most_swept * sweep, once))
+        first = np.clip(share - second, one, most * one)
+        return first, np.clip(share - first, second, np.maximum(most_swept * sweep, second))
 
     low, high = 0.0, float((one * most + sweep * most_swept).max(initial=0.0))
     for _ in range(50):
@@ -103,7 +113,7 @@ def share_out(one: Array, sweep: Array, most: Array, most_swept: Array, total: f
         first, second = parts(middle)
         low, high = (middle, high) if (first + second).sum() <= total else (low, middle)
     first, second = parts(high if (np.add(*parts(high))).sum() <= total else low)
-    return _count(first, one, most, 1.0), _count(second, sweep, most_swept, 1.0)
+    return _count(first, one, most, 1.0), _count(second, sweep, most_swept, 0.0)
 
 
 def _count(seconds: Array, each: Array, most: Array, least: float) -> Array:

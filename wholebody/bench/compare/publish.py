@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from wholebody.bench.compare import blocks as kinds
@@ -50,17 +51,14 @@ def publish(
     front = fronts(given.results)
     if front:
         write_rows(folder / "front.csv", facts, front)
-    say("charts")
-    titles = [(family.name, family.title) for family in settings.sets]
-    charts = draw_all(given.results, titles, folder / "charts")
-    say("scenes")
-    scenes = draw(
-        chosen(given.results),
-        {family.name: family for family in settings.sets},
-        {entrant.name: entrant for entrant in settings.entrants},
-        settings.seed,
-        settings.cap,
-    )
+    say("charts and scenes")
+    families = {family.name: family for family in settings.sets}
+    methods = {entrant.name: entrant for entrant in settings.entrants}
+    with ThreadPoolExecutor(1) as pool:  # scenes are drawn in a process of their own, charts in this one
+        drawn = pool.submit(draw, chosen(given.results), families, methods, settings.seed, settings.cap)
+        titles = [(family.name, family.title) for family in settings.sets]
+        charts = draw_all(given.results, titles, folder / "charts")
+        scenes = drawn.result()
     say("report")
     subtitle = f"{len(settings.sets)} problem sets, {len(settings.entrants)} methods, {len(store.records)} solves. " + (
         f"Measured {facts.get('date', '')} with wholebody {facts.get('wholebody', '')} on {facts.get('processor', '')}."

@@ -14,6 +14,7 @@ from wholebody.bench.compare.store import Chunk, Store
 from wholebody.bench.entrants.base import Entrant
 from wholebody.errors import WholebodyError
 
+SPARE = 3.0  # times its equal share that a method's sweep of one case may take: others leave something over
 TURN = 5  # methods by which the order is turned from case to case: far apart, so that a family does not stay together
 
 
@@ -51,7 +52,8 @@ def run(
     began = time.perf_counter()
     before = sum(_seconds(chunk) for chunk in store.chunks)
     done = {(chunk.set, chunk.number) for chunk in store.chunks}
-    for chunk in compute(_tasks(settings, plan, done), jobs, cluster):
+    end = began + 60.0 * settings.minutes - before / jobs
+    for chunk in compute(_tasks(settings, plan, done, end), jobs, cluster):
         store.add(chunk)
         plan.note(chunk)
         worked = before + jobs * (time.perf_counter() - began)
@@ -61,11 +63,15 @@ def run(
     return store
 
 
-def _tasks(settings: Settings, plan: Plan, done: set[tuple[str, int]]) -> Iterator[Task]:
-    """Cases in turn over all sets, each with those methods that there is time for when it is begun."""
+def _tasks(settings: Settings, plan: Plan, done: set[tuple[str, int]], end: float) -> Iterator[Task]:
+    """Cases in turn over all sets, each with those methods that there is time for when it is begun.
+
+    After the time `end`, for which the costs were foreseen too low, only sets are begun of which there is no case yet.
+    """
     for number in range(settings.cases):
         for family in settings.sets:
-            if (family.name, number) in done or number >= plan.cases(family.name):
+            late = number > 0 and time.perf_counter() > end
+            if late or (family.name, number) in done or number >= plan.cases(family.name):
                 continue
             allowed = plan.allowed()
             solves = tuple(
@@ -74,7 +80,8 @@ def _tasks(settings: Settings, plan: Plan, done: set[tuple[str, int]]) -> Iterat
                 if number < (given := allowed[family.name, entrant.name]).cases
             )
             if solves:
-                yield Task(family, number, settings.seed, solves, settings.cap)
+                most = SPARE * plan.share
+                yield Task(family, number, settings.seed, solves, settings.cap, most)
 
 
 def turned(entrants: tuple[Entrant, ...], number: int) -> tuple[Entrant, ...]:
