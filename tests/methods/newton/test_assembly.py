@@ -197,6 +197,26 @@ def test_the_nearest_place_is_found_with_quadratic_convergence() -> None:
     assert answer.placements["bob"].translation == pytest.approx(wanted, abs=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_the_nearest_place_of_a_chain_is_found_from_far(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    made = _chain(10)
+    goal = rng.normal(size=3)
+    made.point_goal("link9", goal * rng.uniform(0.4, 1.7) / np.linalg.norm(goal), place=(0.2, 0, 0))
+    start, system = made.variables(), made.system()
+    answer = made.solve(tolerance=1e-7, nearest=True)
+    assert answer.status == "solved"
+    errors = np.array(answer.nearness)
+    assert errors[-1] <= 1e-7
+    assert len(errors) <= 25
+    # no way along the equations is left: the gradient is a combination of their gradients
+    x = made.variables()
+    gradient = system.weight * (x - start)
+    jacobian = system.pattern.dense(system.values(x))
+    left = gradient - jacobian.T @ np.linalg.lstsq(jacobian.T, gradient, rcond=1e-9)[0]
+    assert np.abs(left).max() < 1e-6
+
+
 def test_the_nearest_ring_is_nearer_than_what_least_steps_find() -> None:
     count = 12
 

@@ -5,6 +5,8 @@ With L(x, y) = 1/2 (x - a)' D (x - a) - y . c(x), the step solves eqs. 4 to 7 wi
     [H, -J'; -J, 0] [d; y] = [-D (x - a); c],        H = D - sum_i y_i c_i''.
 
 Without the second derivatives, as in eq. 6, the equations converge quadratically and the multipliers only linearly.
+After each step Newton steps lead back to the equations, and the distances there are compared: a merit of distance and
+errors would refuse good long steps where the equations bend (Maratos; Nocedal and Wright 2006, section 15.4).
 """
 
 from __future__ import annotations
@@ -21,8 +23,9 @@ from wholebody.methods.newton.system import System
 Array = NDArray[np.float64]
 
 DAMPING = 1e-10  # redundant equations are tolerated at this loss of accuracy
-PENALTY = 2.0  # times the greatest multiplier: what an error of the equations counts against distance
-HALVINGS = 8  # of a step that does not serve
+HALVINGS = 12  # of a step that does not serve
+BACK = 8  # most Newton steps back to the equations after a step along them
+ROUNDING = 1e-12  # relative difference of squared distances that says nothing
 FIRST_CONVEXITY = 1e-2  # of D that is added where the second derivatives are not convex along the equations
 MORE, LESS = 4.0, 0.3  # what it is multiplied by until they are, and from one step to the next
 MOST_CONVEXITY = 1e6
@@ -60,7 +63,6 @@ def settle(system: System, x: Array, anchor: Array, *, tolerance: float, iterati
     residual, values = system.residual(x), system.values(x)
     errors: list[float] = []
     convexity = 0.0
-    trial, found = x, residual
     for number in range(iterations + 1):
         gradient = system.weight * (x - anchor)
         slope = gradient - system.pattern.transpose_times(values, y)
@@ -80,28 +82,37 @@ def settle(system: System, x: Array, anchor: Array, *, tolerance: float, iterati
                 convexity *= MORE
         except SingularSystemError:
             break
-        penalty = PENALTY * float(np.abs(multiplier).max(initial=1.0))
-        here = _merit(system, x, anchor, residual, penalty)
-        promised = float(gradient @ step) - penalty * float(np.abs(residual).sum())
-        length = 1.0
-        for _ in range(HALVINGS):
-            trial = x + length * step
-            found = system.residual(trial)
-            gain = here - _merit(system, trial, anchor, found, penalty)
-            if gain >= -DECREASE * length * promised:
+        here, slope_along = _distance(system, x, anchor), float(gradient @ step)
+        for halving in range(HALVINGS):
+            length = 0.5**halving
+            trial, found = _brought_back(system, algebra, task, x + length * step, 0.1 * tolerance)
+            most = here * (1.0 + ROUNDING) + DECREASE * length * slope_along
+            good = np.abs(found).max(initial=0.0) <= tolerance
+            if good and _distance(system, trial, anchor) <= most:
                 break
-            if length == 1.0:  # the equations bend: the same step, brought back to them, may serve
-                task = LinearSystem(values, system.weight, damping, np.zeros(len(x)), found)
-                back, _ = algebra.solve(task, np.zeros(len(second)))
-                bent = system.residual(trial + back)
-                if here - _merit(system, trial + back, anchor, bent, penalty) >= -DECREASE * promised:
-                    trial, found = trial + back, bent
-                    break
-            length *= 0.5
+        else:
+            break
         x, y, residual, values = trial, multiplier, found, system.values(trial)
     return Settled(x, tuple(errors), errors[-1] <= tolerance)
 
 
-def _merit(system: System, x: Array, anchor: Array, residual: Array, penalty: float) -> float:
+def _brought_back(
+    system: System, algebra: QuasiDefinite, task: LinearSystem, x: Array, tolerance: float
+) -> tuple[Array, Array]:
+    """The variables (7 n,) moved by Newton steps until the equations hold, and their residual there."""
+    residual = system.residual(x)
+    for _ in range(BACK):
+        if not np.isfinite(residual).all() or np.abs(residual).max(initial=0.0) <= tolerance:
+            break
+        back = task._replace(values=system.values(x), gradient=np.zeros(len(x)), residual=residual)
+        try:
+            x = x + algebra.solve(back)[0]
+        except SingularSystemError:
+            break
+        residual = system.residual(x)
+    return x, residual
+
+
+def _distance(system: System, x: Array, anchor: Array) -> float:
     way = x - anchor
-    return float(0.5 * (system.weight * way) @ way + penalty * np.abs(residual).sum())
+    return float(0.5 * (system.weight * way) @ way)

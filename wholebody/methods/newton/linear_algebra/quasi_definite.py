@@ -40,6 +40,7 @@ class QuasiDefinite:
         none = np.zeros(0, dtype=np.intp)
         row, column = second if second is not None else (none, none)
         size = n + m
+        self._seconds = len(row)
         rows = np.concatenate([np.arange(size), n + pattern.rows, row])
         columns = np.concatenate([np.arange(size), pattern.columns, column])
         places, index = np.unique(columns * size + rows, return_inverse=True)
@@ -59,7 +60,7 @@ class QuasiDefinite:
         """Refill, refactorise, solve; `second` (k,) are the values of the second derivatives."""
         n, values = self.pattern.width, system.values
         least = LEAST_DAMPING / system.weight.min(initial=1.0)
-        extra = np.zeros(0) if second is None else second
+        extra = np.zeros(self._seconds) if second is None else second
         data = np.concatenate([system.weight, -np.maximum(system.damping, least), -values, extra])
         self._matrix.data[:] = np.bincount(self._index, data, len(self._matrix.data))
         self._factor.factorize(self._matrix)
