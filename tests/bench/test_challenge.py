@@ -1,0 +1,35 @@
+"""`wholebody bench challenge`, as short as it can be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from wholebody.bench.challenge import ChallengeRow
+from wholebody.bench.drag import DragFrameRow
+from wholebody.bench.tables import read_rows
+from wholebody.cli import main
+
+
+def test_both_methods_sit_down(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("matplotlib")
+    (tmp_path / "results.md").write_text("<!-- bench:challenge -->\n<!-- /bench:challenge -->\n")
+    command = ["bench", "challenge", "--quick", "--out", str(tmp_path / "out")]
+    assert main([*command, "--update-docs", str(tmp_path)]) == 0
+    facts, rows = read_rows(tmp_path / "out" / "challenge.csv", ChallengeRow)
+    assert "processor" in facts
+    assert [row.method.partition("/")[0] for row in rows] == ["newton", "qp"]
+    for row in rows:
+        assert row.status == "solved"
+        assert 0.0 <= row.seat_mm < 1.0
+        assert row.depth_mm < 0.1
+        assert row.feet_mm < 2.0
+        assert row.left_mm < 0.011
+    _, frames = read_rows(tmp_path / "out" / "challenge-frames.csv", DragFrameRow)
+    assert len(frames) == 120
+    page = (tmp_path / "results.md").read_text()
+    assert "| newton" in page
+    assert "assets/bench/challenge.svg" in page
+    assert (tmp_path / "assets" / "bench" / "challenge.svg").is_file()
+    assert "over the seat" in capsys.readouterr().out

@@ -1,0 +1,127 @@
+"""`wholebody drag` as people use it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wholebody.bench.drag import DragFrameRow
+from wholebody.bench.tables import read_rows
+from wholebody.cli import main
+
+ARM = """\
+[figure]
+name = "avatar"
+
+[[object]]
+name = "wall"
+shape = "box"
+size = [0.1, 3.0, 3.0]
+at = [0.65, 0.0, 1.0]
+
+[[goal]]
+type = "point"
+frame = "right_palm"
+target = [0.35, -0.3, 1.2]
+
+[[constraint]]
+type = "freeze"
+joints = ["root", "left_leg", "right_leg"]
+"""
+
+
+TURNED = """
+[[goal]]
+type = "orientation"
+frame = "left_palm"
+target = [0.0, 0.0, 0.0, 1.0]
+"""
+
+
+@pytest.fixture
+def task(tmp_path: Path) -> Path:
+    file = tmp_path / "reach.toml"
+    file.write_text(ARM)
+    return file
+
+
+def test_a_line_by_newton_prints_a_table_and_writes_all_files(
+    task: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    code = main(["drag", str(task), "--path", "line", "--method", "newton", "--frames", "40", "--out", str(out)])
+    printed = capsys.readouterr().out
+    assert code == 0
+    assert "reach" in printed
+    assert "end: solved" in printed
+    assert {path.name for path in out.iterdir()} == {
+        f"reach-newton.{kind}" for kind in ("csv", "html", "md", "png", "svg")
+    }
+    facts, rows = read_rows(out / "reach-newton.csv", DragFrameRow)
+    assert "processor" in facts
+    assert [row.frame for row in rows] == list(range(40))
+    assert max(row.depth_mm for row in rows) < 0.1
+    assert max(row.between_mm for row in rows) < 1.0
+    assert "| reach | newton" in (out / "reach-newton.md").read_text()
+    assert "animation" in (out / "reach-newton.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("method", ["qp", "ccd"])
+def test_a_circle_by_the_other_methods(method: str, task: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = ["drag", str(task), "--path", "circle", "--size", "0.05", "--method", method, "--out", str(out)]
+    assert main(command) == 0
+    _, rows = read_rows(out / f"reach-{method}.csv", DragFrameRow)
+    assert rows[-1].error_mm < 1.0
+    assert max(row.between_mm for row in rows) <= 1.0
+
+
+def test_a_file_that_leads_into_the_wall_ends_there(
+    task: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "way.csv").write_text("x,y,z\n0.35,-0.3,1.2\n0.75,-0.3,1.2\n")
+    out = tmp_path / "out"
+    command = ["drag", str(task), "--path", str(tmp_path / "way.csv"), "--method", "qp", "--out", str(out)]
+    assert main([*command, "--goal", "0", "--frames", "120"]) == 1
+    assert "unreachable" in "".join(capsys.readouterr().out.split())
+    _, rows = read_rows(out / "reach-qp.csv", DragFrameRow)
+    errors = np.array([row.error_mm for row in rows])
+    assert errors[-1] > 100.0
+    assert max(row.depth_mm for row in rows) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--path", "spiral"], "--path: there is no file spiral; give line, circle or a file of places"),
+        (["--path", "line", "--method", "jacobi"], "no method is called 'jacobi'"),
+        (["--path", "line", "--goal", "5"], "none has the number 5"),
+        (["--path", "line", "--goal", "1"], "goals[1] is a Orientation"),
+        (["--path", "line", "--frames", "0"], "frames is 0; give 1 or more"),
+        (["--path", "circle", "--size", "-1"], "radius of -1.0 m"),
+        (["--path", "line", "--to", "nan", "0", "0"], "--to"),
+        (["--path", "line", "--to", "900", "0", "0"], "--to is 900 m away"),
+    ],
+)
+def test_mistakes_are_said_in_one_sentence(
+    arguments: list[str], message: str, task: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    task.write_text(ARM + TURNED)
+    assert main(["drag", str(task), *arguments, "--out", str(tmp_path / "out")]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_bad_file_of_places_is_named_with_its_line(
+    task: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "way.csv").write_text("0.3 0 1\n0.3 zero 1\n")
+    assert main(["drag", str(task), "--path", str(tmp_path / "way.csv"), "--out", str(tmp_path / "out")]) == 2
+    assert "way.csv, line 2: '0.3 zero 1' is not a place" in capsys.readouterr().err
+
+
+def test_a_task_without_a_goal_that_moves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "none.toml").write_text('[figure]\nname = "avatar"\n')
+    assert main(["drag", str(tmp_path / "none.toml"), "--path", "line"]) == 2
+    assert "no point or frame goal" in capsys.readouterr().err
