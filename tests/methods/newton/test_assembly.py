@@ -174,6 +174,9 @@ def test_bad_input_names_the_bodies() -> None:
     made.spherical("a", "b", at=(0.5, 0, 0))
     with pytest.raises(InputError, match="'b' and 'a' have one already"):
         made.spherical("b", "a", at=(0.5, 0, 0))
+    made.spherical("a", "b", at=(0.5, 0.2, 0))  # at another place it is another joint
+    with pytest.raises(InputError, match="'a' and 'b' have one already"):
+        made.fixed("a", "b").fixed("a", "b")
     with pytest.raises(InputError, match="itself"):
         made.fixed("a", "a")
     with pytest.raises(InputError, match="no room"):

@@ -15,6 +15,7 @@ from wholebody.methods.newton.assembly_solution import AssemblySolution, solved
 from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.equations import EquationSet, axes_along
 from wholebody.methods.newton.inequalities import Kind
+from wholebody.methods.newton.joint_register import JointRegister
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
 from wholebody.methods.newton.system import System
@@ -37,7 +38,7 @@ class Assembly:
         self._names: dict[str, int] = {}
         self._places: list[Array] = []
         self._sizes: list[float] = []
-        self._joined: dict[frozenset[str], str] = {}
+        self._joints = JointRegister()
         self._equations = EquationSet()
         self._prepared: tuple[str, System, LinearAlgebra] | None = None
         self.structures = 0
@@ -130,6 +131,7 @@ class Assembly:
         """Two bodies slide along one direction (3,) in the world, without turning."""
         what = f"the prismatic joint of {first!r} and {second!r}"
         a, b = self._pair(first, second, "prismatic joint")
+        self._joints.add("prismatic joint", first, second)
         along = direction(axis, f"{what}: axis")
         turn_a, turn_b = pin.Quaternion(self._place(a)[3:]), pin.Quaternion(self._place(b)[3:])
         basis = axes_along(turn_a.inverse() * along)
@@ -143,6 +145,7 @@ class Assembly:
         """Two bodies keep their placement to each other: the present one, or the second's in the first's frame."""
         what = f"the fixed joint of {first!r} and {second!r}"
         a, b = self._pair(first, second, "fixed joint")
+        self._joints.add("fixed joint", first, second)
         here = pin.XYZQUATToSE3(self._place(a)).actInv(pin.XYZQUATToSE3(self._place(b)))
         wanted = here if placement_second is None else placement(placement_second, what)
         self._equations.coincide(a, b, what, np.array(wanted.translation), np.zeros(3))
@@ -214,7 +217,7 @@ class Assembly:
         self,
         *,
         tolerance: float = 1e-5,
-        iterations: int = 100,
+        iterations: int = 200,
         algebra: str = "auto",
         inequalities: Kind = "slack",
         nearest: bool = False,
@@ -251,8 +254,6 @@ class Assembly:
         self._places = list(x.reshape(-1, 7))
         return solution
 
-    # ---- looking names up
-
     def _changed(self) -> Assembly:
         self._prepared = None
         return self
@@ -271,10 +272,6 @@ class Assembly:
         a, b = self._index(first, kind), self._index(second, kind)
         if a == b:
             raise InputError(f"{kind}: {first!r} cannot be joined to itself; name two bodies")
-        pair = frozenset((first, second))
-        if kind in self._joined.get(pair, "").split(", "):
-            raise InputError(f"{kind}: {first!r} and {second!r} have one already; leave the second out")
-        self._joined[pair] = ", ".join(filter(None, [self._joined.get(pair, ""), kind]))
         return a, b
 
     def _ends(
@@ -293,7 +290,10 @@ class Assembly:
         if (at is None) == (at_first is None) or (at_first is None) != (at_second is None):
             raise InputError(f"{where}: give its place as at=(x, y, z) in the world, or as at_first and at_second")
         if at is None:
-            return point(at_first, f"{where}: at_first"), point(at_second, f"{where}: at_second")
-        place = point(at, f"{where}: at")
-        sides = [pin.XYZQUATToSE3(self._place(index)).actInv(place) for index in (a, b)]
-        return np.array(sides[0]), np.array(sides[1])
+            ends = point(at_first, f"{where}: at_first"), point(at_second, f"{where}: at_second")
+        else:
+            place = point(at, f"{where}: at")
+            sides = [pin.XYZQUATToSE3(self._place(index)).actInv(place) for index in (a, b)]
+            ends = np.array(sides[0]), np.array(sides[1])
+        self._joints.add(kind, first, second, ends)
+        return ends

@@ -39,6 +39,7 @@ MEND = 0.7  # share of the funnel from which a step only mends; larger = fewer s
 MENDING_DAMPING = 0.03  # of goals in such a step: they stay where they are, but not at any price
 NARROW = 0.7  # what is left of the funnel after a step that only mended
 WORTH = 0.05  # share of the promised progress that a step must make
+MENDED = 0.2  # the same where it only mends what must hold
 STAGNANT = 1e-6  # relative progress below which steps count as none
 PATIENCE = 12  # such steps in a row before the nearest point counts as found
 REFUSALS = 6  # times in a row that a step is made anew because it runs into something; after that it is shortened
@@ -243,7 +244,8 @@ class Run:
         bend = min(before[1] * before[1], WIDEST)  # what a full step towards the goals leaves of equations that bend
         if hard <= max(funnel, bend) and gain > 0.0 and before[1] - goal >= WORTH * gain:
             return True
-        return hard < 0.9 * before[0] and (before[0] > self.tolerance or goal <= before[1])
+        mended = before[0] - hard >= MENDED * max(before[0] - promised[0], 0.0) and hard < before[0]
+        return mended and (before[0] > self.tolerance or goal <= before[1])
 
 
 def largest_turn(step: Array) -> float:
