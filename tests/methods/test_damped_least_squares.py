@@ -65,6 +65,7 @@ def test_limits_stop_a_joint_and_the_others_go_on(planar_arm: Callable[..., wb.F
     problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", np.array(tip))])
     solution = wb.solve(problem, "dls")
     assert solution.solved
+    assert solution.iterations <= 12, "a joint at its limit holds the others up"
     judged(problem, solution)
 
 
@@ -91,8 +92,10 @@ def test_feet_stay_where_a_goal_out_of_reach_pulls(human: wb.Figure) -> None:
         goals=[wb.Point("right_index_tip", (2.5, 0.0, 1.5))],
         constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")],
     )
-    solution = DampedLeastSquares(iterations=60).solve(problem)
-    assert judged(problem, solution).constraint_violation < 1e-5
+    solution = DampedLeastSquares().solve(problem)
+    judgement = judged(problem, solution)
+    assert judgement.constraint_violation < 1e-5
+    assert judgement.goal_error < wb.assess(problem, problem.start).goal_error - 0.3
     assert not solution.solved
 
 
