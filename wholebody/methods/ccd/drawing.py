@@ -26,13 +26,14 @@ class Drawer:
     Attributes:
         parts: degrees of freedom (k,) of each part, and how far from each of them its farthest point can be, (k,).
         step: m that a part's tip is drawn at the most.
+        free: the wanted posture overlaps nothing: then a part may go a longer way round to it.
         limit: of work in the remover's tally, beyond which joints are not tried one by one.
     """
 
     def __init__(self, scene: Scene, remover: Remover) -> None:
         """Say which degrees of freedom are of which chain."""
         self._model, self._remover = scene.model, remover
-        self.step, self.limit = 0.0, 0
+        self.step, self.limit, self.free = 0.0, 0, False
         self.parts: list[tuple[NDArray[np.intp], Array]] = []
         rest = np.ones(scene.model.nv, dtype=bool)
         for chain in remover.chains.values():
@@ -78,7 +79,7 @@ class Drawer:
         slow = []
         for k, (dofs, _) in enumerate(self.parts):
             old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
-            if shares[k] and old - new < LEAST_GAIN:
+            if shares[k] and old - new < LEAST_GAIN and not self.free:
                 back[dofs] = True
             if shares[k] and old - new < HELD_UP * shares[k] * old:
                 slow.append(k)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from wholebody.errors import InputError
 from wholebody.methods.ccd.drawing import Drawer
 from wholebody.methods.ccd.passing import jump
+from wholebody.methods.ccd.pushing import SKIN
 from wholebody.methods.ccd.remover import Remover, Tally
 from wholebody.scene import Scene
 
@@ -35,6 +36,7 @@ SHAKES = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things came upon and t
 APART = 0.02  # m: how far a tip moves between two looks at the straight way from one shown posture to the next
 MOST_LOOKS = 5
 DIP = 4e-4  # m: how deep it may go in there
+WIDE = 5e-3  # m: how far what is to come back to a free posture is pushed out, so that it has room to turn
 TINY = 1e-12  # rad, m
 
 
@@ -109,7 +111,7 @@ class Frames:
         """See `remove_overlap`."""
         self._pace = np.full(self._model.nv, np.inf) if pace is None else pace
         remover = self._remover
-        remover.tally = Tally()
+        remover.tally, remover.skin = Tally(), SKIN
         wanted = remover.into_cones(self._figure.clamp(q_wanted))
         self._fell_back = self._swept = False
         q, overlaps = remover.separate(q_free, rng, TOO_MANY)
@@ -123,7 +125,9 @@ class Frames:
             return self._result(q if remover.look(wanted) else wanted)
         before = self._proximity.placements.copy()
         shown = None
-        if not remover.look(wanted) and not self._jumps(before, q, wanted):
+        self._drawer.free = not remover.look(wanted)
+        remover.skin = WIDE if self._drawer.free else SKIN
+        if self._drawer.free and not self._jumps(before, q, wanted):
             shown = self._toward(q, wanted)
         self._drawer.limit = remover.tally.work + ENOUGH + TOO_MANY
         for self._drawer.step in (STEP, SMALL_STEP) if shown is None else ():
@@ -141,11 +145,15 @@ class Frames:
         """From a free posture towards the wanted one, step by step: the postures on the way."""
         remover = self._remover
         settled = [False] * len(self._parts)
+        settled[-1] = later = self._drawer.free  # limbs that are pressed at something leave it before the root goes on
         way = []
         for _ in range(STEPS):
             if remover.tally.work > self._drawer.limit - TOO_MANY:
                 break
             drawn = self._drawer.draw(q, wanted, settled)
+            if drawn is None and later:
+                settled[-1] = later = False
+                drawn = self._drawer.draw(q, wanted, settled)
             if drawn is None:
                 break
             trial, overlaps = remover.separate(drawn[0], rng, self._drawer.limit)
@@ -167,7 +175,8 @@ class Frames:
         shares = np.minimum(1.0, self._pace / np.maximum(np.abs(way), TINY))
         for dofs, _ in self._parts:
             shares[dofs] = shares[dofs].min(initial=1.0)
-        for share in (shares, shares.min()) if shares.min() < 1.0 else (1.0,):
+        least = float(shares.min())
+        for share in (shares, least) if least < 1.0 else (1.0,):
             q = self._figure.clamp(np.asarray(pin.integrate(self._model, q0, share * way)))
             q = self._remover.into_cones(q)
             if not self._remover.look(q) and self._clear(q0, q):

@@ -101,13 +101,13 @@ class ChainPusher:
         """The overlapping link nearest to the root; see `LinkFinder.find`."""
         return self._finder.find(overlaps)
 
-    def push(self, link: Link) -> tuple[int, ...]:
-        """Turn the chain so that the link leaves; the nodes that took part. `read` comes before."""
+    def push(self, link: Link, skin: float = SKIN) -> tuple[int, ...]:
+        """Turn the chain so that the link leaves, to `skin` metres; the nodes that took part. `read` comes before."""
         x, y, z = link.push
         length = (x * x + y * y + z * z) ** 0.5
         if length < 1e-9:
             return ()
-        grow = 1.0 + SKIN / length
+        grow = 1.0 + skin / length
         push = (grow * x, grow * y, grow * z)
         inner = self._inner(link)
         if inner and self._parallel(link, push):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wholebody.figures.figure import Figure
 from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.ccd.links import Overlap
-from wholebody.methods.ccd.pushing import ChainPusher
+from wholebody.methods.ccd.pushing import SKIN, ChainPusher
 from wholebody.scene import Scene
 
 Array = NDArray[np.float64]
@@ -49,6 +49,7 @@ class Remover:
     Attributes:
         tally: what was done since it was last set.
         deepest: deepest overlap found by the last look, metres, against the distance asked of the pair.
+        skin: how far outside links are pushed, metres.
         overlapping: (pairs,) bool: which collision pairs overlapped at the last look.
     """
 
@@ -71,7 +72,7 @@ class Remover:
             touch: overlap that does not count, metres.
             exact: where PD_g cancels, look for the least translation that separates, which takes up to 0.1 s.
         """
-        self.exact = exact
+        self.exact, self.skin = exact, SKIN
         self.scene, self.clearances, self.touch = scene, clearances, touch
         self._within = 0.0 if clearances is None else float(clearances.max(initial=0.0))
         self._data = scene.model.createData()
@@ -160,7 +161,7 @@ class Remover:
             worst, node = link.depth, link.node
             began = time.perf_counter()
             chain.read(q, self._data)
-            nodes = chain.push(link)
+            nodes = chain.push(link, self.skin)
             chain.limbs.write(q)
             self.tally.ik_seconds += time.perf_counter() - began
             self.tally.iterations += 1
