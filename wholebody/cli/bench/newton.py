@@ -12,7 +12,8 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser = commands.add_parser(
         "newton",
         help="sparse Newton by size, shape and factorisation",
-        description="Chains, trees, rings and stars by every factorisation, the paper's size, and drags of the human.",
+        description="Chains, trees, rings and stars by every factorisation, whole solves, loops beside open chains, the same "
+        "problems by qp, and drags of the human. Set OMP_NUM_THREADS=1: small dense products are slower on more.",
     )
     parser.add_argument("--repeats", type=int, default=15, metavar="N", help="timed systems each (default: 15)")
     parser.set_defaults(run=run)
@@ -21,20 +22,22 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure sparse Newton."""
-    from wholebody.bench import newton
+    from wholebody.bench import newton, newton_solves
     from wholebody.bench.machine import machine
+    from wholebody.bench.newton_drags import drag_row
     from wholebody.bench.tables import write_rows
 
     repeats, sizes, frames = (3, (10, 30), 20) if arguments.quick else (arguments.repeats, newton.SIZES, 1000)
     check_count(repeats, "--repeats")
     facts = machine()
-    solves, drift = [newton.paper_row(10 * repeats)], []
-    for contacts in (False, True):
-        row, worst = newton.drag_row(frames, contacts)
-        solves.append(row)
-        drift.append(worst)
+    many = 10 * repeats
+    solves = [newton_solves.paper_row(many), newton_solves.nearest_row(many), *newton_solves.loop_rows(many)]
+    agreements = newton_solves.agreement_rows(many)
+    drags = [drag_row(frames, contacts) for contacts in (False, True)]
     linear = list(newton.linear_rows(sizes, repeats))
     write_rows(arguments.out / "newton-linear.csv", facts, linear)
     write_rows(arguments.out / "newton-solves.csv", facts, solves)
-    publish("newton", newton.report(linear, solves, drift, facts), {}, {}, arguments)
+    write_rows(arguments.out / "newton-agreements.csv", facts, agreements)
+    write_rows(arguments.out / "newton-drags.csv", facts, drags)
+    publish("newton", newton.report(linear, solves, agreements, drags, facts), {}, {}, arguments)
     return 0

@@ -140,6 +140,10 @@ class Newton:
             raise InputError("nothing has been solved yet; call solve(problem) first")
         return self._course.system.pattern
 
+    def laid_out(self) -> tuple[int, float]:
+        """How many patterns the last problem needed, and the processor's time to lay them out and analyse them [s]."""
+        return (0, 0.0) if self._course is None else (self._course.structures, self._course.laying)
+
     def _settings(self) -> Settings:
         return Settings(self.tolerance, self.iterations, self.restarts, self.seed, self.inequalities)
 

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessment adds the rows of a goal up
 SLACK = 1.05  # times the tolerance: an assessment measures with other arithmetic, and coal's own accuracy is 1e-6 m
 COAL_ACCURACY = 1e-6  # m
-TRIAL = 60  # iterations that another start is given to come nearer than the best so far
+TRIAL = 30  # iterations that another start is given to come nearer than the best so far
 ALIKE = 1e-5  # share of a goal's error by which two ends may differ and count as equally near
 
 

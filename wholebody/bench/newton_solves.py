@@ -1,0 +1,170 @@
+"""Whole solves by sparse Newton: the paper's size, loops beside open chains, and the same problems by `qp`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.bench.newton_shapes import LINK, chain, four_bar, ring, three_bar
+from wholebody.bench.newton_time import median_us
+from wholebody.methods.newton.assembly import Assembly
+from wholebody.methods.newton.course import Course
+from wholebody.methods.newton.linear_algebra.choice import linear_algebra
+from wholebody.methods.newton.reaching import reach
+
+PAPER_BODIES = 30  # 210 variables and about 1455 non-zeros, as in the paper
+PAPER_WAY = (0.03, -0.03, 0.02)  # m: as far as takes three systems
+FINE = 1e-8  # m, rad: tolerance at which two methods are compared
+
+
+@dataclass(frozen=True)
+class SolveRow:
+    """A whole solve: evaluations, factorisations and judgement of steps.
+
+    Attributes:
+        case: what.
+        variables, nonzeros: of the Jacobian.
+        iterations: Newton iterations.
+        systems: linear systems solved.
+        ms: time [ms].
+        us_each: time for a system and a variable [us].
+        errors: the last ones, with the most exact last.
+    """
+
+    case: str
+    variables: int
+    nonzeros: int
+    iterations: float
+    systems: float
+    ms: float
+    us_each: float
+    errors: str
+
+
+@dataclass(frozen=True)
+class AgreementRow:
+    """One problem by two methods.
+
+    Attributes:
+        case: what.
+        newton_ms, qp_ms: time of a solve [ms].
+        apart: greatest difference of a joint [rad].
+        measures_apart: relative difference of the measures.
+    """
+
+    case: str
+    newton_ms: float
+    qp_ms: float
+    apart: float
+    measures_apart: float
+
+
+def paper_row(repeats: int) -> SolveRow:
+    """The paper's size: a chain of 30 bodies whose end is dragged so far that it takes three systems."""
+    made = chain(PAPER_BODIES)
+    last = f"b{PAPER_BODIES - 1}"
+    tip = np.array((LINK, 0.0, 0.0))
+    made.point_goal(last, made.placement(last).act(tip) + np.array(PAPER_WAY), place=tip)
+    return assembly_row("the paper's size", made, repeats)
+
+
+def loop_rows(repeats: int) -> list[SolveRow]:
+    """Closed loops beside open chains with as many bodies, each moved by a goal."""
+    closed, opened = four_bar(), three_bar()
+    for made in (closed, opened):
+        turned = made.placement("crank").rotation @ pin.utils.rotate("y", 0.1)
+        made.point_goal("crank", turned @ np.array((0.0, 0.0, 0.3)), place=(0, 0, 0.3))
+    rows = [assembly_row("three bars, open", opened, repeats), assembly_row("four-bar, closed", closed, repeats)]
+    for name, made in (("chain of 100, open", chain(100)), ("ring of 100, closed", ring(100))):
+        made.point_goal("b50", made.placement("b50").translation + np.array((0.02, 0.01, 0.03)))
+        rows.append(assembly_row(name, made, repeats))
+    scene, q = hands_scene()
+    for name, more in (("two hands, open", []), ("two hands on one box, closed", [_grip()])):
+        rows.append(figure_row(name, hands_problem(scene, q, more), repeats))
+    return rows
+
+
+def nearest_row(repeats: int) -> SolveRow:
+    """The nearest place by Newton on the KKT system, whose last errors show the order of convergence."""
+    made = ring(30)
+    made.point_goal("b0", made.placement("b0").translation + np.array((-0.1, 0.06, 0.15)))
+    start = made.variables()
+
+    def solve() -> Any:
+        made._places = list(start.reshape(-1, 7))
+        return made.solve(tolerance=1e-9, nearest=True)
+
+    found, us = solve(), median_us(solve, max(3, repeats // 10))
+    pattern = made.system().pattern
+    systems = found.systems + len(found.nearness)
+    errors = " ".join(f"{value:.1e}" for value in found.nearness[-4:])
+    case = "nearest place of a ring of 30"
+    count = found.iterations + len(found.nearness) - 1
+    return SolveRow(
+        case, pattern.width, len(pattern.rows), count, systems, 1e-3 * us, us / systems / pattern.width, errors
+    )
+
+
+def assembly_row(case: str, made: Assembly, repeats: int) -> SolveRow:
+    """A reach from where an assembly stands."""
+    system = made.system()
+    course, x = Course(system, linear_algebra(system.pattern)), made.variables()
+    found = reach(course, x, tolerance=1e-5, iterations=50)
+    us = median_us(lambda: reach(course, x, tolerance=1e-5, iterations=50), repeats)
+    pattern, errors = system.pattern, " ".join(f"{value:.1e}" for value in found.residuals[-4:])
+    each = us / max(found.systems, 1) / pattern.width
+    return SolveRow(case, pattern.width, len(pattern.rows), found.iterations, found.systems, 1e-3 * us, each, errors)
+
+
+def figure_row(case: str, problem: wb.Problem, repeats: int) -> SolveRow:
+    """A reach of a figure, without polishing of the measures."""
+    from wholebody.methods.newton.figure_course import FigureCourse
+
+    course = FigureCourse(problem, "auto")
+    few = max(3, repeats // 10)
+
+    def once() -> Any:
+        return reach(course, course.variables(problem.start), tolerance=1e-5, iterations=50)
+
+    found, us = once(), median_us(once, few)
+    pattern, errors = course.system.pattern, " ".join(f"{value:.1e}" for value in found.residuals[-4:])
+    each = us / max(found.systems, 1) / pattern.width
+    return SolveRow(case, pattern.width, len(pattern.rows), found.iterations, found.systems, 1e-3 * us, each, errors)
+
+
+def agreement_rows(repeats: int) -> list[AgreementRow]:
+    """Problems whose least effort is unique, by both methods, the loop being an equality in either."""
+    scene, q = hands_scene()
+    rows = []
+    for case, more in (("two hands, open", []), ("two hands on one box, closed", [_grip()])):
+        problem = hands_problem(scene, q, more)
+        ours, theirs = wb.Newton(tolerance=FINE), wb.QP(tolerance=FINE)
+        ends = [method.solve(problem) for method in (ours, theirs)]
+        times = [median_us(partial(method.solve, problem), max(3, repeats // 30)) for method in (ours, theirs)]
+        apart = float(np.abs(pin.difference(scene.model, ends[0].q, ends[1].q)).max())
+        least = [end.assessment.measure for end in ends]
+        rows.append(AgreementRow(case, 1e-3 * times[0], 1e-3 * times[1], apart, abs(least[0] - least[1]) / least[1]))
+    return rows
+
+
+def hands_scene() -> tuple[wb.Scene, Any]:
+    """The human alone, and the posture with both arms forward."""
+    scene = wb.Scene(wb.load("human"))
+    return scene, scene.figure.posture("arms_forward")
+
+
+def hands_problem(scene: wb.Scene, q: Any, more: list[Any]) -> wb.Problem:
+    """Both feet held, the left palm to be raised by 10 cm."""
+    palm = scene.state(q).frame(scene.frame_id("left_palm")).translation.copy()
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    goals = [wb.Point("left_palm", palm + (0.0, 0.0, 0.1))]
+    return wb.Problem(scene, q, goals=goals, constraints=[*feet, *more])
+
+
+def _grip() -> wb.Hold:
+    return wb.Hold("right_palm", relative_to="left_palm")
