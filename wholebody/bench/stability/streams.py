@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wholebody.bench.stability.bodies import planar_arm, spatial_arm
-from wholebody.bench.stability.case import Frame, HardCase, Kind, Stream, still
+from wholebody.bench.stability.case import FRAME, Frame, HardCase, Kind, Stream, still
 from wholebody.geometry.shapes import Box, Sphere
 from wholebody.problem import Problem
 from wholebody.scene import Scene
@@ -159,30 +159,46 @@ class SpeedBound(_Streamed):
         return kind in ("solved", "refusal")
 
 
-class MovingObstacle(_Streamed):
-    """A ball that comes through where the arm is."""
+class _Ball(_Streamed):
+    """A ball that comes through where the forearm is."""
 
-    name, title = "moving-obstacle", "Moving obstacle"
-    why = (
-        "A ball of 10 cm goes through where the forearm is, at 0.5 m/s; the goal stays. At the beginning of every "
-        "frame the ball is 8 mm inside of an arm that did nothing wrong, and the arm has to give way before the "
-        "frame ends."
-    )
+    speed: float  # m/s
     acceptable = "Solved in the end, and outside of the ball after every frame."
 
     def question(self) -> Stream:
-        """From below to above."""
+        """From one side to the other; the goal stays."""
         scene = Scene(spatial_arm()).add(Sphere(0.1), name="ball", at=(0.35, -0.6, 0.6))
         start = np.array([0.0, 0.5, 1.2, 0.0, 0.3, 0.0])
         goal = scene.state(start).frame(scene.figure.frame_id("tip")).translation.copy()
         target = (float(goal[0]), float(goal[1]), float(goal[2]))
         problem = Problem(scene, start, goals=[Point("tip", target)])
-        way = np.arange(-0.6, 0.6, 0.5 / 60.0)
+        way = np.arange(-0.6, 0.6, self.speed * FRAME)
         frames = tuple(Frame(target, {"ball": (0.35, float(y), 0.6)}) for y in way)
-        return Stream(problem, frames + still(target, REST), shown=len(frames) // 2 + 6)
+        return Stream(problem, frames + still(target, REST), shown=len(frames) // 2)
+
+
+class MovingObstacle(_Ball):
+    """As fast as a hand that moves something aside."""
+
+    name, title, speed = "moving-obstacle", "Moving obstacle", 0.5
+    why = (
+        "A ball of 20 cm goes through where the forearm is, at 0.5 m/s; the goal stays. At the beginning of every "
+        "frame the ball is 8 mm inside of an arm that did nothing wrong, and the arm has to give way before the "
+        "frame ends."
+    )
+
+
+class FastObstacle(_Ball):
+    """As fast as a ball that is thrown."""
+
+    name, title, speed = "fast-obstacle", "Fast obstacle", 2.0
+    why = (
+        "The same ball at 2 m/s: 33 mm a frame, about the radius of the forearm. One frame has to bring the arm "
+        "farther than linearised contacts can be trusted."
+    )
 
 
 CASES = (
     ThinPlate, GoalJumps, WrongActiveSet, OneMillisecond, TenMilliseconds, HundredMilliseconds, OneSecond,
-    SpeedBound, MovingObstacle,
+    SpeedBound, MovingObstacle, FastObstacle,
 )  # fmt: skip

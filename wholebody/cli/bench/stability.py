@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wholebody.cli.bench.publishing import add_common, check_count
+from wholebody.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,6 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.tables import write_rows, write_text
 
     check_count(arguments.jobs, "--jobs")
+    _check_page(arguments)
     asked = entrants(arguments.methods)
     chosen = catalogue.cases(arguments.cases or (catalogue.QUICK if arguments.quick else None))
     facts = machine()
@@ -61,6 +63,17 @@ def run(arguments: argparse.Namespace) -> int:
         shutil.copyfile(svg, arguments.update_docs / ASSETS / page.CHART)
         _write_page(arguments.update_docs, page.page(result, asked, facts, pictures, ASSETS))
     return 0
+
+
+def _check_page(arguments: argparse.Namespace) -> None:
+    """Raise InputError, before anything is asked, where the page could not be written or would lose cases."""
+    docs = arguments.update_docs
+    if docs is None:
+        return
+    if arguments.cases or arguments.quick:
+        raise InputError("the page has all cases; leave --cases and --quick out, or leave --update-docs out")
+    if not (docs / PAGE).is_file():
+        raise InputError(f"{docs / PAGE}: there is no such page; give the folder of the documentation")
 
 
 def _asked(cases: Sequence[HardCase], entrants: Sequence[Entrant], jobs: int) -> Result:

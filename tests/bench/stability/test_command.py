@@ -1,0 +1,83 @@
+"""`wholebody bench stability` from end to end: what is printed, and the files."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from wholebody.bench.entrants import entrants
+from wholebody.bench.stability import page
+from wholebody.bench.stability.catalogue import cases
+from wholebody.bench.stability.rows import Result, StabilityRow, result
+from wholebody.bench.stability.running import run
+from wholebody.bench.tables import read_rows
+from wholebody.cli.bench import stability
+from wholebody.errors import InputError
+
+CASES = ("out-by-1-mm", "edge-on-edge", "not-a-number")
+METHODS = ("qp/osqp", "ccd")
+
+
+def bench(*words: str) -> int:
+    parser = argparse.ArgumentParser()
+    stability.add_to(parser.add_subparsers())
+    arguments = parser.parse_args(["stability", *words])
+    return int(arguments.run(arguments))
+
+
+def test_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("matplotlib")
+    assert bench("--methods", *METHODS, "--cases", *CASES, "--jobs", "2", "--out", str(tmp_path)) == 0
+    _, rows = read_rows(tmp_path / "stability.csv", StabilityRow)
+    assert [(row.case, row.method) for row in rows] == [(case, method) for case in CASES for method in METHODS]
+    assert rows[0].verdict == "honest"
+    assert rows[0].best == 1e-3
+    assert rows[-1].verdict == "refusal"
+    assert "finite" in rows[-1].sentence
+    texts = " ".join(ElementTree.parse(tmp_path / "stability.svg").getroot().itertext())
+    assert all(word in texts for word in ("Out of reach by 1 mm", "Edge on edge", "osqp", "ccd", "●", "–"))
+    assert "3 of 3" in capsys.readouterr().out
+    assert "| out-by-1-mm |" in (tmp_path / "stability.md").read_text()
+
+
+def test_a_page_is_whole_or_not_begun(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="all cases"):
+        bench("--cases", *CASES, "--update-docs", str(tmp_path))
+    with pytest.raises(InputError, match="there is no such page"):
+        bench("--update-docs", str(tmp_path))
+
+
+@pytest.fixture(scope="module")
+def found() -> Result:
+    chosen, asked = cases(CASES[:2]), entrants(METHODS)
+    return result(chosen, METHODS, list(run(chosen, asked)))
+
+
+def test_the_page_tells_every_case_with_its_picture_and_verdicts(found: Result) -> None:
+    drawn = {"edge-on-edge": [(Path("x/edge-on-edge.jpg"), "The answer of qp/osqp; transparent, the start.")]}
+    text = page.page(found, entrants(METHODS), {"wholebody": "1"}, drawn, "assets/stability")
+    for case in found.cases:
+        assert f"### {case.title}\n\n{case.why}\n\n*Acceptable.* {case.acceptable}" in text
+    assert "(assets/stability/edge-on-edge.jpg)" in text
+    assert "| ● honest best effort: best known | `qp/osqp` |" in text
+    assert "| `qp/osqp` | 0 | 2 | 0 | 0 | 2 |" in text
+    assert "No answer was wrong." in text
+    assert "`ccd`: wb.CCD()" in text
+
+
+def test_pictures_of_a_case(found: Result, tmp_path: Path) -> None:
+    from wholebody.bench.stability.pictures import draw
+    from wholebody.view.browser import find_chromium
+
+    if find_chromium() is None:
+        pytest.skip("there is no Chromium")
+    image = pytest.importorskip("PIL.Image")
+    drawn = draw(found, tmp_path)
+    assert [path.name for path, _ in drawn["edge-on-edge"]] == ["edge-on-edge.jpg"]
+    with image.open(tmp_path / "edge-on-edge.jpg") as picture:
+        assert picture.size == (560, 420)
+        assert len(np.unique(np.asarray(picture).reshape(-1, 3), axis=0)) > 1000  # more than a background
