@@ -28,6 +28,10 @@ from wholebody.tasks.inputs import numbers
 Array = NDArray[np.float64]
 Counts = NDArray[np.intp]
 
+SETTLED = 1e-3  # m, rad: a goal that is left by less than this when it has come to its end is met at once
+GAIN = 1e-4  # m, rad: a figure that nears it by less in a frame has come to rest
+SETTLING = 120  # most frames that are added for one that lags behind
+
 DEPTHS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 """Depths, metres, that are tried in turn as a bound on what a way goes in by."""
 
@@ -38,7 +42,7 @@ class Dragged:
 
     Attributes:
         q: (n + 2, nq) the start, every frame, and the end, which is solved to full accuracy.
-        targets: (n, 3) where the goal was in each frame, metres.
+        targets: (n, 3) where the goal was in each frame, metres; the last place again while the figure lags.
         dt: seconds from frame to frame.
         method: its name.
         seconds, cpu_seconds: (n,) of each frame: wall time, and the processor's for this thread.
@@ -110,6 +114,8 @@ def drag_along(
 ) -> Dragged:
     """Drag a goal through places, one a frame, and meet the last with full accuracy.
 
+    A figure that lags behind is given more frames at the last place until it comes to rest.
+
     Args:
         problem: with the goal that moves, a `Point` or a `Frame`, which keeps its orientation.
         places: (n, 3) metres.
@@ -125,20 +131,25 @@ def drag_along(
     targets = numbers(places, (len(np.asarray(places)), 3), "places")
     drag = Drag(problem, method, goal=goal, dt=dt)
     aims = [_aim(problem, goal, place) for place in targets]
-    postures, wall, cpu, iterations = [drag.q], [], [], []
-    for number, aim in enumerate(aims, start=1):
+    postures, left = [drag.q], [np.inf]
+    wall: list[float] = []
+    cpu: list[float] = []
+    iterations: list[int] = []
+    while len(wall) < len(aims) or _lags(left, len(wall) - len(aims)):
         began = time.thread_time()
-        frame = drag.to(aim)
+        frame = drag.to(aims[min(len(wall), len(aims) - 1)])
         cpu.append(time.thread_time() - began)
         wall.append(frame.seconds)
         postures.append(frame.q)
         iterations.append(frame.iterations)
+        left.append(frame.error)
         if progress is not None:
-            progress(number)
+            progress(min(len(wall), len(aims)))
+    late = len(wall) - len(aims)
     end = drag.finish()
     return Dragged(
         q=np.array([*postures, end.q]),
-        targets=targets,
+        targets=np.vstack([targets, np.tile(targets[-1], (late, 1))]),
         dt=dt,
         method=end.method,
         seconds=np.array(wall),
@@ -146,6 +157,11 @@ def drag_along(
         iterations=np.array(iterations, dtype=np.intp),
         end=end,
     )
+
+
+def _lags(left: list[float], late: int) -> bool:
+    """Whether a figure still comes nearer to the last place, from what was left in each frame."""
+    return late < SETTLING and left[-1] > SETTLED and left[-2] - left[-1] > GAIN
 
 
 def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudgement:

@@ -37,8 +37,8 @@ MOST_GOALS = 10_000
 ON_THE_WAY = 1e-3  # m, rad: to which a method that solves anew in every frame meets the goal before the end
 AT_THE_END = 1e-5  # m, rad
 WITHIN = 0.06  # m: pairs nearer than this are measured when a way is judged; larger = dearer, fewer left to a sweep
-SHARES = (1.0, 0.5, 0.25)  # of the way to a posture, tried in turn where all of it goes into something
-GRAZE = 2e-4  # m: deeper than this a way goes into something
+LEGS = (np.inf, 0.01, 0.002)  # m, rad: how far the goal is followed in a frame, in turn where a longer way is not free
+GRAZE = 5e-4  # m: deeper than this a way goes into something; soles that are held dip in between two postures
 SHORT = 0.03  # rad, m: a shorter way of joints whose every step was looked after dips in by less than GRAZE
 
 
@@ -62,8 +62,8 @@ class Drag:
     """Follows a goal that is moved from frame to frame.
 
     "qp" makes one quadratic program a frame, "newton" a few Newton steps; other methods solve every frame anew from the
-    posture at hand, "ccd" to a millimetre. No method restarts elsewhere. A posture that lies beyond something in the
-    way is approached as far as the way is free.
+    posture at hand, "ccd" to a millimetre. No method restarts elsewhere. Where the way to a posture goes into
+    something, the goal is followed by a shorter leg, or not in that frame.
 
     Attributes:
         problem: what is asked; its goals are replaced as they move.
@@ -103,15 +103,11 @@ class Drag:
         """
         began = time.perf_counter()
         retarget(self.problem, self._number, target)
-        if isinstance(self.method, Newton):
-            step = self.method.step(self.problem, self.q)
-            self.q, iterations = self._towards(step.q, SHORT), step.iterations
-        elif isinstance(self.method, QP):
+        if isinstance(self.method, QP):
             answer = self.method.step(self.problem, self.q, self.dt)
             self.q, iterations = answer.q, 1
         else:
-            solution = self._rough.solve(_from(self.problem, self.q))
-            self.q, iterations = self._towards(solution.q, 0.0), solution.iterations
+            iterations = self._followed()
         return DragFrame(self.q, _error(self.problem, self.q), iterations, time.perf_counter() - began)
 
     def finish(self) -> Solution:
@@ -120,16 +116,38 @@ class Drag:
         self.q = solution.q
         return solution
 
-    def _towards(self, q: Array, short: float) -> Array:
-        """The posture q (nq,), or as far towards it as the way is free; ways up to `short` are taken as they are."""
+    def _followed(self) -> int:
+        """Move to a posture whose way is free, nearer to the goal by as long a leg as goes; the iterations it took."""
+        goal, spent = moving_goal(self.problem, self._number), 0
+        left = goal.error(self.problem.scene.state(self.q))
+        error = max(float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:])))
+        for leg in LEGS:
+            if leg < error:
+                retarget(self.problem, self._number, _part(self.problem, goal, self.q, leg / error))
+            elif np.isfinite(leg):
+                break  # the goal is no farther than that, and was asked for already
+            q, iterations, short = self._attempt()
+            spent += iterations
+            if self._free(q, short):
+                self.q = q
+                break
+        retarget(self.problem, self._number, goal.target)
+        return spent
+
+    def _attempt(self) -> tuple[Array, int, float]:
+        """A posture for the present goals, the iterations, and how long a way the method itself looks after."""
+        if isinstance(self.method, Newton):
+            step = self.method.step(self.problem, self.q)
+            return step.q, step.iterations, SHORT
+        solution = self._rough.solve(_from(self.problem, self.q))
+        return solution.q, solution.iterations, 0.0
+
+    def _free(self, q: Array, short: float) -> bool:
+        """Whether the way to the posture q (nq,) goes into nothing; ways up to `short` are taken as they are."""
         scene = self.problem.scene
         if np.abs(pin.difference(scene.model, self.q, q)).max() <= short:
-            return q
-        for share in SHARES:
-            part = q if share == 1.0 else np.asarray(pin.interpolate(scene.model, self.q, q, share))
-            if scene.sweeper.first_contact(self.q, part, tolerance=GRAZE) is None:
-                return part
-        return self.q
+            return True
+        return scene.sweeper.first_contact(self.q, q, tolerance=GRAZE) is None
 
 
 def pull(
@@ -202,6 +220,17 @@ def _jumps(problem: Problem, before: Array, after: Array) -> bool:
         snapshot(scene.proximity, scene.proximity.near(scene.state(q).data, WITHIN), WITHIN) for q in (before, after)
     )
     return jumps(scene, first, last, before, after)
+
+
+def _part(problem: Problem, goal: Point | Frame, q: Array, share: float) -> Any:
+    """A target on the way of a goal's frame from where it is at the posture q (nq,): a share of what is left."""
+    error = goal.error(problem.scene.state(q))
+    if isinstance(goal, Point):
+        return goal._target + (1.0 - share) * error
+    target = goal._target
+    here = pin.SE3(pin.exp3(error[3:]) @ target.rotation, target.translation + error[:3])
+    turned = here.rotation @ pin.exp3(share * pin.log3(here.rotation.T @ target.rotation))
+    return pin.SE3(turned, here.translation + share * (target.translation - here.translation))
 
 
 def own_copy(problem: Problem) -> Problem:
