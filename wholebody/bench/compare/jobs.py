@@ -51,38 +51,43 @@ def work(task: Task) -> Chunk:
     spent, swept = {}, {}
     for entrant, ladder in task.solves:
         began = time.perf_counter()
-        first = _solve(worker, entrant, DEFAULT, task)
+        first, ended = _solve(worker, entrant, DEFAULT, task)
         records.append(first)
         between = time.perf_counter()
         spent[entrant.name] = between - began
         if ladder and spent[entrant.name] * len(ladder) <= task.most:
-            records += _sweep(worker, entrant, ladder, task, first)
+            records += _sweep(worker, entrant, ladder, task, first, ended)
             swept[entrant.name] = time.perf_counter() - between
     return Chunk(task.family.name, task.number, tuple(records), spent, swept, building)
 
 
-def _sweep(worker: Worker, entrant: Entrant, ladder: Iterable[Budget], task: Task, first: Record) -> list[Record]:
-    """All further budgets, unless the first solve or one of them shows that it is of no use."""
+def _sweep(
+    worker: Worker, entrant: Entrant, ladder: Iterable[Budget], task: Task, first: Record, ended: bool
+) -> list[Record]:
+    """All further budgets; where the process has ended over one, the rest count as what they would have been."""
     records: list[Record] = []
-    stopped = first if first.outcome in (REFUSED, OVERTIME) else None
+    if first.outcome == REFUSED:
+        return records
+    last = first
     for level in ladder:
-        if stopped is None:
-            records.append(_solve(worker, entrant, level, task))
-            stopped = records[-1] if records[-1].outcome == OVERTIME else None
-        elif stopped.outcome == OVERTIME:  # counted as what it would have been
-            records.append(replace(stopped, tolerance=level[0], budget=level[1] or 0))
+        if not ended:
+            last, ended = _solve(worker, entrant, level, task)
+            records.append(last)
+        else:
+            records.append(replace(last, tolerance=level[0], budget=level[1] or 0))
     return records
 
 
-def _solve(worker: Worker, entrant: Entrant, level: Budget, task: Task) -> Record:
+def _solve(worker: Worker, entrant: Entrant, level: Budget, task: Task) -> tuple[Record, bool]:
+    """What came of a solve, and whether the process has ended over it."""
     try:
         record: Record = worker.solve(Solve(entrant, level, task.cap))
     except EndedError as error:
         empty = Record(task.family.name, task.number, entrant.name, level[0], level[1] or 0, FAILED)
         if error.overtime:
-            return replace(empty, outcome=OVERTIME, said=f"ended after {task.cap:g} s")
-        return replace(empty, said=str(error))
-    return record
+            return replace(empty, outcome=OVERTIME, said=f"ended after {task.cap:g} s"), True
+        return replace(empty, said=str(error)), True
+    return record, False
 
 
 def compute(tasks: Iterator[Task], jobs: int, cluster: str | None = None) -> Iterator[Chunk]:

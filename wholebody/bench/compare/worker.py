@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import pickle
 import signal
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,6 +20,8 @@ from wholebody.errors import MissingPackageError, WholebodyError
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Set to 1 in the process, so that methods are compared on one core each."""
+
+ORPHANED = 1.0  # s: how often a process looks whether its parent is still there
 
 _local = threading.local()
 
@@ -126,8 +130,17 @@ def own_worker() -> Worker:
     """The worker of this thread; it lives as long as the thread's process."""
     if not hasattr(_local, "worker"):
         _local.worker = Worker()
+        if multiprocessing.current_process().name.startswith("LokyProcess"):
+            threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     worker: Worker = _local.worker
     return worker
+
+
+def _end_with(parent: int) -> None:
+    """End this process, and with it its worker, when its parent was killed; joblib's would wait for minutes."""
+    while os.getppid() == parent:
+        time.sleep(ORPHANED)
+    os._exit(1)
 
 
 def dumps(value: Any) -> bytes:

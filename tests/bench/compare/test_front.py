@@ -1,0 +1,143 @@
+"""Curves and the front on data made by hand, whose answer is plain."""
+
+from __future__ import annotations
+
+from math import inf, isinf
+
+import pytest
+
+from wholebody.bench.compare.advice import advice, choices, standings
+from wholebody.bench.compare.curves import curve, profile
+from wholebody.bench.compare.front import OURS, front, fronts, time_to
+from wholebody.bench.compare.record import ANSWERED, FAILED, REFUSED, Record
+from wholebody.bench.compare.results import QUANTITIES, Results
+from wholebody.bench.compare.summary import summaries
+
+WORST, GOAL, PENETRATION, EFFORT = QUANTITIES
+CASES = range(5)
+
+
+def record(
+    entrant: str, number: int, tolerance: float, seconds: float, error: float, *, family: str = "s",
+    penetration: float = 0.0, outcome: str = ANSWERED, measure: float = 1.0, status: str = "solved",
+) -> Record:  # fmt: skip
+    return Record(
+        family, number, entrant, tolerance, 0, outcome, status, "", seconds, seconds, goal_error=error, goal_angle=0.0,
+        penetration=penetration, clearance_lack=penetration, limit_violation=0.0, constraint_violation=0.0,
+        measure=measure, optimality=0.0, best=1.0,
+    )  # fmt: skip
+
+
+def curve_of(entrant: str, *points: tuple[float, float, float]) -> list[Record]:
+    """Points of (tolerance, seconds, error); cases differ by a factor about the middle one, which is the median."""
+    return [
+        record(entrant, number, tolerance, seconds * 2.0 ** (number - 2), error * 2.0 ** (number - 2))
+        for tolerance, seconds, error in points
+        for number in CASES
+    ]
+
+
+def results(*records: list[Record]) -> Results:
+    flat = [one for some in records for one in some]
+    return Results(flat, ["s"], list(dict.fromkeys(one.entrant for one in flat)))
+
+
+OURS_CURVE = curve_of(OURS, (1e-2, 0.010, 1e-2), (1e-4, 0.020, 2e-4), (1e-6, 0.030, 2e-6))
+
+
+def test_a_slower_method_leaves_ours_on_the_front() -> None:
+    found = front(results(OURS_CURVE, curve_of("other", (1e-4, 0.040, 2e-4), (1e-6, 0.090, 2e-6))), "s", WORST)
+    assert found is not None
+    assert found.on_front
+    assert (found.method, found.ratio) == ("other", pytest.approx(0.5))
+
+
+def test_a_faster_method_at_one_accuracy_takes_ours_off_the_front_there() -> None:
+    found = front(results(OURS_CURVE, curve_of("other", (1e-4, 0.040, 2e-4), (1e-6, 0.012, 2e-6))), "s", WORST)
+    assert found is not None
+    assert not found.on_front
+    assert found.ratio == pytest.approx(30.0 / 12.0)
+    assert found.accuracy in (1e-4, 3e-5, 1e-5)
+    assert (found.ours, found.other) == (pytest.approx(0.030), pytest.approx(0.012))
+
+
+def test_a_method_that_is_fast_but_coarse_does_not_count() -> None:
+    found = front(results(OURS_CURVE, curve_of("other", (1e-4, 0.001, 0.02), (1e-6, 0.001, 0.01))), "s", WORST)
+    assert found is not None
+    assert found.method == ""
+
+
+def test_failures_are_infinitely_slow() -> None:
+    fast = curve_of("other", (1e-4, 0.001, 1e-5))
+    broken = [one if one.number < 2 else record("other", one.number, 1e-4, 0.001, inf, outcome=FAILED) for one in fast]
+    assert isinf(time_to(results(broken), "s", "other", WORST, 1e-3, frozenset(CASES)))
+    found = front(results(OURS_CURVE, broken), "s", WORST)
+    assert found is not None
+    assert found.method == ""
+
+
+def test_an_answer_inside_of_something_is_no_accurate_one() -> None:
+    inside = [record("other", number, 1e-4, 0.001, 1e-6, penetration=0.05) for number in CASES]
+    for quantity in (WORST, GOAL, EFFORT):
+        found = front(results(OURS_CURVE, inside), "s", quantity)
+        assert found is not None
+        assert found.on_front
+    (point,) = curve(results(inside), "s", "other", WORST)
+    assert point.value == 0.05
+    assert isinf(curve(results(inside), "s", "other", GOAL)[0].value)
+
+
+def test_methods_are_compared_on_the_cases_of_both() -> None:
+    theirs = [one for one in curve_of("other", (1e-4, 0.012, 2e-4)) if one.number >= 3]  # the slow ones
+    found = front(results(OURS_CURVE, theirs), "s", WORST)
+    assert found is not None
+    assert found.cases == 2
+    assert found.ratio == pytest.approx(20.0 / 12.0)
+
+
+def test_the_same_method_with_another_solver_is_no_rival() -> None:
+    found = front(results(OURS_CURVE, curve_of("qp/other", (1e-4, 0.001, 1e-8))), "s", WORST)
+    assert found is not None
+    assert found.method == ""
+    assert fronts(results(curve_of("other", (1e-4, 0.1, 1e-5)))) == []
+
+
+def test_points_are_medians_with_their_spread() -> None:
+    points = curve(results(OURS_CURVE), "s", OURS, WORST)
+    assert [point.seconds for point in points] == pytest.approx([0.010, 0.020, 0.030])
+    assert [point.value for point in points] == pytest.approx([1e-2, 2e-4, 2e-6])
+    assert (points[0].low, points[0].high) == (pytest.approx(0.5e-2), pytest.approx(2e-2))
+    assert points[0].seconds_p95 == pytest.approx(0.040)
+
+
+def test_effort_is_measured_against_the_best_exact_answer() -> None:
+    exact = [record("a", 0, 1e-4, 0.1, 1e-8, measure=0.5)]
+    cheat = [record("b", 0, 1e-4, 0.1, 5e-4, measure=0.1)]  # cheaper, by what it lacks
+    made = results(exact, cheat)
+    assert made.best(exact[0]) == 0.5
+    assert EFFORT.of(record("c", 0, 1e-4, 0.1, 1e-8, measure=0.6), made.best(exact[0])) == pytest.approx(0.2)
+
+
+def test_refusals_are_left_out_of_shares_and_seen_in_counts() -> None:
+    some = [record("x", number, 1e-4, 0.1 * (number + 1), 1e-6) for number in range(3)]
+    some += [record("x", number, 1e-4, inf, inf, outcome=REFUSED, status="") for number in (3, 4)]
+    made = results(some)
+    times, cases = profile(made, "s", "x", 1e-3)
+    assert (times, cases) == (pytest.approx([0.1, 0.2, 0.3]), 3)
+    (row,) = summaries(made)
+    assert (row.cases, row.refused, row.success) == (5, 2, 1.0)
+    assert not row.dependable
+
+
+def test_advice_names_the_dependable_and_the_fast() -> None:
+    slow = curve_of("slow", (1e-4, 0.4, 1e-6))
+    fast = [record("fast", number, 1e-4, 0.001, 1e-6 if number else 0.3) for number in CASES]
+    quick = curve_of("quick", (1e-4, 0.1, 1e-5))
+    made = results(slow, fast, quick)
+    rows = summaries(made)
+    (choice,) = choices(made, rows)
+    assert (choice.fastest, choice.exact) == ("quick", "slow")
+    assert [standing.entrant for standing in standings(made, rows)] == ["quick", "slow", "fast"]
+    said = advice(made, rows)
+    assert "`quick`" in said[0]
+    assert any("`fast` alone is not enough" in sentence and "80 %" in sentence for sentence in said)
