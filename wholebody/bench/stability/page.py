@@ -91,8 +91,8 @@ def _wrongs(result: Result) -> str:
 def _setups(entrants: Sequence[Entrant]) -> str:
     lines = ["How each method was set up, the others' as their own documentation has it:", ""]
     for entrant in entrants:
-        differences = " ".join(f"{sentence[0].upper()}{sentence[1:]}." for sentence in entrant.differences)
-        lines.append(f"- `{entrant.name}`: {entrant.setup} {differences}".rstrip())
+        differences = "; ".join(entrant.differences)
+        lines.append(f"- `{entrant.name}`: {entrant.setup}" + (f" Besides: {differences}." if differences else ""))
     return "\n".join(lines)
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wholebody.bench.stability.case import HardCase, Kind
-from wholebody.bench.stability.running import Cell, known_best
+from wholebody.bench.stability.judging import INSIDE
+from wholebody.bench.stability.running import Cell
 from wholebody.bench.stability.verdict import Verdict, decide
 
 
@@ -88,10 +90,21 @@ class Result:
 
 def result(cases: Sequence[HardCase], methods: Sequence[str], cells: Sequence[Cell]) -> Result:
     """Decide all cells: each is compared with the best answer of all."""
-    best = known_best(cells)
+    best = _known(cells)
     best |= {case.name: case.best for case in cases if case.best is not None}
     placed = {(cell.case.name, cell.method): cell for cell in cells}
     verdicts = {
         key: decide(cell.case, cell.answer, cell.judged, best.get(cell.case.name)) for key, cell in placed.items()
     }
     return Result(tuple(cases), tuple(methods), placed, verdicts, best)
+
+
+def _known(cells: Sequence[Cell]) -> dict[str, float]:
+    """Least goal error of each case's answers with which nothing is wrong, by the case's name [m, rad]."""
+    found: dict[str, float] = {}
+    for cell in cells:
+        kind = decide(cell.case, cell.answer, cell.judged).kind
+        if kind in ("solved", "honest") and cell.judged.penetration <= INSIDE:
+            name = cell.case.name
+            found[name] = min(found.get(name, math.inf), cell.judged.goal_error)
+    return found

@@ -6,7 +6,7 @@ import multiprocessing
 import os
 import signal
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
@@ -127,15 +127,3 @@ def _work(case: HardCase, entrant: Entrant, mouth: Connection) -> None:
     mouth.send(judge(case, answer))
     mouth.close()
     os._exit(0)  # nothing of the parent's is to be closed twice
-
-
-def known_best(cells: Iterable[Cell]) -> dict[str, float]:
-    """Least goal error of each case's answers in which everything holds, by the case's name [m, rad]."""
-    found: dict[str, float] = {}
-    for cell in cells:
-        judged = cell.judged
-        held = max(judged.penetration, judged.limit_violation, judged.constraint_violation) <= 1e-4
-        if len(cell.answer.postures) and judged.finite and held and not judged.passed:
-            name = cell.case.name
-            found[name] = min(found.get(name, float("inf")), judged.goal_error)
-    return found

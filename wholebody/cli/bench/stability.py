@@ -85,7 +85,7 @@ def _asked(cases: Sequence[HardCase], entrants: Sequence[Entrant], jobs: int) ->
         work = bar.add_task("asking", total=len(cases) * len(entrants))
         for cell in ask_all(cases, entrants, jobs):
             cells.append(cell)
-            bar.update(work, advance=1, description=f"{cell.case.name}, {cell.method}")
+            bar.update(work, advance=1, description=f"{cell.case.name}, {cell.method}", refresh=True)
     return result(cases, [entrant.name for entrant in entrants], cells)
 
 
@@ -94,7 +94,7 @@ def _drawn(result: Result, docs: Path) -> Drawn:
 
     with _bar() as bar:
         work = bar.add_task("drawing", total=len(result.cases))
-        return draw(result, docs / ASSETS, lambda: bar.update(work, advance=1))
+        return draw(result, docs / ASSETS, lambda: bar.update(work, advance=1, refresh=True))
 
 
 def _bar() -> Progress:
@@ -102,7 +102,8 @@ def _bar() -> Progress:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    return Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4)
+    # no thread that refreshes it: cells are forked, and a fork may catch a thread with a lock
+    return Progress(*columns, console=Console(stderr=True), transient=True, auto_refresh=False)
 
 
 def _print(result: Result) -> None:
