@@ -150,11 +150,12 @@ def drag_chart(drags: Mapping[str, Sequence[DragFrameRow]], path: Path) -> tuple
     for method, rows in drags.items():
         frame = [row.frame for row in rows]
         color = COLORS.get(method.partition("/")[0], "#666666")
-        above.plot(frame, [row.milliseconds for row in rows], color=color, linewidth=1.0, label=method)
+        above.plot(frame, [row.milliseconds for row in rows], color=color, linewidth=0.8, alpha=0.35)
+        above.plot(frame, [max(row.cpu_ms, 1e-3) for row in rows], color=color, linewidth=1.2, label=method)
         below.plot(frame, [max(row.error_mm, 1e-6) for row in rows], color=color, linewidth=1.0)
     above.set_yscale("log")
-    above.set_ylabel("frame time [ms]")
-    above.legend(loc="upper right", frameon=False, ncols=3, fontsize=8)
+    above.set_ylabel("frame time [ms]\nprocessor; pale: wall")
+    above.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=3, fontsize=8)
     first = next(iter(drags.values()))
     above.set_title(f"{first[0].task.replace('_', ' ')}, dragged", loc="left")
     below.set_yscale("log")
