@@ -14,6 +14,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import wholebody as wb
+from wholebody.bench.problem_sets.things import Occupied
 from wholebody.errors import InputError, UnknownNameError
 
 Array = NDArray[np.float64]
@@ -119,23 +120,16 @@ def smooth_way(places: Array, steps: int) -> Array:
 def add_objects(scene: wb.Scene, start: Array, way: Array, rng: np.random.Generator) -> None:
     """Put boxes, spheres and hulls around a body, clear of how it stands and of a way (k, 3) for its fingertip."""
     scene.add(wb.Box(BLOCK[0]), name="block", at=BLOCK[1])
+    standing = Occupied(scene.figure, (start,))
     kinds = ["box"] * (BOXES - 1) + ["sphere"] * SPHERES + ["hull"] * HULLS
     for number, kind in enumerate(kinds):
         while True:
             shape = _shape(kind, rng)
             turn = rng.normal(size=4)
             at = (*rng.uniform(*SPACE), *(turn / np.linalg.norm(turn)))
-            if clear(scene.figure, shape, at, start, ROOM_START) and _clear_of_way(shape, at, way):
+            if standing.clear_of(shape, at, ROOM_START) and _clear_of_way(shape, at, way):
                 break
         scene.add(shape, name=f"{kind} {number}", at=at)
-
-
-def clear(figure: wb.Figure, shape: wb.Shape, at: tuple[float, ...], q: Array, room: float) -> bool:
-    """Whether an object leaves this much room, metres, around the body in the posture q, shape (nq,)."""
-    alone = wb.Scene(figure).add(shape, name="it", at=at)
-    owners = alone.piece_owner
-    near = alone.contacts(q, within=room).pair
-    return not any("it" in (owners[a], owners[b]) for a, b in near)
 
 
 def _clear_of_way(shape: wb.Shape, at: tuple[float, ...], way: Array) -> bool:
