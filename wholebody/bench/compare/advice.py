@@ -135,7 +135,9 @@ def advice(results: Results, rows: Sequence[Summary]) -> list[str]:
     for choice in picked:
         if choice.fastest:
             fast.setdefault(choice.fastest, []).append(f"{words(choice.set)} ({choice.fastest_ms:.3g} ms)")
-    said += [f"**Fastest of the dependable:** `{name}` in {', '.join(sets)}." for name, sets in fast.items()]
+    if fast:
+        listed = "; ".join(f"`{name}` in {', '.join(sets)}" for name, sets in fast.items())
+        said.append(f"**Fastest of the dependable:** {listed}.")
     exact = {choice.exact for choice in picked if choice.exact}
     if exact:
         said.append(

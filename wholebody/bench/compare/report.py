@@ -16,6 +16,8 @@ from wholebody.bench.compare.store import Chunk
 from wholebody.bench.compare.summary import GOOD, Summary, summaries
 from wholebody.bench.machine import sentence
 
+FEW = 10  # problems below which a share is no share
+
 
 @dataclass(frozen=True)
 class Material:
@@ -54,6 +56,7 @@ def blocks(given: Material) -> list[Block]:
     return [
         Heading(2, "What to choose when"),
         Points(advice(given.results, given.rows)),
+        Text(basis(given)),
         _choices(given),
         Heading(2, "All methods at a glance"),
         _standings(given),
@@ -90,6 +93,7 @@ def short(given: Material) -> list[Block]:
     return [
         Heading(2, "What to choose when"),
         Points(advice(given.results, given.rows)),
+        Text(basis(given)),
         _choices(given),
         _standings(given),
         *charts,
@@ -100,6 +104,20 @@ def short(given: Material) -> list[Block]:
         Text(settings_sentence(given)),
         Text(sentence(given.facts)),
     ]
+
+
+def basis(given: Material) -> str:
+    """How much the advice stands on."""
+    counts = [row.cases for row in given.rows]
+    least, most = min(counts, default=0), max(counts, default=0)
+    said = f"This rests on {least} to {most} problems" if least < most else f"This rests on {most} problems"
+    said += " a set for each method"
+    if least < FEW:
+        said += (
+            "; where there are only a few, a share of 100 % says little: run it longer, on a machine with nothing else "
+            "to do, or on more of them (`--jobs`, `--cluster`)"
+        )
+    return said + ". The tables below say how many each method was given."
 
 
 def settings_sentence(given: Material) -> str:

@@ -1,0 +1,166 @@
+"""What a run leaves: charts, a report that needs no network and says what was left out, and the page of results."""
+
+from __future__ import annotations
+
+import re
+from math import inf
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+pytest.importorskip("matplotlib")
+
+from wholebody.bench.compare import publish as publishing
+from wholebody.bench.compare.cases import Shown, chosen
+from wholebody.bench.compare.charts import BAND, lowest
+from wholebody.bench.compare.curves import Point
+from wholebody.bench.compare.looks import look
+from wholebody.bench.compare.record import ANSWERED, OVERTIME, REFUSED, Record
+from wholebody.bench.compare.results import Results
+from wholebody.bench.compare.scenes import CLOSING, OPENING, Scene, draw
+from wholebody.bench.compare.settings import Settings
+from wholebody.bench.compare.store import Chunk, Store
+from wholebody.bench.tables import read_rows
+from wholebody.errors import InputError
+
+FACTS = {"wholebody": "0", "processor": "a fast one", "date": "2030-01-02"}
+REFUSAL = "it cannot take <goals[0]>, Point"
+FETCHED = re.compile(
+    r"""(?:src|href|action)\s*=\s*["']?\s*(?:https?:)?//|url\(\s*["']?(?:https?:)?//|@import|fetch\("""
+)
+
+
+def record(entrant: str, number: int, tolerance: float, seconds: float, error: float) -> Record:
+    return Record(
+        "arm", number, entrant, tolerance, 0, ANSWERED, "solved", "", seconds, seconds, goal_error=error,
+        goal_angle=0.0, penetration=0.0, clearance_lack=0.0, limit_violation=0.0, constraint_violation=0.0,
+        measure=1.0, optimality=0.0, best=1.0,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def asked(fakes: ModuleType) -> Settings:
+    return Settings((fakes.SET,), tuple(fakes.entrant(name) for name in ("solves", "lies", "refuses", "hangs")), 9, 2)
+
+
+@pytest.fixture(scope="module")
+def folder(asked: Settings, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a run of two cases whose records are made by hand, with its report."""
+    place = tmp_path_factory.mktemp("report")
+    docs = place / "docs"
+    docs.mkdir()
+    (docs / "results.md").write_text("before\n<!-- bench:compare -->\nold\n<!-- /bench:compare -->\nafter\n")
+    store = Store(place / "out", asked.described())
+    for number in range(2):
+        records = [record("solves", number, 10.0**-k, 0.01 * k, 10.0**-k / 2) for k in (2, 4, 6)]
+        records += [record("lies", number, 10.0**-k, 0.001 * k, 0.4) for k in (2, 4, 6)]
+        records.append(Record("arm", number, "refuses", 1e-4, 0, REFUSED, said=REFUSAL))
+        records.append(Record("arm", number, "hangs", 1e-4, 0, OVERTIME, said="ended after 20 s"))
+        store.add(Chunk("arm", number, tuple(records)))
+    missing = {"mink": "pip install 'wholebody[compare]'"}
+    publishing.publish(asked, store, place / "out", FACTS, missing, docs)
+    return place
+
+
+def test_every_solve_is_in_the_table(folder: Path) -> None:
+    facts, rows = read_rows(folder / "out" / "solves.csv", Record)
+    assert facts["processor"] == "a fast one"
+    assert len(rows) == 16
+    assert [row.worst for row in rows if row.entrant == "refuses"] == [inf, inf]
+    assert {row.entrant for row in rows if row.false_claim} == {"lies"}
+
+
+def test_charts_are_there_in_both_kinds(folder: Path) -> None:
+    for name in ("compare-arm", "compare-arm-profile"):
+        assert (folder / "out" / "charts" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert "time of a solve [ms]" in (folder / "out" / "charts" / f"{name}.svg").read_text()
+
+
+def test_the_report_asks_the_network_for_nothing(folder: Path) -> None:
+    page = (folder / "out" / publishing.PAGE).read_text()
+    shown = re.sub(r'<script id="[^"]*" type="application/octet-stream">[^<]*</script>', "", page)
+    assert not FETCHED.search(shown)
+    assert shown.count("<svg") == 2
+
+
+def test_names_within_the_charts_do_not_meet(folder: Path) -> None:
+    page = (folder / "out" / publishing.PAGE).read_text()
+    names = re.findall(r'\sid="([^"]+)"', page)
+    assert len(names) == len(set(names))
+    used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', page))
+    assert used <= set(names)
+
+
+def test_the_report_says_what_was_left_out_and_why(folder: Path) -> None:
+    page = (folder / "out" / publishing.PAGE).read_text()
+    assert "it cannot take &lt;goals[0]&gt;, Point" in page
+    assert "ended after 20 s" in page
+    assert "2 of 9" in page  # problems that there was time for
+    assert "pip install" in page
+    assert "If in doubt, take <code>solves</code>" in page
+
+
+def test_the_report_has_the_scene_of_a_false_answer(folder: Path) -> None:
+    page = (folder / "out" / publishing.PAGE).read_text()
+    assert page.count("<iframe") == 1
+    assert "lies claims &#x27;solved&#x27; and misses the goals by 400 mm" in page
+
+
+def test_the_page_of_results_gets_its_part(folder: Path) -> None:
+    page = (folder / "docs" / "results.md").read_text()
+    assert page.startswith("before\n<!-- bench:compare -->")
+    assert page.endswith("<!-- /bench:compare -->\nafter\n")
+    assert "old" not in page
+    for name in re.findall(r"\]\((assets/bench/[^)]+)\)", page):
+        assert (folder / "docs" / name).is_file()
+
+
+def test_a_scene_is_drawn_again_from_its_seed(fakes: ModuleType) -> None:
+    shown = Shown("arm", 1, "solves", "lies", "why")
+    families, entrants = {"arm": fakes.SET}, {name: fakes.entrant(name) for name in ("solves", "lies", "hangs")}
+    (scene,) = draw([shown], families, entrants, 0, 20.0)
+    assert isinstance(scene, Scene)
+    assert OPENING + CLOSING in scene.shell
+    assert len(scene.picture) > 1000
+    assert draw([shown._replace(bad="hangs")], families, entrants, 0, 0.5) == []
+
+
+def test_the_worst_failure_of_a_set_is_chosen() -> None:
+    records = [record("qp/osqp", number, 1e-4, 0.1, 1e-5) for number in range(3)]
+    records += [record("dls", number, 1e-4, 0.1, error) for number, error in enumerate((1e-5, 0.2, 0.1))]
+    (shown,) = chosen(Results(records, ["arm"], ["qp/osqp", "dls"]))
+    assert (shown.number, shown.good, shown.bad) == (1, "qp/osqp", "dls")
+
+
+def test_the_line_of_a_chart_joins_the_best_budgets() -> None:
+    def point(seconds: float, value: float) -> Point:
+        return Point((1e-3, None), 1, seconds, seconds, value, value, value)
+
+    points = [point(1.0, 1e-1), point(2.0, 1e-3), point(3.0, 1e-2), point(4.0, 1e-6)]
+    assert [made.seconds for made in lowest(points)] == [1.0, 2.0, 4.0]
+    assert max(made.value for made in points) < BAND
+
+
+def test_principal_methods_have_colours_of_their_own() -> None:
+    names = (
+        "qp/osqp",
+        "qp/daqp",
+        "newton/slack",
+        "newton/barrier",
+        "newton/kkt",
+        "ccd",
+        "dls",
+        "placo",
+        "mink",
+        "pink",
+    )
+    assert len({look(name).color for name in names}) == len(names)
+    assert look("qp/some_solver") == look("qp/some_solver")
+
+
+def test_settings_are_checked(fakes: ModuleType) -> None:
+    with pytest.raises(InputError, match="cases is 0"):
+        Settings((fakes.SET,), (fakes.entrant("solves"),), cases=0)
+    with pytest.raises(InputError, match="at least one of each"):
+        Settings((), (fakes.entrant("solves"),))
