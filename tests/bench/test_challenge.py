@@ -24,6 +24,7 @@ def test_both_methods_sit_down(tmp_path: Path, capsys: pytest.CaptureFixture[str
         assert row.status == "solved"
         assert 0.0 <= row.seat_mm < 1.0
         assert row.depth_mm < 0.1
+        assert row.between_mm <= 1.0
         assert row.feet_mm < 2.0
         assert row.left_mm < 0.011
     _, frames = read_rows(tmp_path / "out" / "challenge-frames.csv", DragFrameRow)
