@@ -12,8 +12,8 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser = commands.add_parser(
         "newton",
         help="sparse Newton by size, shape and factorisation",
-        description="Chains, trees, rings and stars by every factorisation, whole solves, loops beside open chains, the same "
-        "problems by qp, and drags of the human. Set OMP_NUM_THREADS=1: small dense products are slower on more.",
+        description="Chains, trees, rings and stars by every factorisation, whole solves, loops beside open chains, "
+        "the same problems by qp, and drags of the human. Set OMP_NUM_THREADS=1: small products are slower on more.",
     )
     parser.add_argument("--repeats", type=int, default=15, metavar="N", help="timed systems each (default: 15)")
     parser.set_defaults(run=run)

@@ -127,6 +127,7 @@ class Newton:
             goal_tolerance=tolerance,
             iterations=FRAME_ITERATIONS,
             kind=self.inequalities,
+            hurried=True,
         )
         return NewtonStep(course.posture(found.x), found.iterations, found.systems, course.structures)
 

@@ -51,6 +51,7 @@ def reach(
     iterations: int,
     kind: Kind = "slack",
     goal_tolerance: float | None = None,
+    hurried: bool = False,
 ) -> Reached:
     """Meet all equations from x (7 n,), or come as near as goes.
 
@@ -61,10 +62,11 @@ def reach(
         iterations: most of them.
         kind: how inequalities are dealt with.
         goal_tolerance: of the goals, where it is another.
+        hurried: end at the first steps that bring little, and do not look for the nearest point of goals not met.
     """
     run = Run(course, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
-    run.iterate(iterations, goals=True, measures="lower")
-    if run.stationary and not run.met and len(run.objective):
+    run.iterate(iterations, goals=True, measures="lower", hurried=hurried)
+    if not hurried and run.stationary and not run.met and len(run.objective):
         run.iterate(iterations, goals=True, measures="ignore")
     if run.hard > tolerance and len(run.goal_rows):
         stationary = run.stationary

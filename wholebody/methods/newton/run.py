@@ -41,6 +41,8 @@ NARROW = 0.7  # what is left of the funnel after a step that only mended
 WORTH = 0.05  # share of the promised progress that a step must make
 MENDED = 0.2  # the same where it only mends what must hold
 STAGNANT = 1e-6  # relative progress below which steps count as none
+IDLE = 0.02  # the same where frames wait
+LINGERS = 1  # steps that bring less than that, after which a frame ends
 PATIENCE = 12  # such steps in a row before the nearest point counts as found
 REFUSALS = 6  # times in a row that a step is made anew because it runs into something; after that it is shortened
 SHORTENINGS = 8  # halvings of a step whose way is not free before it counts as failed
@@ -89,8 +91,15 @@ class Run:
         error[self.objective] = 0.0
         return error
 
-    def iterate(self, iterations: int, *, goals: bool, measures: Measures) -> None:
-        """Step until everything holds, nothing moves any more, or the iterations are spent."""
+    def iterate(self, iterations: int, *, goals: bool, measures: Measures, hurried: bool = False) -> None:
+        """Step until everything holds, nothing moves any more, or the iterations are spent.
+
+        Args:
+            iterations: most of them.
+            goals: whether goals are asked for.
+            measures: to be lowered, to grow little, or not to be looked at.
+            hurried: end at the first step that brings little, as in a frame whose goal lies in something.
+        """
         damping, share, pull, stagnant = 0.0, 1.0, PULL, 0
         self.stationary = False
         least = sum(self._norms(self.residual))
@@ -129,12 +138,15 @@ class Run:
                 if damping >= MOST_DAMPING:
                     self.stationary = True
                     return
+                stagnant += hurried
+                if hurried and stagnant > LINGERS:
+                    return
                 damping = max(FIRST_DAMPING, damping * DAMPING_UP)
                 share, pull = max(0.5 * share, 0.05), max(0.5 * pull, 1e-3)
                 continue
             if mend and after[1] >= before[1]:
                 funnel = max(NARROW * funnel, self.tolerance)
-            nearer = sum(after) < (1.0 - STAGNANT) * least
+            nearer = sum(after) < (1.0 - (IDLE if hurried else STAGNANT)) * least
             least = min(least, sum(after))
             stagnant = 0 if nearer or not self.state.finished() else stagnant + 1
             self.advance(trial, length)
@@ -146,6 +158,8 @@ class Run:
             share, pull = min(1.0, 2.0 * share), min(PULL, 2.0 * pull)
             if stagnant >= PATIENCE:
                 self.stationary = True
+                return
+            if hurried and stagnant > LINGERS:
                 return
 
     def length(self, step: Array) -> float:
