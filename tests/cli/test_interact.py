@@ -14,9 +14,9 @@ from wholebody.interaction import SCENES
 
 PAGE = """\
 before
-<!-- bench:interaction -->
+<!-- bench:{0} -->
 old
-<!-- /bench:interaction -->
+<!-- /bench:{0} -->
 after
 """
 
@@ -47,7 +47,8 @@ def test_a_run_prints_tables_and_writes_numbers_chart_and_animation(
 
 
 def test_the_tables_go_into_the_documentation(tmp_path: Path) -> None:
-    (tmp_path / "results.md").write_text(PAGE)
+    for name, part in (("results", "interaction"), ("where-methods-fail", "interaction-failures")):
+        (tmp_path / f"{name}.md").write_text(PAGE.format(part))
     command = ["interact", "hand_on_table", "--frames", "40", "--out", str(tmp_path / "out")]
     assert main([*command, "--update-docs", str(tmp_path)]) == 0
     page = (tmp_path / "results.md").read_text()
@@ -57,6 +58,9 @@ def test_the_tables_go_into_the_documentation(tmp_path: Path) -> None:
     assert "| hand on table | qp | 40 |" in page
     assert "| arm in corner | paper | 2146 | 20.49 |" in page
     assert (tmp_path / "assets" / "interaction" / "hand_on_table-qp.svg").is_file()
+    page = (tmp_path / "where-methods-fail.md").read_text()
+    assert "\nold\n" not in page
+    assert "| hand on table | qp | 0.0000 (" in page
 
 
 @pytest.mark.parametrize(
@@ -65,6 +69,8 @@ def test_the_tables_go_into_the_documentation(tmp_path: Path) -> None:
         (["hand_on_tabel"], "no scene is called 'hand_on_tabel'; did you mean hand_on_table"),
         (["two_arms", "--overlap", "springs"], "--overlap: no way to remove overlap is called 'springs'"),
         (["two_arms", "--frames", "0"], "give 1 or more"),
+        (["two_arms", "--out", "/dev/null/pictures"], "/dev/null/pictures"),
+        (["two_arms", "--update-docs", "nowhere"], "nowhere"),
     ],
 )
 def test_mistakes_are_said_in_one_sentence(

@@ -134,7 +134,9 @@ def test_a_dropped_out_frame_is_held_and_noted(hand: wb.Figure, scene: wb.Scene)
     shown = loop.frame(at(hand, 0.01, 0.3)).q
     lost = at(hand, 0.02, 0.3)
     lost[9] = np.nan
-    for bad in (lost, lost[:-1]):
+    unturned = at(hand, 0.02, 0.3)
+    unturned[3:7] = 0.0
+    for bad in (lost, lost[:-1], unturned):
         frame = loop.frame(bad)
         np.testing.assert_array_equal(frame.q, shown)
         assert f"frame {loop.count - 1}" in frame.note
@@ -156,7 +158,7 @@ def test_settings_are_checked(hand: wb.Figure, scene: wb.Scene) -> None:
         FrameLoop(scene, hand.neutral, overlap="springs")
     with pytest.raises(wb.InputError, match="dt"):
         FrameLoop(scene, hand.neutral, dt=0.0)
-    for start in (hand.neutral[:-1], np.full(hand.model.nq, np.nan)):
+    for start in (hand.neutral[:-1], np.full(hand.model.nq, np.nan), np.zeros(hand.model.nq)):
         with pytest.raises(wb.InputError, match="frame 0"):
             FrameLoop(scene, start)
 

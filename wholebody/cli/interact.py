@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from wholebody.bench.interaction import InteractionRow
+    from wholebody.bench.interaction_failures import WorstFrames
     from wholebody.interaction import InteractionScene, Judgement, Recording
 
 HELP = "follow a tracker frame by frame through a gallery without going into walls"
@@ -21,7 +22,7 @@ examples:
   wholebody interact --list
   wholebody interact two_arms
   wholebody interact all --out out/interact
-exit code: 1 if a frame overlaps by more than is allowed, passes through something or leaves a joint limit"""
+exit code: 1 if a frame overlaps by more than is allowed, passes through something or leaves a joint limit or cone"""
 
 
 CHARTED = ("hand_on_table", "two_arms")
@@ -67,35 +68,61 @@ def run(arguments: argparse.Namespace) -> int:
     for overlap in chosen:
         if overlap not in OVERLAPS:
             raise UnknownNameError("way to remove overlap", overlap, OVERLAPS, "--overlap")
-    facts, rows = machine(), []
+    if arguments.seed < 0:
+        raise InputError(f"--seed is {arguments.seed}; give 0 or more")
+    _check_writable(arguments.out, arguments.update_docs)
+    facts, worst = machine(), []
     for name in names:
         scene = build_scene(name, frames=arguments.frames, seed=arguments.seed)
-        rows += [_run_one(scene, overlap, arguments.seed, arguments.out, facts) for overlap in chosen]
+        worst += [_run_one(scene, overlap, arguments.seed, arguments.out, facts) for overlap in chosen]
+    rows = [each.row for each in worst]
     text = report(rows, facts)
     label = f"{arguments.scene}-{arguments.overlap}"
     write_text(arguments.out / f"{label}.md", text + "\n")
     _print(rows)
     print(f"wrote {arguments.out}")
     if arguments.update_docs is not None:
-        _update(arguments.update_docs, text, rows, arguments.out)
+        _update(arguments.update_docs, text, worst, arguments.out)
     held = all(
         row.depth_mm <= 1.0 and not row.passed and max(row.limit_rad, row.cone_rad) < 1e-6 for row in rows
     )  # fmt: skip
     return 0 if held else 1
 
 
+def _check_writable(out: Path, docs: Path | None) -> None:
+    """Make the folder, and see that the pages are there, before anything is computed."""
+    import os
+
+    from wholebody.errors import InputError
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {out}: the folder cannot be made ({error.strerror}); give another one") from None
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise InputError(f"--out {out}: the folder cannot be written; give another one")
+    for page in ("results.md", "where-methods-fail.md") if docs is not None else ():
+        if docs is not None and not (docs / page).is_file():
+            raise InputError(f"--update-docs {docs}: there is no {page} in it; give the folder that holds the pages")
+
+
 def _run_one(
     scene: InteractionScene, overlap: str, seed: int, out: Path, facts: dict[str, str]
-) -> InteractionRow:  # fmt: skip
+) -> WorstFrames:  # fmt: skip
+    import gc
+
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from wholebody.bench.interaction import frame_chart, frame_rows, summary
+    from wholebody.bench.interaction_failures import worst_frames
     from wholebody.bench.tables import write_rows
     from wholebody.interaction import follow, judge
 
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
+        gc.collect()
+        gc.freeze()  # or Python looks through all that was loaded once in a run, which takes a frame 80 ms
         task = bar.add_task(f"{scene.name}, {overlap}", total=len(scene.track))
         recording = follow(
             scene.scene, scene.track, overlap=overlap, seed=seed, rigid=scene.rigid,
@@ -104,12 +131,31 @@ def _run_one(
         bar.update(task, description="judging every pair of every frame")
         judged = judge(scene.scene, recording)
     rows = frame_rows(scene.name, recording, judged)
-    out.mkdir(parents=True, exist_ok=True)
     write_rows(out / f"{scene.name}-{overlap}.csv", facts, rows)
     frame_chart(rows, out / f"{scene.name}-{overlap}")
     _animation(scene, recording, out / f"{scene.name}-{overlap}.html")
     _notes(recording, judged)
-    return summary(scene.name, recording, judged)
+    worst = worst_frames(summary(scene.name, recording, judged), recording, judged)
+    _picture(scene, recording, worst.picture, out / f"{scene.name}-{overlap}-frame.png")
+    return worst
+
+
+def _picture(scene: InteractionScene, recording: Recording, frame: int, path: Path) -> None:
+    """Draw the frame in which something is missed, with the tracked posture as a ghost; none if nothing is."""
+    from wholebody.errors import MissingPackageError
+    from wholebody.view import Viewer
+
+    path.unlink(missing_ok=True)
+    if frame < 0:
+        return
+    with Viewer(scene.scene, see_through=scene.see_through, title=scene.name) as viewer:
+        viewer.look(eye=scene.eye, target=scene.target)
+        viewer.ghosts([recording.tracked[frame]])
+        viewer.show(recording.q[frame])
+        try:
+            viewer.picture(path)
+        except MissingPackageError as error:
+            print(f"no picture of frame {frame}: {error}")
 
 
 def _animation(scene: InteractionScene, recording: Recording, path: Path) -> None:
@@ -167,17 +213,26 @@ def _print(rows: list[InteractionRow]) -> None:
     console.print(left)
 
 
-def _update(docs: Path, text: str, rows: list[InteractionRow], out: Path) -> None:
+def _update(docs: Path, text: str, worst: list[WorstFrames], out: Path) -> None:
     import shutil
 
+    from wholebody.bench.interaction_failures import failures
     from wholebody.bench.tables import replace_section
 
     folder = docs / "assets" / "interaction"
     folder.mkdir(parents=True, exist_ok=True)
-    pictures = []
-    for row in [row for row in rows if row.scene in CHARTED]:
-        name = f"{row.scene}-{row.overlap}.svg"
-        shutil.copyfile(out / name, folder / name)
-        pictures.append(f"![Frame time of {row.scene.replace('_', ' ')}](assets/interaction/{name})")
-    replace_section(docs / "results.md", "interaction", "\n\n".join([text, *pictures]))
-    print(f"wrote {docs / 'results.md'}")
+    charts, pictures = [], []
+    for each in worst:
+        scene, overlap = each.row.scene, each.row.overlap
+        if scene in CHARTED:
+            name = f"{scene}-{overlap}.svg"
+            shutil.copyfile(out / name, folder / name)
+            charts.append(f"![Frame time of {scene.replace('_', ' ')}](assets/interaction/{name})")
+        name = f"{scene}-{overlap}-frame.png"
+        (folder / name).unlink(missing_ok=True)
+        if (out / name).is_file():
+            shutil.copyfile(out / name, folder / name)
+            pictures.append((each, f"assets/interaction/{name}"))
+    replace_section(docs / "results.md", "interaction", "\n\n".join([text, *charts]))
+    replace_section(docs / "where-methods-fail.md", "interaction-failures", failures(worst, pictures))
+    print(f"wrote {docs / 'results.md'} and {docs / 'where-methods-fail.md'}")

@@ -21,7 +21,7 @@ from wholebody.interaction.nearest import CLEARANCE, NearestPosture, weights
 from wholebody.interaction.recording import Frame, Recording
 from wholebody.interaction.removal import Removal, Remover
 from wholebody.interaction.scripts import FRAME
-from wholebody.interaction.tracks import Track
+from wholebody.interaction.tracks import UNIT_TOLERANCE, Track
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene import Scene
@@ -79,8 +79,9 @@ class FrameLoop:
             raise InputError(f"dt is {dt!r}; give seconds from frame to frame, such as 1/60")
         self.scene, self.overlap, self.count = scene, overlap, 0
         q = np.array(start, dtype=float)
-        if q.shape != (scene.model.nq,) or not np.isfinite(q).all():
-            raise InputError(f"frame 0: a tracked posture is ({scene.model.nq},) finite numbers, not {q.shape}")
+        unreadable = _unreadable(scene, q)
+        if unreadable:
+            raise InputError(f"frame 0: {unreadable}; begin with a posture of {scene.figure.name}")
         self.shown, self._note = free_start(scene, q, rigid)
         self._remover = self._made(overlap, dt, seed, rigid)
         self._kept_from_passing(self._remover.remove(self.shown, self.shown))  # what is set up once, before the clock
@@ -96,9 +97,9 @@ class FrameLoop:
         """
         began = _clocks()
         goal = np.asarray(tracked, dtype=float)
-        if goal.shape != self.shown.shape or not np.isfinite(goal).all():
-            note = f"the tracked posture is not {len(self.shown)} finite numbers; the figure stays"
-            return self._shown(Removal((self.shown,), 0.0, 0.0, 0, 0, 0, note), began)
+        unreadable = _unreadable(self.scene, goal)
+        if unreadable:
+            return self._shown(Removal((self.shown,), 0.0, 0.0, 0, 0, 0, f"{unreadable}; the figure stays"), began)
         removal = self._remover.remove(self.shown, self._readable(goal))
         # Simulated objects would move here, after the driven ones have found their places.
         return self._shown(self._kept_from_passing(removal), began)
@@ -152,6 +153,15 @@ class FrameLoop:
         from wholebody.interaction.chains import LimbByLimb
 
         return LimbByLimb(self.scene, self.shown, dt, seed)
+
+
+def _unreadable(scene: Scene, q: Array) -> str:
+    """Why a tracked posture is none, or ""."""
+    if q.shape != (scene.model.nq,) or not np.isfinite(q).all():
+        return f"the tracked posture is not {scene.model.nq} finite numbers"
+    if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
+        return "a quaternion of the tracked posture is not of unit length"
+    return ""
 
 
 def _clocks() -> tuple[float, float]:
