@@ -32,11 +32,11 @@ def test_the_worst_frames_are_found() -> None:
     assert (worst.deepest, worst.slowest, worst.farthest) == (6, 3, 9)
     assert worst.sudden in (8, 9, 10, 11)
     assert worst.milliseconds == pytest.approx(500.0)
-    assert worst.picture == 3
+    assert worst.picture == 6  # something passes on the way to it
     text = failures([worst], [(worst, "assets/frame.png")])
     assert "| hand on table | ccd | 5.0000 (6) | 500.0 (3) |" in text
     assert "](assets/frame.png)" in text
-    assert "Hand on table with ccd, frame 3: mean " in text
+    assert "Hand on table with ccd, frame 6: mean " in text
 
 
 def test_without_a_miss_there_is_no_picture() -> None:
