@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from presenting import DARK, LIGHT, OAK, STEEL, command_line
 
 import wholebody as wb
+from wholebody.bench import style
 from wholebody.view.parts import Part, Parts
 
 GROUND, CRANK, COUPLER, ROCKER = 0.40, 0.12, 0.36, 0.28  # m: a crank-rocker, for 0.12 + 0.40 < 0.36 + 0.28
@@ -109,15 +110,17 @@ def draw(
     angles: Array, places: list[dict[str, pin.SE3]], found: Array, exact: Array, curve: Array, out: Path
 ) -> None:  # fmt: skip
     """Write four_bar.html, which plays the turn, and four_bar.png: the coupler's curve and the rocker's angle."""
-    from matplotlib import pyplot
-
     out.mkdir(parents=True, exist_ok=True)
     parts = shapes()
     with wb.Viewer(parts, title="four_bar") as viewer:
         viewer.look(eye=(0.2, -1.2, 0.35), target=(0.18, 0.0, 0.12))
         viewer.play([parts.posture(place | {"ground": pin.SE3.Identity()}) for place in places], dt=1 / 30)
         print(f"  {viewer.save(out / 'four_bar.html')}")
-    chart, (left, right) = pyplot.subplots(1, 2, figsize=(9.6, 4.2), layout="constrained")
+    try:
+        chart, ((left, right),) = style.figure(1, 2, (9.6, 4.2))
+    except wb.MissingPackageError as error:
+        print(f"  no picture: {error}")
+        return
     for place, shade in zip(places[:-1:15], (0.8, 0.7, 0.6, 0.5, 0.4, 0.3), strict=True):
         joints = [np.zeros(3), place["coupler"].translation, place["coupler"].act(np.array((COUPLER, 0.0, 0.0)))]
         joints.append(np.array((GROUND, 0.0, 0.0)))
@@ -127,16 +130,13 @@ def draw(
         left.plot(x, z, color=str(shade), linewidth=0.7)
     left.plot(curve[:, 0], curve[:, 2], color="#d55e00", linewidth=1.8, label="a point of the coupler")
     left.set(aspect="equal", xlabel="x [m]", ylabel="z [m]", title="six positions of the linkage")
-    left.legend(loc="upper right", frameon=False)
+    left.legend(loc="lower right", frameon=False)
     right.plot(np.degrees(angles), np.degrees(exact[:, 1]), color="#0072b2", label="closed form")
     right.plot(np.degrees(angles[::5]), np.degrees(found[::5, 1]), "o", color="#d55e00", markersize=4, label="solved")
     right.set(xlabel="crank [degrees]", ylabel="rocker [degrees]", title="angle of the rocker", xlim=(0, 360))
     right.set_xticks(range(0, 361, 90))
-    right.grid(color="#dddddd", linewidth=0.6)
     right.legend(frameon=False)
-    chart.savefig(out / "four_bar.png", dpi=110)
-    pyplot.close(chart)
-    print(f"  {out / 'four_bar.png'}")
+    print(f"  {style.save(chart, out / 'four_bar')[1]}")
 
 
 if __name__ == "__main__":
