@@ -31,6 +31,7 @@ def test_the_shown_figure_stays_outside(name: str, overlap: str, allowed: float,
     for a, b in zip(recording.q[:-1:2], recording.q[1::2], strict=True):
         assert least(scene, pin.interpolate(scene.model, a, b, 0.5)) > -max(allowed, 1e-4)
     assert all(scene.figure.within_limits(q) for q in recording.q)
+    assert bool(scene.figure.cones) == (not made.rigid)  # every avatar is judged by its cones
     if scene.figure.cones:
         cones = ReachCones().resolve(scene, part.q[0])
         assert min(cones.value(scene.state(q)).min() for q in recording.q) > -1e-6

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wholebody.bench.interaction import GOAL_MEAN, GOAL_P99, InteractionRow
+from wholebody.bench.interaction import DEEPEST, GOAL_MEAN, GOAL_P99, InteractionRow
 from wholebody.bench.tables import markdown
 from wholebody.interaction.judging import IN_TIME, Judgement
 from wholebody.interaction.recording import Recording
@@ -54,8 +54,13 @@ class WorstFrames:
                 f"slow where much is in contact: frame {self.slowest} has {self.pairs} overlapping pairs to leave and "
                 f"takes {self.iterations} rounds, {self.query_percent:.0f} % of its time are collision queries"
             )
+        if row.passed or row.depth_mm > DEEPEST[row.overlap]:
+            return (
+                f"in frame {self.deepest} limbs hinder each other, and what frees one of them is not found within the "
+                "work of a frame"
+            )
         if row.misses:
-            return "see the picture"
+            return "limbs that folded in contact do not find the way back by drawing joints, which is local"
         if self.distance_rad > FAR:
             return (
                 f"no line is missed; far from the tracked posture, which is {self.tracked_mm:.0f} mm inside, because "
