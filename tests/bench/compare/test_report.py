@@ -104,7 +104,7 @@ def test_the_report_says_what_was_left_out_and_why(folder: Path) -> None:
 def test_the_report_has_the_scene_of_a_false_answer(folder: Path) -> None:
     page = (folder / "out" / publishing.PAGE).read_text()
     assert page.count("<iframe") == 1
-    assert "lies claims &#x27;solved&#x27; and misses the goals by 400 mm" in page
+    assert "lies says &#x27;solved&#x27; and misses the goals by 400 mm" in page
 
 
 def test_the_page_of_results_gets_its_part(folder: Path) -> None:

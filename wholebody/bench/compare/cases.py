@@ -28,28 +28,38 @@ class Shown(NamedTuple):
 
 
 def chosen(results: Results, most: int = SCENES) -> list[Shown]:
-    """At most one case a set, those first in which a method is farthest from an answer."""
-    found = [shown for family in results.sets if (shown := _of(results, family)) is not None]
-    return [shown for _, shown in sorted(found, key=lambda pair: -pair[0])[:most]]
+    """At most one case a set, where a method is farthest from an answer; another method each time, if there is one."""
+    shown: list[Shown] = []
+    for family in results.sets:
+        found = _candidates(results, family)
+        if found and len(shown) < most:
+            seen = [one.bad for one in shown]
+            shown.append(min(found, key=lambda pair: (seen.count(pair[1].bad), -pair[0]))[1])
+    return shown
 
 
-def _of(results: Results, family: str) -> tuple[float, Shown] | None:
+def _candidates(results: Results, family: str) -> list[tuple[float, Shown]]:
+    """For every method that fails, how far it is from an answer where it is farthest, and that case."""
     if results.moving(family):
-        return None
+        return []
     good = _by_number(results, family, OURS) or _by_number(results, family, _most_successful(results, family))
-    best: tuple[float, Shown] | None = None
+    found = []
     for other in results.entrants:
-        for number, bad in _by_number(results, family, other).items():
-            if number not in good or not good[number].success(COARSE) or not bad.answered or bad.success(COARSE):
-                continue
-            size = min(max(bad.penetration, bad.missed), 1.0) + (1.0 if bad.status == "solved" else 0.0)
-            if best is None or size > best[0]:
-                best = (size, Shown(family, number, good[number].entrant, other, _about(good[number], bad)))
-    return best
+        failing = [
+            (_size(bad), Shown(family, number, good[number].entrant, other, _about(good[number], bad)))
+            for number, bad in _by_number(results, family, other).items()
+            if bad.answered and not bad.success(COARSE) and number in good and good[number].success(COARSE)
+        ]
+        found += [max(failing, key=lambda pair: pair[0])] if failing else []
+    return found
+
+
+def _size(record: Record) -> float:
+    return min(max(record.penetration, record.missed), 1.0) + (1.0 if record.status == "solved" else 0.0)
 
 
 def _about(good: Record, bad: Record) -> str:
-    claim = f"claims {bad.status!r}" if bad.status else "answers"
+    claim = f"says {bad.status!r}" if bad.status else "answers"
     faults = []
     if bad.missed > COARSE:
         faults.append(f"misses the goals by {1e3 * bad.missed:.0f} mm or mrad")

@@ -98,9 +98,9 @@ def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Pat
     """Share of the cases solved within a time at the default budget, to a millimetre and to a tenth of one."""
     chart, axes = style.figure(1, 2, (11.0, 4.6))
     drawn: dict[str, Any] = {}
+    known = [time for entrant in results.entrants for time in profile(results, family, entrant, COARSE)[0]]
+    start, end = 0.7 * MS * min(known, default=1.0), 1.5 * MS * max(known, default=1.0)
     for panel, tolerance in zip(axes[0], (COARSE, FINE), strict=True):
-        lasts = [times[-1] for entrant in results.entrants if (times := profile(results, family, entrant, COARSE)[0])]
-        end = 1.5 * MS * max(lasts, default=1.0)
         for entrant in reversed(results.entrants):
             times, cases = profile(results, family, entrant, tolerance)
             if not cases:
@@ -108,13 +108,13 @@ def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Pat
             seen = look(entrant)
             shares = [100.0 * (place + 1) / cases for place in range(len(times))]
             x = [MS * time for time in times]
-            begin = x[0] if x else end
             (drawn[entrant],) = panel.step(
-                [begin, *x, end], [0.0, *shares, shares[-1] if shares else 0.0], where="post",
+                [start, *x, end], [0.0, *shares, shares[-1] if shares else 0.0], where="post",
                 color=seen.color, linewidth=1.9 if seen.principal else 0.9, zorder=3 if seen.principal else 2,
             )  # fmt: skip
         panel.axhline(98.0, color=GREY, linewidth=0.9, linestyle="--", zorder=1)
         _time_axis(panel)
+        panel.set_xlim(start, end)
         panel.set_ylim(0.0, 103.0)
         panel.set_title(f"solved to {tolerance:g} m and rad", loc="left", fontsize=10)
         panel.set_xlabel(f"time of {'a frame' if results.moving(family) else 'a solve'} [ms]")

@@ -20,6 +20,7 @@ from wholebody.bench.compare.record import DEFAULT
 from wholebody.bench.entrants.base import Entrant
 
 BUILDING = 120.0  # s: to build a case and what belongs to its scene; compiling once included
+FRAME_CAP = 0.1  # s: most for a frame, on the average, where goals move; slower than that nobody drags
 GLIMPSE = 3  # frames of a moving case that a method sees before it is timed
 
 
@@ -62,7 +63,7 @@ class _Served:
                 return page(request.good, request.bad, self._ready)
         entrant, level, cap = request
         self._warm_up(entrant, cap)
-        with _Alarm(cap):
+        with _Alarm(max(cap, FRAME_CAP * len(self._ready.case.frames))):
             return solve(entrant, level, self._ready)
 
     def _warm_up(self, entrant: Entrant, cap: float) -> None:
