@@ -158,8 +158,8 @@ def test_passing_through_between_frames() -> None:
     assert frames("thin-plate", (-1.4, 1.5, 1.2), (-1.6, 1.5, 1.2)).kind == "honest"
 
 
-def test_passing_through_what_moves() -> None:
-    # the ball goes from one side of the arm to the other, and the arm never moves
+def test_what_moves_comes_into_who_stays() -> None:
+    # the arm never moves, and the ball comes into it; then the arm is turned away from where it comes
     assert frames("moving-obstacle", (0.0, 0.5, 1.2, 0.0, 0.3, 0.0)).kind == "wrong"
     assert frames("moving-obstacle", (2.5, 0.5, 1.2, 0.0, 0.3, 0.0)).kind == "honest"
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
 from wholebody.bench.stability.answering import Answer
-from wholebody.bench.stability.case import Frame, HardCase, Nonsense, Posed, Stream
+from wholebody.bench.stability.case import HardCase, Nonsense, Posed, Stream
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 
@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 
 INSIDE = 1e-4  # m: deeper than this is inside
 DIP = 1e-3  # m: by which the straight way between two postures may go in deeper than its ends
-PARTS = 8  # of the way from frame to frame, where a thing moves along with the figure
 
 
 @dataclass(frozen=True)
@@ -84,8 +83,10 @@ def _stream(question: Stream, answer: Answer) -> Judged:
     before = scene.figure.clamp(problem.start)
     allowed = question.speed * question.dt
     for number, (frame, q) in enumerate(zip(question.frames, answer.postures, strict=True)):
+        for name, place in frame.moved.items():
+            scene.move(name, at=place)
         if not passed:
-            passed, through = _passed(problem, frame, before, q, number), number
+            passed, through = _passed(problem, before, q, number), number
         problem.retarget([Point(first.frame, frame.target)])
         found.append(assess(problem, q))
         misreported = max(misreported, abs(_left(found[-1]) - answer.left[number]))
@@ -106,35 +107,14 @@ def _stream(question: Stream, answer: Answer) -> Judged:
     )
 
 
-def _passed(problem: Problem, frame: Frame, before: Array, q: Array, number: int) -> str:
-    """What is gone through on the way to a frame, with the things going where they are in it."""
+def _passed(problem: Problem, before: Array, q: Array, number: int) -> str:
+    """What is gone through on the straight way to a frame, with things where they are in it."""
     scene = problem.scene
-    if frame.moved:
-        return _passed_while_moving(problem, frame, before, q, number)
     contact = scene.sweeper.first_contact(before, q, tolerance=DIP)
     if contact is None or not contact.certain:
         return ""
     owners = " and ".join(scene.piece_owner[piece] for piece in contact.pair)
     return f"{owners}, frame {number}"
-
-
-def _passed_while_moving(problem: Problem, frame: Frame, before: Array, q: Array, number: int) -> str:
-    """The same by looking at parts of the way: figure and things move together, so neither can be swept alone."""
-    scene = problem.scene
-    placed = {name: np.array(scene.objects[name].placement.translation) for name in frame.moved}
-    ends = []
-    deepest, between = 0.0, ""
-    for part in np.linspace(0.0, 1.0, PARTS + 1):
-        for name, place in frame.moved.items():
-            scene.move(name, at=tuple(placed[name] + part * (np.array(place) - placed[name])))
-        contacts = scene.contacts(pin.interpolate(scene.model, before, q, float(part)), within=0.0)
-        depth = float(-contacts.distance[0]) if len(contacts.distance) else 0.0
-        if part in (0.0, 1.0):
-            ends.append(depth)
-        elif depth > deepest:
-            deepest = depth
-            between = " and ".join(scene.piece_owner[piece] for piece in contacts.pair[0])
-    return f"{between}, frame {number}" if deepest > max(ends) + DIP else ""
 
 
 def _left(found: Assessment) -> float:

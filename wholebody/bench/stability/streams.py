@@ -11,7 +11,7 @@ from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import Point, StepLimit
 
-GROUP = "Frame by frame"
+GROUP = "Goals and things that move"
 REST = 40  # frames at the end in which the goal rests
 RADIUS = 0.03
 
