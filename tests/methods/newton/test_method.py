@@ -180,6 +180,23 @@ def test_constraints_that_cannot_all_hold_end_near_all_of_them_and_in_nothing(hu
     assert solution.assessment.constraint_violation < 0.7  # the head stands at 1.7 m
 
 
+def test_speeds_hold_in_every_frame(human: wb.Figure) -> None:
+    limit = wb.StepLimit(1.0, root_velocity=0.5, root_turn=0.5)
+    goal = wb.Point("right_index_tip", (0.4, -0.2, 1.2))
+    problem = wb.Problem(
+        wb.Scene(human), "standing", goals=[goal], constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), limit]
+    )
+    method, q, dt = wb.Newton(), problem.start, 0.02
+    lower, upper = problem.bounds[0].bounds(problem.scene.state(q), dt)
+    for _ in range(150):
+        after = method.step(problem, q, dt=dt).q
+        way = pin.difference(human.model, q, after)
+        assert (way >= lower - 1e-9).all()
+        assert (way <= upper + 1e-9).all()
+        q = after
+    assert wb.assess(problem, q).goal_error < 2e-4
+
+
 def test_a_barrier_goes_where_slacks_go(human: wb.Figure) -> None:
     problem = _standing(wb.Scene(human), wb.Point("right_index_tip", (0.6, -0.2, 0.3)))
     slack, barrier = (wb.Newton(inequalities=kind).solve(problem) for kind in ("slack", "barrier"))

@@ -64,6 +64,15 @@ class FigureBodies:
         forms = relative_forms(first, second)[:, 2:]
         self.angles = Angle(pairs, labels, forms, center, np.zeros(len(pairs)), np.ones(len(pairs)))
         self.weight = self._weight()
+        self._step: tuple[Array, Array, Array] | None = None
+
+    def bound_step(self, q: Array, lower: Array, upper: Array) -> None:
+        """Keep postures within tangent displacements (nv,) of the posture q (nq,) from now on: a frame's speeds."""
+        self._step = (q, lower, upper)
+
+    def free_step(self) -> None:
+        """Bound postures by limits alone."""
+        self._step = None
 
     def limits(self) -> Angle:
         """One row for each limited joint, the nearer of its two limits; `aim` chooses which."""
@@ -125,6 +134,13 @@ class FigureBodies:
                 q[kind.idx_q : kind.idx_q + 2] = np.array((turn[0, 0], turn[1, 0])) / np.hypot(turn[0, 0], turn[1, 0])
             else:
                 q[kind.idx_q] = place.translation @ _axis(kind)
+        if self._step is not None:
+            start, lower, upper = self._step
+            way = np.asarray(pin.difference(self.model, start, q))
+            # all joints by the same share: clipped one by one they would go another way
+            room = np.where(way > 0.0, upper, -lower)
+            share = float(np.min(room / np.maximum(np.abs(way), 1e-300), initial=1.0))
+            q = pin.integrate(self.model, start, share * way)
         result: Array = self.figure.clamp(q)
         return result
 

@@ -17,6 +17,7 @@ from wholebody.methods.newton.linear_algebra.choice import NAMES
 from wholebody.methods.newton.reaching import reach
 from wholebody.methods.newton.search import SHARPER, Found, Search, Settings
 from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.tasks import StepLimit
 
 Array = NDArray[np.float64]
 
@@ -110,16 +111,28 @@ class Newton:
         search = Search(self._prepared(problem), self._settings())
         return self._answer(search, search.from_here(q), began)
 
-    def step(self, problem: Problem, q: Array, tolerance: float = FRAME_TOLERANCE) -> NewtonStep:
+    def step(
+        self, problem: Problem, q: Array, tolerance: float = FRAME_TOLERANCE, dt: float | None = None
+    ) -> NewtonStep:
         """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
 
         What was laid out for the same problem is kept.
+
+        Args:
+            problem: what is asked.
+            q: where the frame begins.
+            tolerance: of the goals, metres and radians.
+            dt: seconds of the frame, for bounds on speeds; none hold where it is None.
 
         Raises:
             InputError: the problem has a term that this method has no equations for.
         """
         course = self._prepared(problem)
         course.objective.anchor(q)
+        if dt is not None and any(isinstance(bound, StepLimit) for bound in problem.bounds):
+            state = problem.scene.state(q)
+            ranges = np.array([bound.bounds(state, dt) for bound in problem.bounds])
+            course.bodies.bound_step(q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0))
         found = reach(
             course,
             course.variables(q),
@@ -156,6 +169,7 @@ class Newton:
             course = self._course = FigureCourse(problem, self.algebra)
         course.retarget()
         course.objective.follow()
+        course.bodies.free_step()
         return course
 
     def _answer(self, search: Search, found: Found, began: float) -> Solution:
