@@ -137,7 +137,7 @@ class Drag:
     def _attempt(self) -> tuple[Array, int, float]:
         """A posture for the present goals, the iterations, and how long a way the method itself looks after."""
         if isinstance(self.method, Newton):
-            step = self.method.step(self.problem, self.q)
+            step = self.method.step(self.problem, self.q, dt=self.dt)
             return step.q, step.iterations, SHORT
         solution = self._rough.solve(_from(self.problem, self.q))
         return solution.q, solution.iterations, 0.0
