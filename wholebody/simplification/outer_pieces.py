@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import coal
 import numpy as np
 import pinocchio as pin
@@ -9,12 +11,13 @@ from numpy.typing import NDArray
 
 from wholebody.geometry.convex import hull_piece
 from wholebody.geometry.outer_hull import outer_hull
+from wholebody.geometry.pieces import Piece
 from wholebody.geometry.proximity import COAL_ACCURACY
 
 Array = NDArray[np.float64]
 
-FEW = 16  # corners: pieces with no more are as quick as a box
-CORNERS = (8, 12, 16, 24, 32, 48)  # tried in turn
+FEW = 64  # corners: fewer of them in pieces with no more are nothing to be measured in a solve
+CORNERS = (8, 16, 32, 48)  # tried in turn
 PROBE = 1e-4  # m: radius of the ball that stands for a point in coal
 
 
@@ -31,18 +34,29 @@ def coarser(piece: pin.GeometryObject, growth: float) -> tuple[pin.GeometryObjec
     if not isinstance(piece.geometry, coal.Convex):
         return None
     points = np.array(piece.geometry.points())
-    for corners in CORNERS:
-        if len(points) <= max(FEW, corners):
-            return None
-        outer = outer_hull(points, corners)
-        out = farthest(outer, piece.geometry)
+    if len(points) <= FEW:
+        return None
+    found = _around(points.tobytes(), growth)
+    if found is None:
+        return None
+    made, out = found
+    coarse = pin.GeometryObject(
+        piece.name, piece.parentJoint, piece.parentFrame, piece.placement * made.placement, made.geometry
+    )
+    coarse.meshColor[:] = piece.meshColor
+    return coarse, out
+
+
+@lru_cache(maxsize=256)
+def _around(corners: bytes, growth: float) -> tuple[Piece, float] | None:
+    """The simplest hull around these corners that reaches out no farther, and how far it does."""
+    points = np.frombuffer(corners).reshape(-1, 3)
+    whole = hull_piece(points)
+    for most in CORNERS:
+        outer = outer_hull(points, most)
+        out = farthest(outer - whole.placement.translation, whole.geometry)
         if out <= growth:
-            made = hull_piece(outer, piece.name)
-            coarse = pin.GeometryObject(
-                piece.name, piece.parentJoint, piece.parentFrame, piece.placement * made.placement, made.geometry
-            )
-            coarse.meshColor[:] = piece.meshColor
-            return coarse, out
+            return hull_piece(outer), out
     return None
 
 

@@ -1,0 +1,45 @@
+"""`wholebody bench detail`: what each level of modelling costs, and what it gets wrong."""
+
+from __future__ import annotations
+
+import argparse
+
+from wholebody.cli.bench.publishing import add_common, check_count, publish
+
+CAPTION = "Time of a solve against what each level gets wrong, judged in the finest model"
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "detail",
+        help="spheres, capsules, hulls; all joints and pairs or those that matter: time against error",
+        description="The same tasks with every detail of geometry, with all joints and pairs and with those that a "
+        "task needs; answers judged in the model of hulls with everything in it.",
+    )
+    parser.add_argument("--cases", type=int, default=8, metavar="N", help="cases of each task (default: 8)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the cases (default: 0)")
+    parser.set_defaults(run=run)
+    add_common(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, judge, draw."""
+    from wholebody.bench import detail, detail_report
+    from wholebody.bench.machine import machine
+    from wholebody.bench.tables import write_rows
+
+    check_count(arguments.cases, "--cases")
+    cases = 2 if arguments.quick else arguments.cases
+    facts = machine()
+    rows, refused = [], []
+    for row in detail.rows(cases, arguments.seed):
+        if isinstance(row, str):
+            refused.append(row)
+            print(row, flush=True)
+        else:
+            rows.append(row)
+    write_rows(arguments.out / "detail.csv", facts, rows)
+    charts = {"detail": detail_report.chart(rows, arguments.out / "detail")}
+    publish("detail", detail_report.report(rows, refused, facts), charts, {"detail": CAPTION}, arguments)
+    return 0

@@ -1,0 +1,55 @@
+"""`wholebody bench scaling`: time against joints, pieces and things."""
+
+from __future__ import annotations
+
+import argparse
+
+from wholebody.cli.bench.publishing import add_common, check_count, publish
+from wholebody.errors import UnknownNameError
+
+CAPTION = "Time of a solve, of a step, of the judgement and of the building of the geometry, as one size grows"
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "scaling",
+        help="time of a step and a solve against joints, pieces and things, with exponents",
+        description="Chains of 5 to 200 joints (500 bodies without a model of joints), 1 to 32 pieces a segment, 10 to "
+        "5000 things around, and the exponents with which times grow.",
+    )
+    parser.add_argument("--repeats", type=int, default=5, metavar="N", help="timed solves each (default: 5)")
+    parser.add_argument("--methods", nargs="+", metavar="NAME", help="methods (default: qp newton ccd placo)")
+    parser.set_defaults(run=run)
+    add_common(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, fit, draw."""
+    from wholebody.bench import scaling, scaling_report
+    from wholebody.bench.machine import machine
+    from wholebody.bench.tables import write_rows
+
+    check_count(arguments.repeats, "--repeats")
+    methods = tuple(arguments.methods or scaling.METHODS)
+    for name in methods:
+        if name not in scaling.METHODS:
+            raise UnknownNameError("method", name, scaling.METHODS, "--methods")
+    repeats = 2 if arguments.quick else arguments.repeats
+    sizes = scaling.QUICK if arguments.quick else scaling.SIZES
+    lines: list[str] = []
+
+    def say(line: str) -> None:
+        lines.append(line)
+        print(line, flush=True)
+
+    facts = machine()
+    rows = list(scaling.rows(sizes, methods, repeats, say))
+    if "newton" in methods:
+        bodies = sizes["joints"] if arguments.quick else scaling.ASSEMBLIES
+        rows += scaling.assembly_rows(bodies, repeats)
+    write_rows(arguments.out / "scaling.csv", facts, rows)
+    charts = {"scaling": scaling_report.chart(rows, arguments.out / "scaling")}
+    left_out = [line for line in lines if "left out" in line]
+    publish("scaling", scaling_report.report(rows, left_out, facts), charts, {"scaling": CAPTION}, arguments)
+    return 0
