@@ -12,6 +12,7 @@ import pytest
 import wholebody as wb
 from wholebody.interaction import FrameLoop, Track, follow
 from wholebody.interaction.nearest import CLEARANCE
+from wholebody.tasks import ReachCones
 
 
 def at(hand: wb.Figure, x: float, z: float, posture: str = "relaxed") -> Any:
@@ -151,6 +152,23 @@ def test_tracked_angles_out_of_limits_are_shown_at_the_limit(hand: wb.Figure, sc
         shown = loop.frame(bent).q
     assert hand.within_limits(shown)
     np.testing.assert_allclose(shown, hand.clamp(bent), atol=1e-9)
+
+
+@pytest.mark.parametrize("overlap", ["ccd", "qp"])
+def test_a_tracked_limb_out_of_its_reach_cone_is_shown_in_it(overlap: str) -> None:
+    avatar = wb.load("avatar")
+    scene, standing = wb.Scene(avatar), avatar.posture("standing")
+    behind = {"right_shoulder_flexion": -0.9, "right_shoulder_abduction": -0.6}
+    apart = {"left_hip_flexion": -0.6, "left_hip_abduction": 0.9}
+    tracked = avatar.clamp(avatar.with_joints(standing, behind | apart))
+    cones = ReachCones().resolve(scene, standing)
+    assert cones.value(scene.state(tracked)).min() < -0.3
+    loop = FrameLoop(scene, standing, overlap=overlap)
+    for _ in range(40):
+        shown = loop.frame(tracked).q
+        assert cones.value(scene.state(shown)).min() > -1e-6
+    before, after = (np.linalg.norm(pin.difference(avatar.model, q, tracked)) for q in (standing, shown))
+    assert after < 0.6 * before
 
 
 def test_settings_are_checked(hand: wb.Figure, scene: wb.Scene) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wholebody.interaction.attraction import Attraction, Pace
 from wholebody.interaction.removal import Removal
+from wholebody.methods.ccd.remover import Remover
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene import Scene
@@ -60,6 +61,7 @@ class NearestPosture:
             scene, start, constraints=[self._pace, *cones], measures=[self._attraction], clearance=CLEARANCE
         )
         self._method = QP()
+        self._into_cones = Remover(scene).into_cones if cones else np.array
 
     def remove(self, shown: Array, tracked: Array) -> Removal:
         """One frame: from the posture that is shown towards the tracked one, as near as it can be.
@@ -70,13 +72,13 @@ class NearestPosture:
         """
         proximity = self.scene.proximity
         began, queried = time.perf_counter(), proximity.seconds
-        self._attraction.toward(tracked)
+        self._attraction.toward(self._into_cones(tracked))
         self._pace.begin(shown)
         q = shown
         ways: list[Array] = []
         while len(ways) < STEPS:
             step = self._method.step(self.problem, q, self.dt)
-            q = step.q
+            q = self._into_cones(step.q)  # rows are exact to first order only, and a corner of a cone is no edge
             ways.append(q)
             if np.abs(step.displacement).max() < SETTLED or not step.rows:
                 break
