@@ -137,7 +137,7 @@ METHODS = {
             Key("solver", kinds.Text(), 'QP solver: "osqp" (if left out), "daqp", or what `wholebody doctor` lists'),
             Key("tolerance", Number(1e-10, 0.1), "metres and radians to which goals are met; 1e-5 if left out"),
             Key("iterations", Number(1, 100_000, whole=True), "of one descent"),
-            Key("budget", Number(0, 1_000_000, whole=True), "programs for further tries when the first ends short; 600 if left out"),
+            Key("budget", Number(0, 1_000_000, whole=True), "programs for further tries when the first ends short; 1000 if left out"),
             Key("restarts", Number(0, 1000, whole=True), "most of those tries"),
             Key("seed", Number(0, 2**32 - 1, whole=True), "of those tries"),
         ),

@@ -58,7 +58,6 @@ def make(number: int, seed: int) -> Case:
         start,
         goals=[wb.Frame("right_palm", place_of(figure, witness, "right_palm"))],
         constraints=[wb.Hold("left_palm", other, relative_to="right_palm"), *held_feet()],
-        measures=[wb.Effort()],
         clearance=CLEARANCE,
     )
     return Case(NAME, number, problem, witness)

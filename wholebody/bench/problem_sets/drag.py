@@ -44,7 +44,6 @@ def make(number: int, seed: int) -> Case:
         postures[0],
         goals=goals[:1],
         constraints=held_feet(),
-        measures=[wb.Effort()],
         clearance=CLEARANCE,
     )
     return Case(NAME, number, problem, postures[0], tuple((goal,) for goal in goals[1:]))

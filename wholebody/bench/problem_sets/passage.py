@@ -68,7 +68,6 @@ def make(number: int, seed: int) -> Case:
         start,
         goals=[wb.Point(tip, place_of(figure, witness, tip).translation)],
         constraints=held_feet(),
-        measures=[wb.Effort()],
         clearance=CLEARANCE,
     )
     return Case(NAME, number, problem, witness)

@@ -30,7 +30,6 @@ def make(number: int, seed: int) -> Case:
         scene,
         start,
         goals=[wb.Frame("tool", place) if turned else wb.Point("tool", place.translation)],
-        measures=[wb.Effort()],
         clearance=CLEARANCE,
     )
     return Case(NAME, number, problem, witness)

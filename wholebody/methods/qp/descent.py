@@ -81,6 +81,7 @@ class Descent:
         trace: grows by one entry an iteration.
         note: what to call the iterations in the trace.
         measures: whether the measures count from the beginning; without them only the goals are sought.
+        hasty: whether to give up where the violation hardly lessens for a while.
     """
 
     subproblem: Subproblem
@@ -92,6 +93,7 @@ class Descent:
     trace: list[Iterate] = field(default_factory=list)
     note: str = ""
     measures: bool = True
+    hasty: bool = False
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
@@ -138,7 +140,9 @@ class Descent:
                 here = there
                 self._keep(here)
                 history.append(here.violation.total)
-                if self._stagnates(history):
+                if self.hasty and self._lingers(history):
+                    break
+                if self._measures and self._lingers(history):
                     self._measures = False
                     self._memory.forget()
                 elif self.measures and not self._measures and here.violation.worst <= 10.0 * self.tolerance:
@@ -184,9 +188,9 @@ class Descent:
         still = float(np.abs(answer.x).max(initial=0.0)) <= 10.0 * self.tolerance
         return still or outlook.saving <= 1e-2 * self.tolerance * (1.0 + abs(here.at.measure))
 
-    def _stagnates(self, history: list[float]) -> bool:
-        """Whether the violation has hardly lessened for a while, so that the measures should not hold it up."""
-        if not self._measures or len(history) <= PATIENCE or history[-1] <= 100.0 * self.tolerance:
+    def _lingers(self, history: list[float]) -> bool:
+        """Whether the violation has hardly lessened for a while."""
+        if len(history) <= PATIENCE or history[-1] <= 100.0 * self.tolerance:
             return False
         return min(history[-PATIENCE:]) > (1.0 - SLOW) * min(history[:-PATIENCE])
 
@@ -203,7 +207,7 @@ class Descent:
         there = self._visit(pin.integrate(self.lineariser.state.model, here.at.q, dq))
         verdict = self._judge(here, there, outlook)
         promising = not verdict.accepted and self._promises(here, there)
-        if (verdict.accepted or promising) and self._jumps(here, there):
+        if (verdict.accepted or promising) and not self.hasty and self._jumps(here, there):
             verdict, promising = Verdict(False, False, False, "blocked"), False
         self._record(there, dq, "tentative" if promising else verdict.by)
         step = float(np.abs(dq).max(initial=0.0))

@@ -29,15 +29,15 @@ class QP:
         iterations: most programs for one descent.
         budget: most programs that continuation and restarts may add when the first descent does not reach the goals;
             a program takes about a millisecond.
-        restarts: most seeded starts that are tried after continuation.
+        restarts: most seeded starts that are tried.
         seed: of the restarts.
     """
 
     solver: str = "osqp"
     tolerance: float = 1e-5
     iterations: int = 150
-    budget: int = 600
-    restarts: int = 6
+    budget: int = 1000
+    restarts: int = 40
     seed: int = 0
     _tracker: Tracker | None = field(default=None, init=False, repr=False)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,13 @@ from wholebody.methods.starts import bent, restarts
 from wholebody.problem import Iterate, Problem
 
 ALIKE = 1e-5  # share of a goal's error by which two descents may differ and count as equally near
+JUST = 0.05  # tolerances by which what must hold may be missed more and count as held as well
+SCOUT = 40  # most programs of a scout; more = surer on curved ways, fewer starts within the budget
+GHOST = 0.15  # m: by which a scout that goes through things may be inside of them; two limbs that cross need as much
+NO_NEARER = 20  # scouts in a row that came no nearer although nothing was in their way: the goals are out of reach
+REACHED = 10.0  # tolerances: scouts that are not this near to the goals although nothing is in their way are given up
+NEARER = 0.02  # share of what is left by which a scout is nearer
+FIRST = 8  # scouts before goals are approached in stages, which takes as many programs and stays near the start
 STAGES = (0.25, 0.5, 0.75)  # of the way to the goals, when the straight attempt ends in a local minimum
 
 
@@ -40,6 +47,7 @@ class Search:
         self.trace: list[Iterate] = []
         self.spent = 0
         self._left = settings.budget  # programs that the ways after the first may still solve
+        self._in_vain = 0  # scouts in a row that came no nearer
         self.how = "directly"
         self._best: Local | None = None
 
@@ -59,7 +67,11 @@ class Search:
         start = self.problem.scene.figure.clamp(self.problem.start)
         if self._accept(self._descend(start), "directly"):
             return
-        ways = chain(self._bent(start), self._staged(start), self._restarted(start))
+        rng = np.random.default_rng(self.settings.seed)
+        starts = chain([start], restarts(self.problem, start, rng, self.settings.restarts))
+        ways = chain(
+            self._bent(start), self._scouted(islice(starts, FIRST)), self._staged(start), self._scouted(starts)
+        )
         for local, how in ways:
             if self._accept(local, how) or self._left <= 0:
                 return
@@ -79,27 +91,55 @@ class Search:
             q = self._try(q, "stage", (1.0 - share) * whole).q
         yield self._try(q, "stage"), "in stages"
 
-    def _restarted(self, start: Array) -> Iterator[tuple[Local, str]]:
-        """Seeded postures to begin from."""
-        rng = np.random.default_rng(self.settings.seed)
-        for q in restarts(self.problem, start, rng, self.settings.restarts):
-            yield self._try(q, "restart"), "from another start"
+    def _scouted(self, starts: Iterator[Array]) -> Iterator[tuple[Local, str]]:
+        """Scouts from the start and from seeded postures, and a descent from where one reaches the goals.
+
+        A scout first goes through things, where limbs can change sides, and then is pushed out of them. Where many in
+        a row, although nothing was in their way, came no nearer than the best posture, the goals are out of reach.
+        """
+        for q in starts:
+            if self._in_vain == NO_NEARER or self._left <= 0:
+                return
+            ghost = self._scout(q, GHOST)
+            nearer = ghost.violation.left < (1.0 - NEARER) * self.best.violation.left
+            self._in_vain = 0 if nearer else self._in_vain + 1
+            if ghost.violation.left > REACHED * self.settings.tolerance:
+                continue
+            scout = self._scout(ghost.q, 0.0)
+            reached = scout.violation.worst <= self.settings.tolerance
+            yield self._try(scout.q, "restart") if reached else scout, "from another start"
+
+    def _scout(self, start: Array, depth: float) -> Local:
+        """Look whether the goals can be met from a start, in haste and without regard to the measures.
+
+        Args:
+            start: (nq,).
+            depth: by which pieces may be inside of each other, metres.
+        """
+        most = max(min(self._left, SCOUT), 1)
+        asked = self.lineariser.clearances
+        self.lineariser.clearances = asked - depth
+        local = self._descent(most, None, "scout", measures=False, hasty=True).run(start)
+        self.lineariser.clearances = asked
+        self.spent += local.iterations
+        self._left -= local.iterations
+        return local
 
     def _settle(self) -> None:
         """Where the goals are not reached, come as near as goes, then improve the measures from there."""
-        if self.best.violation.left <= self.settings.tolerance:
+        tolerance = self.settings.tolerance
+        if not _held(self.best, tolerance):
+            self._accept(self._stay(self.best), self.how)
+        if self.best.violation.left <= tolerance:
             return
         nearest = self._descend(self.best.q, note="nearest", measures=False)
         self._accept(nearest, self.how)
         # it began at the best and came to rest: nothing nearer is near that
         best = self.best._replace(converged=self.best.converged or nearest.converged)
         self._best = best
-        if best.violation.left > self.settings.tolerance and self.problem.measures:
+        if best.violation.left > tolerance and self.problem.measures:
             local = self._stay(best)
-            if (
-                _held(local, self.settings.tolerance)
-                and local.violation.left <= best.violation.left + self.settings.tolerance
-            ):
+            if _held(local, tolerance) and local.violation.left <= best.violation.left + tolerance:
                 self._best = local
 
     def _stay(self, local: Local) -> Local:
@@ -140,10 +180,12 @@ class Search:
             local = stayed if _better(stayed, local, self.settings.tolerance) else local
         return local
 
-    def _descent(self, iterations: int, offset: Array | None, note: str, *, measures: bool = True) -> Descent:
+    def _descent(
+        self, iterations: int, offset: Array | None, note: str, *, measures: bool = True, hasty: bool = False
+    ) -> Descent:
         return Descent(
             self.subproblem, self.lineariser, self.solver, self.settings.tolerance, iterations, offset, self.trace,
-            note, measures,
+            note, measures, hasty,
         )  # fmt: skip
 
     def _accept(self, local: Local, how: str) -> bool:
@@ -159,9 +201,12 @@ def _held(local: Local, tolerance: float) -> bool:
 
 def _better(one: Local, other: Local, tolerance: float) -> bool:
     """Whether one descent ended better: in what must hold, then in the goals, then in the measures."""
-    for left, right in ((_broken(one), _broken(other)), (one.violation.goal, other.violation.goal)):
+    for left, right, alike in (
+        (_broken(one), _broken(other), JUST * tolerance),
+        (one.violation.goal, other.violation.goal, tolerance),
+    ):
         left, right = max(left, tolerance), max(right, tolerance)
-        if abs(left - right) > max(tolerance, ALIKE * min(left, right)):
+        if abs(left - right) > max(alike, ALIKE * min(left, right)):
             return left < right
     return one.measure < other.measure
 
