@@ -251,3 +251,16 @@ def test_a_changed_scene_is_refused_in_the_next_step(planar_arm):
     problem.scene.add(wb.Sphere(0.1), name="late", at=(0.6, 0.0, 0.0))
     with pytest.raises(wb.InputError, match="state the problem anew"):
         method.step(problem, problem.start, 0.01)
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 2.0, 3.0])
+def test_a_limb_gets_out_of_the_way_of_a_thrown_ball(planar_arm, least_distance, speed):
+    """The ball is inside when the frame begins, by up to 50 mm: more than a step may go that looks 60 mm far."""
+    dt, radius = 1.0 / 60.0, 0.05
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(radius), name="ball", at=(0.7, -0.6, 0.0))
+    problem = wb.Problem(scene, start=np.array([0.0, 0.4, 0.4]), goals=[wb.Point("tip", (0.9, 0.5, 0.0))])
+    method, q = wb.QP(), problem.start
+    for frame in range(int(0.8 / (speed * dt))):
+        scene.move("ball", at=(0.7, -0.6 + speed * dt * frame, 0.0))
+        q = method.step(problem, q, dt).q
+        assert least_distance(scene, q) > -2e-4, frame

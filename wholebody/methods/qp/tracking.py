@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from wholebody.errors import InputError
 from wholebody.linearisation import Linearisation
-from wholebody.methods.qp.quadratic_program import Array, QuadraticProgram
+from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
@@ -21,6 +21,7 @@ LARGEST_WITHIN = 0.5
 HEADROOM = 2.5  # pairs within this many times the last step's motion get rows, so that the next may be longer
 RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
 UNSEEN = 1e-4  # m: by which turning may bring things nearer than the linearisation says without being looked after
+CORRECTIONS = 3  # programs that ask again for what turning brought nearer, before the step is cut
 CUTS = 6  # times that a step is halved before it is given up
 DAMPING = (
     0.3  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at what is in the way
@@ -83,13 +84,13 @@ class Tracker:
         self.problem.check_fresh()
         if self.problem.goals is not self._lineariser.goals:
             self._retarget()
-        at = self._lineariser.at(q, self._within)
-        rows = self._subproblem.rows(at)
-        program = self._subproblem.program(
-            at, rows, RADIUS, PULL * RADIUS, DAMPING, np.zeros(len(rows.soft_error)), True
-        )
-        answer = self._working_set.solve(program, rows.key)
+        at, rows, program, answer = self._solved(q)
         motion, turn = self._motion(answer.x)
+        if motion > 0.5 * self._within and rows.lack.max(initial=0.0) > UNSEEN:
+            # something came in fast: to get out of its way, one must look as far as one has to go
+            self._within = min(HEADROOM * motion, LARGEST_WITHIN)
+            at, rows, program, answer = self._solved(q)
+            motion, turn = self._motion(answer.x)
         share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
         displacement = answer.x if share == 1.0 else share * answer.x
         if 0.5 * share**2 * motion * turn > UNSEEN:
@@ -100,6 +101,15 @@ class Tracker:
             following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
             answer.iterations, answer.by, share,
         )  # fmt: skip
+
+    def _solved(self, q: Array) -> tuple[Linearisation, Rows, QuadraticProgram, QPSolution]:
+        """Linearisation, rows, program and its answer at a posture (nq,)."""
+        at = self._lineariser.at(q, self._within)
+        rows = self._subproblem.rows(at)
+        program = self._subproblem.program(
+            at, rows, RADIUS, PULL * RADIUS, DAMPING, np.zeros(len(rows.soft_error)), True
+        )
+        return at, rows, program, self._working_set.solve(program, rows.key)
 
     def _looked_after(
         self, at: Linearisation, rows: Rows, program: QuadraticProgram, displacement: Array, share: float
@@ -117,16 +127,17 @@ class Tracker:
             The displacement (nv,) and its share.
         """
         began = np.minimum(at.contacts.distance, at.clearance[: len(at.contacts.distance)])
-        short = self._shortfall(at, displacement, np.maximum(began, self._foreseen(at, rows, displacement)))
-        if short.max(initial=0.0) <= UNSEEN:
-            return displacement, share
         groups = np.zeros(rows.groups)
-        groups[rows.groups - len(short) :] = short
-        again = self._working_set.solve(replace(program, least=program.least + groups[rows.group]), rows.key)
-        self.problem.scene.proximity.place(self._lineariser.state.update(at.q).data)  # where motion begins
-        motion, _ = self._motion(again.x)
-        share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
-        displacement = share * again.x
+        for _ in range(CORRECTIONS):
+            short = self._shortfall(at, displacement, np.maximum(began, self._foreseen(at, rows, displacement)))
+            if short.max(initial=0.0) <= UNSEEN:
+                return displacement, share
+            groups[rows.groups - len(short) :] += short
+            again = self._working_set.solve(replace(program, least=program.least + groups[rows.group]), rows.key)
+            self.problem.scene.proximity.place(self._lineariser.state.update(at.q).data)  # where motion begins
+            motion, _ = self._motion(again.x)
+            share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
+            displacement = share * again.x
         for _ in range(CUTS):
             if self._shortfall(at, displacement, began).max(initial=0.0) <= UNSEEN:
                 return displacement, share
