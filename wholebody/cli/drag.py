@@ -114,7 +114,7 @@ def show(rows: list[DragRow]) -> None:
 
 def _goal(problem: Problem, number: int | None) -> int:
     from wholebody.errors import InputError
-    from wholebody.methods.drag import moving_goal
+    from wholebody.methods.moving_goals import moving_goal
     from wholebody.tasks import Frame, Point
 
     if number is None:

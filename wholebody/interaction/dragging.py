@@ -19,7 +19,8 @@ from wholebody.assessment import assess
 from wholebody.geometry.sweep import Sweep
 from wholebody.interaction.judging import jerk
 from wholebody.interaction.scripts import FRAME
-from wholebody.methods.drag import Drag, moving_goal, own_copy, retarget
+from wholebody.methods.drag import Drag
+from wholebody.methods.moving_goals import moving_goal, own_copy, retarget
 from wholebody.methods.solve import Method
 from wholebody.problem import Problem, Solution
 from wholebody.tasks import Point

@@ -7,7 +7,6 @@ reached; a jump to the goal is `wholebody.solve`.
 
 from __future__ import annotations
 
-import copy
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,13 +19,13 @@ from numpy.typing import ArrayLike, NDArray
 from wholebody.assessment import assess
 from wholebody.errors import InputError
 from wholebody.methods.ccd.method import CCD
+from wholebody.methods.moving_goals import begun_at, moving_goal, own_copy, part_way, retarget
 from wholebody.methods.newton.method import Newton
 from wholebody.methods.passage import jumps, snapshot
 from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import Method, method_named
 from wholebody.problem import Problem, Solution
-from wholebody.tasks import Frame, Point
-from wholebody.tasks.base import Goal
+from wholebody.tasks import Point
 from wholebody.tasks.inputs import numbers
 
 Array = NDArray[np.float64]
@@ -39,6 +38,7 @@ AT_THE_END = 1e-5  # m, rad
 WITHIN = 0.06  # m: pairs nearer than this are measured when a way is judged; larger = dearer, fewer left to a sweep
 LEGS = (np.inf, 0.01, 0.002)  # m, rad: how far the goal is followed in a frame, in turn where a longer way is not free
 GRAZE = 5e-4  # m: deeper than this a way goes into something; soles that are held dip in between two postures
+PASSING = 1e-3  # m: a solution whose way goes in deeper gives way to a nearer one
 SHORT = 0.03  # rad, m: a shorter way of joints whose every step was looked after dips in by less than GRAZE
 
 
@@ -123,7 +123,7 @@ class Drag:
         error = max(float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:])))
         for leg in LEGS:
             if leg < error:
-                retarget(self.problem, self._number, _part(self.problem, goal, self.q, leg / error))
+                retarget(self.problem, self._number, part_way(self.problem, goal, self.q, leg / error))
             elif np.isfinite(leg):
                 break  # the goal is no farther than that, and was asked for already
             q, iterations, short = self._attempt()
@@ -139,7 +139,7 @@ class Drag:
         if isinstance(self.method, Newton):
             step = self.method.step(self.problem, self.q, dt=self.dt)
             return step.q, step.iterations, SHORT
-        solution = self._rough.solve(_from(self.problem, self.q))
+        solution = self._rough.solve(begun_at(self.problem, self.q))
         return solution.q, solution.iterations, 0.0
 
     def _free(self, q: Array, short: float) -> bool:
@@ -200,15 +200,25 @@ def _chosen(method: str | Method) -> Method:
 
 
 def _solve_freely(problem: Problem, q: Array, method: Method) -> Solution:
-    return method.follow(problem, q) if isinstance(method, Newton) else method.solve(_from(problem, q))
+    return method.follow(problem, q) if isinstance(method, Newton) else method.solve(begun_at(problem, q))
 
 
 def _solve(problem: Problem, q: Array, method: Method) -> Solution:
-    """Solve from the posture q (nq,); it is kept where the way from it jumps over something."""
+    """Solve from the posture q (nq,); it is kept where the way from it jumps over something.
+
+    Where the way to the best answer goes into something, the nearest answer is preferred; where the goal is not met
+    either way, the posture is kept too.
+    """
     solution = _solve_freely(problem, q, method)
-    if not _jumps(problem, q, solution.q):
+    sweeper = problem.scene.sweeper
+    if sweeper.first_contact(q, solution.q, tolerance=PASSING) is None:
         return solution
-    judgement = assess(_from(problem, q), q)
+    near = method.solve(begun_at(problem, q, nearest=True))
+    if (near.solved or not solution.solved) and sweeper.first_contact(q, near.q, tolerance=PASSING) is None:
+        return replace(near, assessment=assess(problem, near.q))
+    if solution.solved and not _jumps(problem, q, solution.q):
+        return solution
+    judgement = assess(begun_at(problem, q), q)
     message = "the posture that was found lies beyond something in the way; the figure stays"
     return replace(solution, q=q, status="unreachable", assessment=judgement, message=message)
 
@@ -220,55 +230,6 @@ def _jumps(problem: Problem, before: Array, after: Array) -> bool:
         snapshot(scene.proximity, scene.proximity.near(scene.state(q).data, WITHIN), WITHIN) for q in (before, after)
     )
     return jumps(scene, first, last, before, after)
-
-
-def _part(problem: Problem, goal: Point | Frame, q: Array, share: float) -> Any:
-    """A target on the way of a goal's frame from where it is at the posture q (nq,): a share of what is left."""
-    error = goal.error(problem.scene.state(q))
-    if isinstance(goal, Point):
-        return goal._target + (1.0 - share) * error
-    target = goal._target
-    here = pin.SE3(pin.exp3(error[3:]) @ target.rotation, target.translation + error[:3])
-    turned = here.rotation @ pin.exp3(share * pin.log3(here.rotation.T @ target.rotation))
-    return pin.SE3(turned, here.translation + share * (target.translation - here.translation))
-
-
-def own_copy(problem: Problem) -> Problem:
-    """A copy whose goals can be moved without moving the caller's."""
-    problem.check_fresh()
-    return copy.copy(problem)
-
-
-def _from(problem: Problem, q: Array) -> Problem:
-    """The same problem, begun at another posture; what was resolved at its start stays."""
-    result = copy.copy(problem)
-    result.start = q
-    return result
-
-
-def moving_goal(problem: Problem, number: int) -> Point | Frame:
-    """The goal of this number, which can be moved.
-
-    Raises:
-        InputError: there is no such goal, or it is of another kind.
-    """
-    if not 0 <= number < len(problem.goals):
-        raise InputError(f"the problem has {len(problem.goals)} goals, and none has the number {number}")
-    goal = problem.goals[number]
-    if not isinstance(goal, (Point, Frame)):
-        raise InputError(f"goals[{number}] is a {type(goal).__name__}; only a Point or a Frame can be moved")
-    return goal
-
-
-def retarget(problem: Problem, number: int, target: Any) -> None:
-    """Move a problem's goal, a `Point` or `Frame`, to another target.
-
-    Raises:
-        InputError: there is no such goal, it is of another kind, or the target is not one.
-    """
-    goals: list[Goal] = list(problem.goals)
-    goals[number] = replace(moving_goal(problem, number), target=target)
-    problem.retarget(goals)
 
 
 def _error(problem: Problem, q: Array) -> float:

@@ -1,0 +1,75 @@
+"""Problems whose goals are moved, or that are begun elsewhere, without moving the caller's."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError
+from wholebody.problem import Problem
+from wholebody.tasks import Frame, Point
+from wholebody.tasks.base import Goal
+
+Array = NDArray[np.float64]
+
+
+def own_copy(problem: Problem) -> Problem:
+    """A copy whose goals can be moved without moving the caller's."""
+    problem.check_fresh()
+    return copy.copy(problem)
+
+
+def begun_at(problem: Problem, q: Array, *, nearest: bool = False) -> Problem:
+    """The same problem, begun at another posture q (nq,).
+
+    Args:
+        problem: what is asked; what was resolved at its start stays.
+        q: the posture.
+        nearest: whether measures count from q too, such as effort, so that the nearest answer is sought.
+    """
+    result = copy.copy(problem)
+    result.start = q
+    if nearest:
+        result.measures = tuple(term.resolve(problem.scene, q) for term in problem.measures)
+    return result
+
+
+def moving_goal(problem: Problem, number: int) -> Point | Frame:
+    """The goal of this number, which can be moved.
+
+    Raises:
+        InputError: there is no such goal, or it is of another kind.
+    """
+    if not 0 <= number < len(problem.goals):
+        raise InputError(f"the problem has {len(problem.goals)} goals, and none has the number {number}")
+    goal = problem.goals[number]
+    if not isinstance(goal, (Point, Frame)):
+        raise InputError(f"goals[{number}] is a {type(goal).__name__}; only a Point or a Frame can be moved")
+    return goal
+
+
+def retarget(problem: Problem, number: int, target: Any) -> None:
+    """Move a problem's goal, a `Point` or `Frame`, to another target.
+
+    Raises:
+        InputError: there is no such goal, it is of another kind, or the target is not one.
+    """
+    goals: list[Goal] = list(problem.goals)
+    goals[number] = replace(moving_goal(problem, number), target=target)
+    problem.retarget(goals)
+
+
+def part_way(problem: Problem, goal: Point | Frame, q: Array, share: float) -> Any:
+    """A target on the way of a goal's frame from where it is at the posture q (nq,): a share of what is left."""
+    error = goal.error(problem.scene.state(q))
+    if isinstance(goal, Point):
+        return goal._target + (1.0 - share) * error
+    target = goal._target
+    here = pin.SE3(pin.exp3(error[3:]) @ target.rotation, target.translation + error[:3])
+    turned = here.rotation @ pin.exp3(share * pin.log3(here.rotation.T @ target.rotation))
+    return pin.SE3(turned, here.translation + share * (target.translation - here.translation))
