@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from wholebody.errors import UnknownNameError
+from wholebody.methods.newton.linear_algebra import gram
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern
 from wholebody.methods.newton.linear_algebra.choice import dense_columns, linear_algebra
+from wholebody.methods.newton.linear_algebra.gram import Gram
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.linear_algebra.reference import Dense
 
@@ -49,6 +51,23 @@ def test_each_solves_what_the_dense_one_solves(name: str, hub: bool) -> None:
         assert step == pytest.approx(wanted, abs=1e-6)
         assert multiplier == pytest.approx(its_multiplier, rel=1e-7, abs=1e-5)
     assert 0 < solver.fill < 200 * pattern.height
+
+
+def test_compiled_products_are_those_of_the_array_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("numba")
+    rng = np.random.default_rng(6)
+    pattern = _pattern(rng, 40, 60)
+    compiled = Gram(pattern)
+    monkeypatch.setattr(gram, "compiled_kernel", lambda: None)
+    plain = Gram(pattern)
+    for _ in range(2):
+        system = _system(rng, pattern)
+        for one in (compiled, plain):
+            one.refill(system.values, system.weight, system.damping)
+        assert compiled.matrix.data == pytest.approx(plain.matrix.data, rel=1e-12, abs=1e-12)
+        jacobian = pattern.dense(system.values)
+        wanted = np.tril(jacobian @ np.diag(1.0 / system.weight) @ jacobian.T + np.diag(system.damping))
+        assert plain.matrix.toarray() == pytest.approx(wanted, abs=1e-9)
 
 
 def test_a_hub_costs_less_when_its_columns_are_split_off() -> None:

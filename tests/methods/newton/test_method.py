@@ -62,7 +62,7 @@ def test_it_finds_what_the_qp_method_finds(human: wb.Figure, goal: tuple[float, 
     _honest(problem, ours)
     assert ours.status == theirs.status == "solved"
     # two methods that share no code end at the same effort, which is the global one or the same local one
-    assert ours.assessment.measure == pytest.approx(theirs.assessment.measure, rel=0.02)
+    assert ours.assessment.measure == pytest.approx(theirs.assessment.measure, rel=1e-3)
 
 
 def test_slacks_and_barrier_agree(human: wb.Figure) -> None:
@@ -94,10 +94,11 @@ def test_two_hands_on_one_box_close_a_loop(human: wb.Figure) -> None:
         goals=[wb.Point("left_palm", scene.state(q).frame(human.frame_id("left_palm")).translation + (0, 0, 0.1))],
         constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Hold("right_palm", relative_to="left_palm")],
     )
-    ours, theirs = wb.Newton(tolerance=1e-6).solve(problem), wb.QP(tolerance=1e-6).solve(problem)
+    ours, theirs = wb.Newton(tolerance=1e-8).solve(problem), wb.QP(tolerance=1e-8).solve(problem)
     assert ours.status == theirs.status == "solved"
     assert ours.assessment.constraint_violation < 1e-6
-    assert ours.assessment.measure == pytest.approx(theirs.assessment.measure, rel=0.02)
+    assert ours.assessment.measure == pytest.approx(theirs.assessment.measure, rel=1e-8)
+    assert np.abs(pin.difference(human.model, ours.q, theirs.q)).max() < 1e-5
 
 
 def test_a_goal_out_of_reach_is_approached_and_said_to_be(human: wb.Figure) -> None:
