@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from types import ModuleType
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wholebody.bench.compare.plan import share_out
+from wholebody.bench.compare.plan import FIRST, Plan, share_out
+from wholebody.bench.compare.settings import Settings
+from wholebody.bench.compare.store import Chunk
 
 COSTS = st.lists(st.tuples(st.floats(1e-3, 5.0), st.floats(1e-3, 30.0)), min_size=1, max_size=8)
 
@@ -46,3 +50,16 @@ def test_costs_that_are_not_known_yet_bound_nothing() -> None:
     cases, sweeps = share_out(np.zeros(2), np.zeros(2), np.full(2, 20.0), np.full(2, 6.0), 1.0)
     assert (cases == 20).all()
     assert (sweeps == 6).all()
+
+
+def test_one_slow_start_does_not_end_a_set_but_slow_building_does(fakes: ModuleType) -> None:
+    plan = Plan(Settings((fakes.SET,), (fakes.entrant("solves"),), 100, 0, minutes=1.0), jobs=1)
+    plan.note(Chunk("arm", 0, (), building=50.0))
+    assert plan.cases("arm") == 100
+    for number in range(1, FIRST + 2):
+        plan.note(Chunk("arm", number, (), building=0.01))
+    assert plan.cases("arm") == 100
+    slow = Plan(Settings((fakes.SET,), (fakes.entrant("solves"),), 100, 0, minutes=1.0), jobs=1)
+    for number in range(FIRST):
+        slow.note(Chunk("arm", number, (), building=2.0))
+    assert slow.cases("arm") == 9  # of sixty seconds 30 % for building

@@ -17,6 +17,8 @@ from wholebody.bench.compare.store import Chunk
 
 BUILDING_SHARE = 0.3  # of a set's time, that building its cases may take
 
+FIRST = 4  # cases after which it is known what building one takes
+
 Array = NDArray[np.float64]
 
 
@@ -57,17 +59,21 @@ class Plan:
 
     def cases(self, family: str) -> int:
         """How many cases of a set there is time to build."""
-        known = self._building[family]
-        if not known:
+        if len(self._building[family]) < FIRST:
             return self._settings.cases
         share = BUILDING_SHARE * self._total / len(self._building)
-        return int(np.clip(share / max(float(np.median(known)), 1e-6), 1, self._settings.cases))
+        return int(np.clip(share / max(self._built(family), 1e-6), FIRST, self._settings.cases))
+
+    def _built(self, family: str) -> float:
+        """Seconds to build a case; the slow ones are those for which a process was started, and a body loaded."""
+        known = self._building[family]
+        return float(np.quantile(known, 0.25)) if known else 0.0
 
     def allowed(self) -> dict[tuple[str, str], Allowed]:
         """Cases of every method in every set, by what is known of the costs now."""
         settings = self._settings
         one, sweep = self._costs()
-        built = sum(self.cases(name) * float(np.median(known)) for name, known in self._building.items() if known)
+        built = sum(self.cases(name) * self._built(name) for name in self._building)
         most = np.array([self.cases(family) for family, _ in self._keys], dtype=float)
         cases, sweeps = share_out(one, sweep, most, np.minimum(most, settings.sweep), self._total - built)
         return {key: Allowed(int(cases[place]), int(sweeps[place])) for key, place in self._place.items()}
@@ -81,7 +87,7 @@ class Plan:
         """What all cases that are allowed will have taken."""
         one, sweep = self._costs()
         counts = np.array([allowed[key] for key in self._keys], dtype=float)
-        built = sum(self.cases(name) * float(np.median(known)) for name, known in self._building.items() if known)
+        built = sum(self.cases(name) * self._built(name) for name in self._building)
         return float(one @ counts[:, 0] + sweep @ counts[:, 1]) + built
 
     def _costs(self) -> tuple[Array, Array]:
