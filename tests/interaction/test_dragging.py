@@ -49,6 +49,17 @@ def test_a_hand_that_is_dragged_into_a_table_stays_on_it_and_comes_back(problem:
     np.testing.assert_allclose(goal_place(problem), (0.4, -0.25, 0.9))  # the caller's goal stays
 
 
+@pytest.mark.parametrize("method", ["newton", "qp", "ccd"])
+def test_a_drag_that_ends_inside_of_a_thing_ends_on_it(problem: wb.Problem, method: str) -> None:
+    corners = [present_place(problem), (0.3, -0.25, 0.95), (0.5, -0.1, 0.80), (0.5, -0.1, 0.66)]
+    dragged = drag_along(problem, spread(corners, 90), method)
+    judged = judge_drag(problem, dragged)
+    assert dragged.end.status == "unreachable"
+    assert 0.05 < dragged.end.assessment.goal_error < 0.12
+    assert judged.depth.max() < 2e-4
+    assert judged.between.max() <= 1e-3
+
+
 def test_what_passes_through_a_thing_is_seen(problem: wb.Problem) -> None:
     """A drag that is not one: the hand is above the table, then under it, with nothing between."""
     above = drag_along(problem, [(0.4, -0.25, 0.9)] * 12, "qp")
