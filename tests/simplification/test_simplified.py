@@ -150,6 +150,7 @@ class Lean(Constraint):
         {"goals": [wb.Axis("right_palm", (1, 0, 0), toward=TARGET)], "constraints": [*FEET, wb.Balance(margin=0.01)]},
         {"constraints": [wb.Freeze("root", "legs", "spine"), wb.Balance(), wb.ReachCones(), Lean()]},
         {"constraints": [wb.Freeze("spine"), *FEET, wb.ReachCones(["right_shoulder"])], "measures": [wb.Discomfort()]},
+        {"constraints": [wb.Freeze("spine"), *FEET], "measures": [wb.PotentialEnergy(0.01)]},
     ],
 )
 def test_every_term_is_the_same_function_of_the_joints_that_are_left(human: Figure, terms: dict[str, list]) -> None:
@@ -180,6 +181,11 @@ def test_every_term_is_the_same_function_of_the_joints_that_are_left(human: Figu
         slope = sum(term.weight * term.gradient(state) @ step for term in part.problem.measures)
         rise = (before("measures", moved) - before("measures", q))[0]
         assert abs(slope - rise) < 1e-4 * (abs(slope) + 1e-6)
+        places = part._embedding.idx_v
+        bend = sum(term.weight * term.curvature(state) for term in part.problem.measures)
+        whole.update(part.posture(q))
+        wanted = sum(term.weight * term.curvature(whole)[places] for term in problem.measures)
+        np.testing.assert_allclose(bend, wanted, rtol=1e-6)
         change = np.concatenate([_rows(goal, state) @ step for goal in part.problem.goals])
         np.testing.assert_allclose(change, before("goals", moved) - before("goals", q), atol=1e-9)
         kept = [np.atleast_1d(term.value(state)) for term in part.problem.constraints]
