@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from wholebody import tasks
 from wholebody.methods.ccd.method import CCD
+from wholebody.methods.damped_least_squares import DampedLeastSquares
 from wholebody.methods.newton.method import Newton
+from wholebody.methods.placo.method import Placo
 from wholebody.methods.qp.method import QP
 from wholebody.taskfile import kinds
 from wholebody.taskfile.kinds import DIRECTION, FRAME, PLACEMENT, POSITION, QUATERNION, WEIGHT, Number
@@ -137,7 +139,7 @@ METHODS = {
             Key("solver", kinds.Text(), 'QP solver: "osqp" (if left out), "daqp", or what `wholebody doctor` lists'),
             Key("tolerance", Number(1e-10, 0.1), "metres and radians to which goals are met; 1e-5 if left out"),
             Key("iterations", Number(1, 100_000, whole=True), "of one descent"),
-            Key("budget", Number(0, 1_000_000, whole=True), "programs for further tries when the first ends short; 1000 if left out"),
+            Key("budget", Number(0, 1_000_000, whole=True), "programs for further tries; 1000 if left out"),
             Key("restarts", Number(0, 1000, whole=True), "most of those tries"),
             Key("seed", Number(0, 2**32 - 1, whole=True), "of those tries"),
         ),
@@ -154,7 +156,7 @@ METHODS = {
         CCD,
     ),
     "newton": Form(
-        "Sparse Newton in full coordinates: points, frames, orientations, axes, holds and planes; least effort.",
+        "Sparse Newton in full coordinates; least effort.",
         (
             Key("tolerance", Number(1e-10, 0.1), "metres and radians to which goals are met; 1e-5 if left out"),
             Key("iterations", Number(1, 100_000, whole=True), "most of them"),
@@ -166,5 +168,22 @@ METHODS = {
             ),
         ),
         Newton,
+    ),
+    "placo": Form(
+        "placo's differential inverse kinematics, iterated; to compare with.",
+        (
+            Key("tolerance", Number(1e-10, 0.1), "metres and radians to which goals are met; 1e-5 if left out"),
+            Key("iterations", Number(1, 100_000, whole=True), "most of them"),
+        ),
+        Placo,
+    ),
+    "dls": Form(
+        "Damped least squares, the textbook baseline: it sees no contacts.",
+        (
+            Key("tolerance", Number(1e-10, 0.1), "metres and radians to which goals are met; 1e-5 if left out"),
+            Key("iterations", Number(1, 100_000, whole=True), "most of them"),
+            Key("damping", Number(1e-9, 1e3), "left when the goals are met; 1e-3 if left out"),
+        ),
+        DampedLeastSquares,
     ),
 }
