@@ -127,7 +127,7 @@ def require_browser() -> None:
     ("arguments", "parts"),
     [
         (["pose", "absent.toml"], ["no task file is called 'absent.toml'", "small.toml"]),
-        (["pose", "small.toml", "--method", "hunt"], ["no method is called 'hunt'", "qp"]),
+        (["pose", "small.toml", "--method", "xyz"], ["no method is called 'xyz'", "qp"]),
         (["pose", "small.toml", "--out", "small.toml/x"], ["small.toml/x", "--out"]),
         (["show", "humna"], ["no figure is called 'humna'", "human"]),
         (["show", "human", "--posture", "siting", "--save", "a.html"], ["no posture", "sitting"]),

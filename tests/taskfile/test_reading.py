@@ -112,7 +112,7 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         ('to = "right_hand"', 'to = "right_hnd"', ["attach 1, key to", "right_hand"]),
         ('type = "point"', 'type = "pont"', ["no goal type", "did you mean point"]),
         ('shape = "box"', 'shape = "cube"', ["object 1, key shape", "no object shape is called 'cube'"]),
-        ('name = "qp"', 'name = "hunt"', ["method", "qp"]),
+        ('name = "qp"', 'name = "xyz"', ["method", "qp"]),
         ("[[goal]]", "[[gaol]]", ["no key or table is called 'gaol'", "goal"]),
         # a wrong structure
         ("[[goal]]", "[goal]", ["goal", "write [[goal]]"]),
