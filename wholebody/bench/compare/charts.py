@@ -79,10 +79,11 @@ def lowest(points: list[Point]) -> list[Point]:
 
 
 def _dress(panel: Any, quantity: Quantity, what: str) -> None:
-    from matplotlib.ticker import LogLocator
+    from matplotlib.ticker import LogLocator, NullLocator
 
     _time_axis(panel)
     panel.set_yscale("log")
+    panel.yaxis.set_minor_locator(NullLocator())  # ten decades have a hundred, and each is laid out
     panel.yaxis.set_major_locator(LogLocator(numticks=12))
     panel.set_ylim(0.5 * quantity.floor, 2.0 * BAND)
     panel.axhspan(0.35 * BAND, 2.0 * BAND, color="#f4dddd", zorder=0)
