@@ -25,7 +25,7 @@ from wholebody.methods.passage import jumps, snapshot
 from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import Method, method_named
 from wholebody.problem import Problem, Solution
-from wholebody.tasks import Point
+from wholebody.tasks import Point, StepLimit
 from wholebody.tasks.inputs import numbers
 
 Array = NDArray[np.float64]
@@ -34,6 +34,9 @@ FRAME = 1.0 / 60.0  # s: a frame of a screen
 SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from nearer
 MOST_GOALS = 10_000
 ON_THE_WAY = 1e-3  # m, rad: to which a method that solves anew in every frame meets the goal before the end
+OF_A_FRAME = 1e-4  # m, rad: to which "qp" meets the goal in a frame
+PROGRAMS = 3  # most of a frame; more = nearer to a goal that turns quickly, dearer frames where it cannot be met
+WORTH = 0.5  # share of the error that another program must leave at most for one more to follow
 AT_THE_END = 1e-5  # m, rad
 WITHIN = 0.06  # m: pairs nearer than this are measured when a way is judged; larger = dearer, fewer left to a sweep
 LEGS = (np.inf, 0.01, 0.002)  # m, rad: how far the goal is followed in a frame, in turn where a longer way is not free
@@ -61,9 +64,9 @@ class DragFrame(NamedTuple):
 class Drag:
     """Follows a goal that is moved from frame to frame.
 
-    "qp" makes one quadratic program a frame, "newton" a few Newton steps; other methods solve every frame anew from the
-    posture at hand, "ccd" to a millimetre. No method restarts elsewhere. Where the way to a posture goes into
-    something, the goal is followed by a shorter leg, or not in that frame.
+    "qp" makes one quadratic program a frame, seldom up to three, "newton" a few Newton steps; other methods solve every
+    frame anew from the posture at hand, "ccd" to a millimetre. No method restarts elsewhere. Where the way to a posture
+    goes into something, the goal is followed by a shorter leg, or not in that frame.
 
     Attributes:
         problem: what is asked; its goals are replaced as they move.
@@ -103,11 +106,7 @@ class Drag:
         """
         began = time.perf_counter()
         retarget(self.problem, self._number, target)
-        if isinstance(self.method, QP):
-            answer = self.method.step(self.problem, self.q, self.dt)
-            self.q, iterations = answer.q, 1
-        else:
-            iterations = self._followed()
+        iterations = self._stepped(self.method) if isinstance(self.method, QP) else self._followed()
         return DragFrame(self.q, _error(self.problem, self.q), iterations, time.perf_counter() - began)
 
     def finish(self) -> Solution:
@@ -115,6 +114,16 @@ class Drag:
         solution = _solve(self.problem, self.q, self.method)
         self.q = solution.q
         return solution
+
+    def _stepped(self, method: QP) -> int:
+        """Quadratic programs until the goal is met as a frame should, or another brings little; how many it took."""
+        bounded = any(isinstance(bound, StepLimit) for bound in self.problem.bounds)  # of the way of a whole frame
+        error, before, spent = np.inf, np.inf, 0
+        while spent < (1 if bounded else PROGRAMS) and error > OF_A_FRAME and error <= WORTH * before:
+            self.q = method.step(self.problem, self.q, self.dt).q
+            before, error = error, _error(self.problem, self.q)
+            spent += 1
+        return spent
 
     def _followed(self) -> int:
         """Move to a posture whose way is free, nearer to the goal by as long a leg as goes; the iterations it took."""
