@@ -91,6 +91,8 @@ class Loop(ABC):
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
         """Take a budget."""
+        if not 1e-10 <= tolerance <= 0.1:
+            raise InputError(f"tolerance is {tolerance}; give metres from 1e-10 to 0.1")
         self.tolerance, self.iterations = tolerance, ITERATIONS if iterations is None else iterations
         self._built: tuple[Problem, Stepper] | None = None
 
