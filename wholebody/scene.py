@@ -81,7 +81,7 @@ class Scene:
 
     @property
     def excluded_pairs(self) -> Mapping[tuple[str, str], str]:
-        """Pairs of owners that are not tested against each other because of the scene, with the reason."""
+        """Pairs of owners that are not tested because of the scene, with the reason."""
         self._build()
         return MappingProxyType(self._excluded)
 
@@ -206,8 +206,9 @@ class Scene:
     def _put(self, thing: SceneObject) -> Scene:
         shape: object = thing.shape
         if not isinstance(shape, Shape):
-            kind = type(shape).__name__
-            raise InputError(f"{thing.name!r} is a {kind}, not a shape; give wb.Box, wb.Sphere, wb.Mesh or another")
+            raise InputError(
+                f"{thing.name!r} is a {type(shape).__name__}, not a shape; give wb.Box, wb.Mesh or another"
+            )
         self._objects[thing.name] = thing
         self._changed()
         return self
@@ -273,11 +274,12 @@ class Scene:
         """
         return self.sweeper.first_contact(q0, q1)
 
-    def simplified(self, problem: Problem) -> Simplified:
-        """A smaller problem whose answers are answers of this one: joints, pairs and corners that matter.
+    def simplified(self, problem: Problem, *, lock: bool = True) -> Simplified:
+        """A smaller problem whose answers are answers of this one: the joints, pairs and corners that matter.
 
         Args:
-            problem: a problem about this scene.
+            problem: about this scene.
+            lock: whether joints that take no part stay as they start; False keeps all that are not frozen.
 
         Returns:
             The smaller problem, the way back to the whole figure, and what was left out with what that can change.
@@ -285,11 +287,11 @@ class Scene:
         Raises:
             InputError: the problem is about another scene, or objects came or left after it was stated.
         """
-        from wholebody.simplification.simplify import simplify
+        from wholebody.simplification.simplify import Parts, simplify
 
-        if problem.scene is not self:
-            raise InputError("the problem is about another scene; call problem.scene.simplified(problem)")
-        return simplify(problem)
+        if problem.scene is self:
+            return simplify(problem, Parts(lock=lock))
+        raise InputError("the problem is about another scene; call problem.scene.simplified(problem)")
 
     # ---- building
 

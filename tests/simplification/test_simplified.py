@@ -59,6 +59,16 @@ def test_a_closed_loop_brings_the_other_arm(human: Figure) -> None:
     assert not groups(human, "left_arm") & set(problem.scene.simplified(problem).left_out.locked)
 
 
+def test_joints_may_be_kept(human: Figure) -> None:
+    problem = standing(human, constraints=[*FEET, wb.Balance(), wb.Freeze("left_arm")])
+    left_out = problem.scene.simplified(problem, lock=False).left_out
+    assert left_out.locked == ()
+    assert set(left_out.frozen) == groups(human, "left_arm")
+    assert left_out.helpers == ()
+    assert left_out.excess == 0.0
+    assert left_out.exact
+
+
 def test_an_inequality_brings_no_joint_and_is_named(human: Figure) -> None:
     problem = standing(human, constraints=[*FEET, wb.Balance()])
     left_out = problem.scene.simplified(problem).left_out

@@ -47,8 +47,8 @@ class Participation:
     excess: float
 
 
-def participation(problem: Problem) -> Participation:
-    """Find the joints that take part in a problem."""
+def participation(problem: Problem, lock: bool = True) -> Participation:
+    """Find the joints that take part in a problem: those that it needs, or with `lock` off all that are not frozen."""
     model = problem.scene.model
     states = _states(problem)
     joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in list(model.joints)[1:]])
@@ -64,7 +64,7 @@ def participation(problem: Problem) -> Participation:
     moving = _closed(moving & ~frozen[joint_of], rows, frozen[joint_of])
     joints = np.zeros(model.njoints, dtype=bool)
     joints[joint_of[moving]] = True
-    if not joints.any():
+    if not (lock and joints.any()):
         joints = ~frozen
         joints[0] = False
     locked = ~joints[joint_of] & ~frozen[joint_of]

@@ -29,12 +29,14 @@ class Parts:
     """What to leave out: each kind by itself, so that its gain can be measured.
 
     Attributes:
-        joints: lock joints that take no part.
+        joints: leave out joints that the problem freezes.
+        lock: lock joints that take no part, too.
         pairs: drop pairs that cannot come near, and things that are left without any.
         growth: how far a piece with fewer corners may reach out of the one it holds, metres; 0 keeps all pieces.
     """
 
     joints: bool = True
+    lock: bool = True
     pairs: bool = True
     growth: float = GROWTH
 
@@ -65,7 +67,7 @@ def simplify(problem: Problem, parts: Parts | None = None) -> Simplified:
     problem.check_fresh()
     parts = parts or Parts()
     whole = problem.scene
-    part = participation(problem) if parts.joints else None
+    part = participation(problem, parts.lock) if parts.joints else None
     figure, geometry = _smaller_figure(problem, part)
     embedding = Embedding(whole.model, figure.model, problem.start)
     start = problem.start[embedding.idx_q]
