@@ -206,9 +206,8 @@ class Scene:
     def _put(self, thing: SceneObject) -> Scene:
         shape: object = thing.shape
         if not isinstance(shape, Shape):
-            raise InputError(
-                f"{thing.name!r} is a {type(shape).__name__}, not a shape; give wb.Box, wb.Mesh or another"
-            )
+            kind = type(shape).__name__
+            raise InputError(f"{thing.name!r} is a {kind}, not a shape; give wb.Box, wb.Sphere, wb.Mesh or another")
         self._objects[thing.name] = thing
         self._changed()
         return self
@@ -292,8 +291,6 @@ class Scene:
         if problem.scene is self:
             return simplify(problem, Parts(lock=lock))
         raise InputError("the problem is about another scene; call problem.scene.simplified(problem)")
-
-    # ---- building
 
     def _build(self) -> SceneGeometry:
         if self._built is None:
