@@ -32,7 +32,7 @@ ASSEMBLY = "newton, assembly"
 STEPPED = ("qp", "newton")  # methods that have a step of their own in a drag
 FRAMES = 12
 CIRCLE = 0.02  # m: radius of what a drag follows; a frame moves a tenth of the way round
-LONGEST = 20.0  # s: a method that takes longer for one solve is not asked at larger sizes
+LONGEST = 1.0  # s: a method that takes longer for one solve is not asked at larger sizes
 CLEARANCE = 0.002  # m
 
 _R = TypeVar("_R")
@@ -95,6 +95,7 @@ def rows(
                     continue
                 if row.solve_ms > 1e3 * LONGEST:
                     slow.add(method)
+                    say(f"{method}: more {series} than {size} left out, for a solve took {1e-3 * row.solve_ms:.1f} s")
                 say(f"{series} {size}, {method}: {row.solve_ms:.1f} ms, a step {row.step_ms:.2f} ms, {row.status}")
                 yield row
             del scene, figure
