@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 INSIDE = 1e-4  # m: deeper than this is inside
 DIP = 1e-3  # m: by which the straight way between two postures may go in deeper than its ends
+PARTS = 41  # places on it where the depth is measured
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,8 @@ class Judged:
         limit_violation: farthest out of a joint's limits [rad, m].
         constraint_violation: farthest from what must hold [m, rad].
         speed_excess: by how much the fastest joint is too fast, as a share of what is allowed.
-        passed: what it went through between frames, in words; "" for nothing.
+        passed: what it went into between frames, in words; "" for nothing.
+        dip: how deep, at the deepest [m].
         misreported: largest difference between what it says is left and what is [m, rad].
         worst: index of the posture to look at: where it went through something, the deepest, or the last.
     """
@@ -45,6 +47,7 @@ class Judged:
     constraint_violation: float = 0.0
     speed_excess: float = 0.0
     passed: str = ""
+    dip: float = 0.0
     misreported: float = 0.0
     worst: int = 0
 
@@ -79,14 +82,15 @@ def _stream(question: Stream, answer: Answer) -> Judged:
     first = problem.goals[0]
     assert isinstance(first, Point)
     found: list[Assessment] = []
-    passed, through, excess, misreported = "", 0, 0.0, 0.0
+    passed, dip, through, excess, misreported = "", 0.0, 0, 0.0, 0.0
     before = scene.figure.clamp(problem.start)
     allowed = question.speed * question.dt
     for number, (frame, q) in enumerate(zip(question.frames, answer.postures, strict=True)):
         for name, place in frame.moved.items():
             scene.move(name, at=place)
-        if not passed:
-            passed, through = _passed(problem, before, q, number), number
+        depth, owners = _dip(problem, before, q)
+        if depth > dip:
+            passed, dip, through = f"{owners}, frame {number}", depth, number
         problem.retarget([Point(first.frame, frame.target)])
         found.append(assess(problem, q))
         misreported = max(misreported, abs(_left(found[-1]) - answer.left[number]))
@@ -102,19 +106,26 @@ def _stream(question: Stream, answer: Answer) -> Judged:
         constraint_violation=max(each.constraint_violation for each in found),
         speed_excess=excess,
         passed=passed,
+        dip=dip,
         misreported=misreported,
         worst=through if passed else deepest if inside else len(found) - 1,
     )
 
 
-def _passed(problem: Problem, before: Array, q: Array, number: int) -> str:
-    """What is gone through on the straight way to a frame, with things where they are in it."""
+def _dip(problem: Problem, before: Array, q: Array) -> tuple[float, str]:
+    """How deep the straight way to a frame goes into something [m], and into what; things are where the frame has them.
+
+    The sweep sees whether it does, however thin the thing; the depth is that of parts of the way.
+    """
     scene = problem.scene
     contact = scene.sweeper.first_contact(before, q, tolerance=DIP)
     if contact is None or not contact.certain:
-        return ""
-    owners = " and ".join(scene.piece_owner[piece] for piece in contact.pair)
-    return f"{owners}, frame {number}"
+        return 0.0, ""
+    depth = DIP
+    for share in np.linspace(0.0, 1.0, PARTS):
+        found = scene.contacts(np.asarray(pin.interpolate(scene.model, before, q, float(share))), within=0.0)
+        depth = max(depth, float(-found.distance.min(initial=0.0)))
+    return depth, " and ".join(scene.piece_owner[piece] for piece in contact.pair)
 
 
 def _left(found: Assessment) -> float:

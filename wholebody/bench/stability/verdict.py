@@ -87,7 +87,8 @@ def _wrong(case: HardCase, answer: Answer, judged: Judged) -> tuple[str, str]:
     if judged.limit_violation > BEYOND:
         return f"{judged.limit_violation:.2g} rad out of limits", f"{judged.limit_violation:.2g} rad"
     if judged.passed:
-        return f"passes through {judged.passed}", "through"
+        deep = length(judged.dip)
+        return f"{deep} inside on the way: {judged.passed}", f"{deep} way"
     return _missed(case, answer, judged)
 
 
