@@ -22,7 +22,7 @@ from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution,
 
 BOUND_TOLERANCE = 1e-11  # rad, m: an x this far outside its box counts as inside
 ROW_TOLERANCE = 1e-11  # m: likewise for elastic rows
-FULL_CORRECTIONS = 4  # corrections of everything at once, before only the worst entry is corrected at a time
+FULL_CORRECTIONS = 8  # corrections of everything at once, before only the worst entry is corrected at a time
 
 
 def guess_active_set(program: QuadraticProgram, x: Array, tolerance: float) -> ActiveSet:

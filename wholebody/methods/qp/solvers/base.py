@@ -12,7 +12,7 @@ from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution,
 GUESS_TOLERANCE = 1e-4
 """How near to its bound an approximate answer counts as on it [rad, m]."""
 
-WARM_CORRECTIONS = 15
+WARM_CORRECTIONS = 120
 """Corrections of the last active set before the solver is asked."""
 
 CORRECTIONS = 12
