@@ -25,6 +25,7 @@ LEVELS: dict[str, Parts] = {
 }
 ARM_THINGS = 1000
 CLEARANCE = 0.002  # m
+REPEATS = 2  # solves of which the faster counts
 INSIDE = 1e-4  # m: deeper than this an answer is inside something
 
 
@@ -39,8 +40,8 @@ class DetailRow:
         level: what was left out.
         freedoms, pairs: of the model that was solved.
         status: of the answer, as its own model says.
-        solve_ms: the solve without its judgement [ms].
-        judge_ms: the judgement [ms].
+        solve_ms: the solve without its judgement, the faster of two, by the clock [ms].
+        judge_ms: the judgement, by the clock [ms].
         prepare_ms: to leave out what is left out [ms].
         penetration_mm: how deep the answer is inside something in the finest model [mm].
         lack_mm: by how much the worst pair misses its clearance there [mm].
@@ -114,13 +115,9 @@ def _levels(name: str, number: int, models: dict[str, Problem], finest: str) -> 
             part = simplify(models[detail], parts)
             prepare_ms = 1e3 * (time.process_time() - began) if level != "all" else 0.0
             problem = models[detail] if level == "all" else part.problem
-            answer = wb.solve(problem)  # once before: what a problem makes once is made
-            began = time.process_time()
-            answer = wb.solve(problem)
-            taken = time.process_time() - began
-            began = time.process_time()
-            wb.assess(problem, answer.q)
-            judged = time.process_time() - began
+            wb.solve(problem)  # what a problem makes once is made
+            answers = [wb.solve(problem) for _ in range(REPEATS)]
+            answer = answers[0]
             q: Array = answer.q if level == "all" else part.posture(answer.q)
             truth = wb.assess(judge, q)
             if (detail, level) == (finest, "all") and answer.solved:
@@ -133,8 +130,8 @@ def _levels(name: str, number: int, models: dict[str, Problem], finest: str) -> 
                 freedoms=problem.scene.model.nv,
                 pairs=len(problem.scene.geometry.collisionPairs),
                 status=answer.status,
-                solve_ms=1e3 * max(taken - judged, 0.0),
-                judge_ms=1e3 * judged,
+                solve_ms=1e3 * min(found.seconds - found.assessment.seconds for found in answers),
+                judge_ms=1e3 * min(found.assessment.seconds for found in answers),
                 prepare_ms=prepare_ms,
                 penetration_mm=1e3 * truth.penetration,
                 lack_mm=1e3 * truth.clearance_lack,

@@ -124,7 +124,8 @@ def report(rows: Sequence[DetailRow], refused: Sequence[str], facts: Mapping[str
         f"Answers of `qp` that their own model calls solved, judged in the model of {FINEST} with everything in it: "
         f"how many are inside something by more than {1e3 * INSIDE:g} mm, how deep, by how much a pair misses its "
         "clearance, a goal its place, and how far the effort is above that of the finest model's own answer (below "
-        "it where another local optimum was found). Median time of the processor; what is left out is left out once "
+        "it where another local optimum was found). Medians over the cases, of "
+        "the faster of two solves by the clock; what is left out is left out once "
         f"for a problem, before. *Simplified* is `scene.simplified`, its coarser pieces at most {1e3 * GROWTH:g} mm "
         "larger.",
         table,

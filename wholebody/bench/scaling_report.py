@@ -43,7 +43,7 @@ def chart(rows: Sequence[ScalingRow], path: Path) -> tuple[Path, Path]:
             if stepped:
                 below.plot(
                     [row.size for row in stepped], [row.step_ms for row in stepped], line, color=color, marker=marker,
-                    markersize=5, linewidth=1.5, label=f"a step, {method}",
+                    markersize=5, linewidth=1.5, label=f"a step, {method}", fillstyle="none" if line == "--" else "full",
                 )  # fmt: skip
         whole = [row for row in mine if row.method == "qp"]
         for label, color, values in (
@@ -82,7 +82,8 @@ def report(rows: Sequence[ScalingRow], left_out: Sequence[str], facts: Mapping[s
     """
     parts = [
         f"A chain 2 m long that reaches for a place among boxes. What does not grow: {JOINTS} joints with ten segments "
-        f"of one box each, {THINGS} things around. Processor's time. An exponent e means time ~ size^e; it is the "
+        f"of one box each, {THINGS} things around. Solves and judgements are the least of the repeats by the "
+        "clock, the rest is the processor's time. An exponent e means time ~ size^e; it is the "
         "slope of a line through the logarithms over the sizes from a tenth of the largest on (at least three).",
         _exponents(rows),
         _times(rows),

@@ -32,6 +32,7 @@ class Embedding:
         idx_q: (small nq,) places in the whole posture.
         idx_v: (small nv,) places in the whole displacement.
         state: the whole figure, moved by `whole`.
+        small: the smaller figure, to compare terms on.
     """
 
     def __init__(self, whole: pin.Model, small: pin.Model, start: Array) -> None:
@@ -40,7 +41,7 @@ class Embedding:
         joints = [whole.joints[index] for index in ids]
         self.idx_q = _places([(int(joint.idx_q), int(joint.nq)) for joint in joints])
         self.idx_v = _places([(int(joint.idx_v), int(joint.nv)) for joint in joints])
-        self.state = State(whole)
+        self.state, self.small = State(whole), State(small)
         self._start: Array = np.array(start, dtype=float)
 
     def lift(self, q: Array) -> Array:
@@ -174,14 +175,14 @@ def on_smaller(term: _T, scene: Surroundings, start: Array, embedding: Embedding
     else:
         assert isinstance(term, Bound)
         return LiftedBound(term, embedding)
-    wanted = _said(lifted, scene, start)
+    wanted = _said(lifted, embedding.small, start)
     if isinstance(lifted, Constraint):
         wanted, rows = _moving_rows(wanted)
         if not rows:
             return None
     try:
         anew = term.resolve(scene, start)
-        said = _said(anew, scene, start)
+        said = _said(anew, embedding.small, start)
     except Exception:  # a term is anyone's code, and may fail in any way on a figure it was not meant for
         return lifted
     alike = len(said) == len(wanted) and all(
@@ -191,9 +192,9 @@ def on_smaller(term: _T, scene: Surroundings, start: Array, embedding: Embedding
     return anew if alike else lifted
 
 
-def _said(term: Term, scene: Surroundings, start: Array) -> list[Array]:
+def _said(term: Term, state: State, start: Array) -> list[Array]:
     """What a term says at a few postures: all that a method reads, but for what is constant in a measure."""
-    state, postures = State(scene.model), [start, *random_postures(scene.model, SAMPLES, seed=1)]
+    postures = [start, *random_postures(state.model, SAMPLES, seed=1)]
     ask: list[Callable[[], object]] = []
     if isinstance(term, Goal):
         ask = [lambda: term.error(state), lambda: _dense(term.jacobian(state), state), lambda: term.angular]

@@ -8,6 +8,7 @@ others, because no bound on the measure could be given. All the rest stay where 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,17 +51,17 @@ class Participation:
 def participation(problem: Problem, lock: bool = True) -> Participation:
     """Find the joints that take part in a problem: those that it needs, or with `lock` off all that are not frozen."""
     model = problem.scene.model
-    states = _states(problem)
+    walk = _Walk(problem)
     joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in list(model.joints)[1:]])
     frozen = _frozen(problem, joint_of)
     moving = np.zeros(model.nv, dtype=bool)
     for goal in problem.goals:
-        moving |= _columns(goal, states).any(axis=0)
+        moving |= _columns(goal, walk).any(axis=0)
     for measure in problem.measures:
         if not isinstance(measure, SEPARABLE):
-            moving |= _slopes(measure, states)
+            moving |= _slopes(measure, walk)
     moving |= _out_of_limits(problem) | _too_near(problem)
-    rows = [(term, _columns(term, states), *_kinds(term, states[0])) for term in problem.constraints]
+    rows = [(term, _columns(term, walk), *_kinds(term, walk.start())) for term in problem.constraints]
     moving = _closed(moving & ~frozen[joint_of], rows, frozen[joint_of])
     joints = np.zeros(model.njoints, dtype=bool)
     joints[joint_of[moving]] = True
@@ -84,18 +85,23 @@ def _closed(moving: Mask, rows: list[tuple[Constraint, Mask, Mask, Mask]], froze
             return moving
 
 
-def _states(problem: Problem) -> list[State]:
-    """The start, and random postures with the root as at the start."""
-    model, start = problem.scene.model, problem.start
-    states = [State(model).update(start)]
-    for q in random_postures(model, SAMPLES, seed=0):
+class _Walk:
+    """The start, and random postures with the root as at the start: one state that goes from one to the next."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.state = State(problem.scene.model)
+        self.postures = np.vstack([problem.start, random_postures(problem.scene.model, SAMPLES, seed=0)])
         if problem.scene.figure.root == "free":
-            q[:7] = start[:7]
-        states.append(State(model).update(q))
-    return states
+            self.postures[:, :7] = problem.start[:7]
+
+    def start(self) -> State:
+        return self.state.update(self.postures[0])
+
+    def __iter__(self) -> Iterator[State]:
+        return (self.state.update(q) for q in self.postures)
 
 
-def _columns(term: Goal | Constraint, states: list[State]) -> Mask:
+def _columns(term: Goal | Constraint, states: Iterable[State]) -> Mask:
     """(m, nv) which degrees of freedom a row moves with: exact for wrenches, else what the sampled postures show."""
     found: Mask | None = None
     for state in states:
@@ -109,7 +115,7 @@ def _columns(term: Goal | Constraint, states: list[State]) -> Mask:
     return found
 
 
-def _slopes(measure: Measure, states: list[State]) -> Mask:
+def _slopes(measure: Measure, states: Iterable[State]) -> Mask:
     return np.asarray(np.any([np.abs(measure.gradient(state)) > NOTHING for state in states], axis=0))
 
 
