@@ -43,7 +43,8 @@ def chart(rows: Sequence[ScalingRow], path: Path) -> tuple[Path, Path]:
             if stepped:
                 below.plot(
                     [row.size for row in stepped], [row.step_ms for row in stepped], line, color=color, marker=marker,
-                    markersize=5, linewidth=1.5, label=f"a step, {method}", fillstyle="none" if line == "--" else "full",
+                    markersize=5, linewidth=1.5, label=f"a step, {method}",
+                    fillstyle="none" if line == "--" else "full",
                 )  # fmt: skip
         whole = [row for row in mine if row.method == "qp"]
         for label, color, values in (
