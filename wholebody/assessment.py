@@ -122,7 +122,7 @@ class _Pairs:
         pin.updateGeometryPlacements(self.model, self.state.data, self.geometry, self.results)
         pin.computeDistances(self.geometry, self.results)
         count = len(self.geometry.collisionPairs)
-        self.distance = np.array([self.results.distanceResults[k].min_distance for k in range(count)])
+        self.distance = np.array([result.min_distance for result in self.results.distanceResults])
         if np.isnan(self.distance).any():
             raise InputError("a distance is not a number; an object's placement or shape is broken")
         self.least = float(self.distance.min()) if count else float("inf")

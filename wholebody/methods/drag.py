@@ -106,7 +106,10 @@ class Drag:
         """
         began = time.perf_counter()
         retarget(self.problem, self._number, target)
-        iterations = self._stepped(self.method) if isinstance(self.method, QP) else self._followed()
+        if isinstance(self.method, QP):
+            self.q, iterations = qp_frame(self.method, self.problem, self.q, self.dt)
+        else:
+            iterations = self._followed()
         return DragFrame(self.q, _error(self.problem, self.q), iterations, time.perf_counter() - began)
 
     def finish(self) -> Solution:
@@ -114,16 +117,6 @@ class Drag:
         solution = _solve(self.problem, self.q, self.method)
         self.q = solution.q
         return solution
-
-    def _stepped(self, method: QP) -> int:
-        """Quadratic programs until the goal is met as a frame should, or another brings little; how many it took."""
-        bounded = any(isinstance(bound, StepLimit) for bound in self.problem.bounds)  # of the way of a whole frame
-        error, before, spent = np.inf, np.inf, 0
-        while spent < (1 if bounded else PROGRAMS) and error > OF_A_FRAME and error <= WORTH * before:
-            self.q = method.step(self.problem, self.q, self.dt).q
-            before, error = error, _error(self.problem, self.q)
-            spent += 1
-        return spent
 
     def _followed(self) -> int:
         """Move to a posture whose way is free, nearer to the goal by as long a leg as goes; the iterations it took."""
@@ -136,8 +129,8 @@ class Drag:
             elif np.isfinite(leg):
                 break  # the goal is no farther than that, and was asked for already
             q, iterations, short = self._attempt()
-            spent += iterations
-            if self._free(q, short):
+            spent, q = spent + iterations, self._bounded(q)
+            if _free(self.problem, self.q, q, short) or self._leaves(q):
                 self.q = q
                 break
         retarget(self.problem, self._number, goal.target)
@@ -151,12 +144,64 @@ class Drag:
         solution = self._rough.solve(begun_at(self.problem, self.q))
         return solution.q, solution.iterations, 0.0
 
-    def _free(self, q: Array, short: float) -> bool:
-        """Whether the way to the posture q (nq,) goes into nothing; ways up to `short` are taken as they are."""
+    def _bounded(self, q: Array) -> Array:
+        """As far towards the posture q (nq,) as bounds on speeds let a frame go."""
+        limits = [bound for bound in self.problem.bounds if isinstance(bound, StepLimit)]
+        if not limits:
+            return q
         scene = self.problem.scene
-        if np.abs(pin.difference(scene.model, self.q, q)).max() <= short:
-            return True
-        return scene.sweeper.first_contact(self.q, q, tolerance=GRAZE) is None
+        state, way = scene.state(self.q), pin.difference(scene.model, self.q, q)
+        most = np.min(
+            [np.where(way > 0.0, high, -low) for low, high in (b.bounds(state, self.dt) for b in limits)], axis=0
+        )
+        share = float(np.min(np.where(np.abs(way) > most, most / np.maximum(np.abs(way), 1e-12), 1.0)))
+        return q if share >= 1.0 else np.asarray(pin.integrate(scene.model, self.q, share * way))
+
+    def _leaves(self, q: Array) -> bool:
+        """Whether something came into the figure, and q (nq,) is less deep in it; newton's frames get out themselves."""
+        if isinstance(self.method, Newton):
+            return False
+        deep = _depth(self.problem, self.q)
+        return deep > GRAZE and _depth(self.problem, q) < deep
+
+
+def qp_frame(method: QP, problem: Problem, q: Array, dt: float) -> tuple[Array, int]:
+    """One frame of dragging by quadratic programs: until the goals are met as a frame should, or another brings little.
+
+    Args:
+        method: whose programs they are.
+        problem: with the goals of this frame.
+        q: (nq,) posture of the frame before.
+        dt: seconds a frame.
+
+    Returns:
+        The posture (nq,), and how many programs it took.
+    """
+    bounded = any(isinstance(bound, StepLimit) for bound in problem.bounds)  # of the way of a whole frame
+    here, error = method.step(problem, q, dt).q, np.inf
+    for spent in range(1, 1 if bounded else PROGRAMS):
+        before, error = error, _error(problem, here)
+        if error <= OF_A_FRAME or error > WORTH * before:
+            return here, spent
+        there = method.step(problem, here, dt).q
+        if not _free(problem, q, there, SHORT):
+            return here, spent + 1
+        here = there
+    return here, 1 if bounded else PROGRAMS
+
+
+def _free(problem: Problem, before: Array, after: Array, short: float) -> bool:
+    """Whether the way between postures (nq,) goes into nothing; ways up to `short` are taken as they are."""
+    scene = problem.scene
+    if np.abs(pin.difference(scene.model, before, after)).max() <= short:
+        return True
+    return scene.sweeper.first_contact(before, after, tolerance=GRAZE) is None
+
+
+def _depth(problem: Problem, q: Array) -> float:
+    """Depth of the deepest overlap at a posture (nq,), metres."""
+    scene = problem.scene
+    return float(-scene.proximity.near(scene.state(q).data, 0.0).distance.min(initial=0.0))
 
 
 def pull(

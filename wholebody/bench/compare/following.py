@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from wholebody.assessment import Assessment, assess
 from wholebody.bench.compare.record import ANSWERED, Record
 from wholebody.bench.problem_sets.case import Case
+from wholebody.methods.drag import qp_frame
 from wholebody.methods.newton.method import Newton
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
@@ -35,8 +36,8 @@ class _Frame(NamedTuple):
 def follow(method: Any, problem: Problem, case: Case, empty: Record) -> Record:
     """Follow the goals of a case; `problem` is a copy of its problem, that may be changed.
 
-    QP and newton make one step a frame, as `wb.Drag` does; every other method solves each frame from the posture of the
-    frame before.
+    QP and newton make a few steps a frame, as `wb.Drag` does; every other method solves each frame from the posture of
+    the frame before.
     """
     q = problem.scene.figure.clamp(problem.start)
     frames: list[_Frame] = []
@@ -62,7 +63,7 @@ def _advance(method: Any, problem: Problem, q: Array, dt: float) -> tuple[Array,
         made = method.step(problem, q)
         return made.q, made.iterations, 0.0
     if isinstance(method, QP):
-        return method.step(problem, q, dt).q, 1, 0.0
+        return (*qp_frame(method, problem, q, dt), 0.0)
     problem.start = q
     solution = method.solve(problem)
     return np.asarray(solution.q, dtype=float), solution.iterations, solution.assessment.seconds

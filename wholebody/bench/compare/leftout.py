@@ -65,10 +65,12 @@ def _failures(rows: Sequence[Summary]) -> list[Block]:
 
 
 def _slow(settings: Settings, rows: Sequence[Summary]) -> list[Block]:
+    asked = {family.name: settings.asked(family) for family in settings.sets}
     found = [
-        (row.entrant, words(row.set), f"{row.cases} of {settings.cases}", f"{row.swept} of {settings.sweep}")
+        (row.entrant, words(row.set), f"{row.cases} of {cases}", f"{row.swept} of {sweep}")
         for row in rows
-        if row.cases < settings.cases or (row.swept < settings.sweep and row.refused < row.cases)
+        for cases, sweep in [asked[row.set]]
+        if row.cases < cases or (row.swept < sweep and row.refused < row.cases)
     ]
     if not found:
         return []

@@ -43,6 +43,7 @@ class Plan:
         self._levels = np.array(
             [len(settings.ladder(entrant, family.moving)) for family in settings.sets for entrant in settings.entrants]
         )
+        self._asked = {family.name: settings.asked(family) for family in settings.sets}
         self._building: dict[str, list[float]] = {family.name: [] for family in settings.sets}
 
     def note(self, chunk: Chunk) -> None:
@@ -60,9 +61,10 @@ class Plan:
     def cases(self, family: str) -> int:
         """How many cases of a set there is time to build."""
         if len(self._building[family]) < FIRST:
-            return self._settings.cases
+            return self._asked[family][0]
         share = BUILDING_SHARE * self._total / len(self._building)
-        return int(np.clip(share / max(self._built(family), 1e-6), FIRST, self._settings.cases))
+        possible = max(FIRST, int(share / max(self._built(family), 1e-6)))
+        return min(possible, self._asked[family][0])
 
     def _built(self, family: str) -> float:
         """Seconds to build a case; the slow ones are those for which a process was started, and a body loaded."""
@@ -71,11 +73,11 @@ class Plan:
 
     def allowed(self) -> dict[tuple[str, str], Allowed]:
         """Cases of every method in every set, by what is known of the costs now."""
-        settings = self._settings
         one, sweep = self._costs()
         built = sum(self.cases(name) * self._built(name) for name in self._building)
         most = np.array([self.cases(family) for family, _ in self._keys], dtype=float)
-        cases, sweeps = share_out(one, sweep, most, np.minimum(most, settings.sweep), self._total - built)
+        swept = np.array([self._asked[family][1] for family, _ in self._keys], dtype=float)
+        cases, sweeps = share_out(one, sweep, most, np.minimum(most, swept), self._total - built)
         return {key: Allowed(int(cases[place]), int(sweeps[place])) for key, place in self._place.items()}
 
     @property

@@ -125,7 +125,8 @@ def settings_sentence(given: Material) -> str:
     settings = given.settings
     return (
         f"Seed {settings.seed}; up to {settings.cases} problems a set at a tolerance of {DEFAULT[0]:g} m and rad, the "
-        f"first {settings.sweep} of them at every budget; {settings.minutes:g} minutes of solving in all, shared among "
+        f"first {settings.sweep} of them at every budget, a tenth of that where goals move; "
+        f"{settings.minutes:g} minutes of solving in all, shared among "
         f"methods and sets; a solve is ended after {settings.cap:g} s (a drag after a tenth of a second a frame, if "
         "that is more). Every solve is by a fresh method in a process of its own on one thread, in turning order; one "
         "solve goes before the first and is not counted. Time is wall time of the call; the set-up of methods that "

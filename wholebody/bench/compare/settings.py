@@ -12,6 +12,7 @@ from wholebody.errors import InputError
 from wholebody.version import __version__
 
 MOVING_LEVELS = 3  # budgets of a set whose goals move: a case is hundreds of solves
+MOVING = 10  # cases of other sets for one whose goals move
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,12 @@ class Settings:
             "cap": self.cap,
             "minutes": self.minutes,
         }
+
+    def asked(self, family: ProblemSet) -> tuple[int, int]:
+        """Cases of a set at the default budget, and at all budgets; fewer where a case is hundreds of solves."""
+        if family.moving:
+            return max(1, self.cases // MOVING), self.sweep // MOVING
+        return self.cases, self.sweep
 
     def ladder(self, entrant: Entrant, moving: bool = False) -> list[Budget]:
         """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`."""
