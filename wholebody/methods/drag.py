@@ -158,7 +158,7 @@ class Drag:
         return q if share >= 1.0 else np.asarray(pin.integrate(scene.model, self.q, share * way))
 
     def _leaves(self, q: Array) -> bool:
-        """Whether something came into the figure, and q (nq,) is less deep in it; newton's frames get out themselves."""
+        """Whether something came into the figure, and q (nq,) is less deep in it; newton sees to that by itself."""
         if isinstance(self.method, Newton):
             return False
         deep = _depth(self.problem, self.q)
