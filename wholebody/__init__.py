@@ -30,10 +30,11 @@ if TYPE_CHECKING:
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
-    from wholebody.methods.drag import Drag, pull
+    from wholebody.methods.drag import Drag
     from wholebody.methods.newton.assembly import Assembly
     from wholebody.methods.newton.method import Newton
     from wholebody.methods.placo.method import Placo
+    from wholebody.methods.pull import pull
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
     from wholebody.problem import Problem, Solution
@@ -127,10 +128,11 @@ _MODULES = {
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
     "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
-    "wholebody.methods.drag": "Drag pull",
+    "wholebody.methods.drag": "Drag",
     "wholebody.methods.newton.assembly": "Assembly",
     "wholebody.methods.newton.method": "Newton",
     "wholebody.methods.placo.method": "Placo",
+    "wholebody.methods.pull": "pull",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
     "wholebody.problem": "Problem Solution",

@@ -1,47 +1,38 @@
-"""Dragging and pulling with any method: goals that move, followed frame by frame or goal by goal.
+"""Dragging with any method: a goal that moves, followed frame by frame.
 
-The schemes of Choi and Cremer 1999, section 3: a drag is a stream of nearby goals, each met with moderate accuracy and
-the last one with high; a pull follows a path through evenly spaced intermediate goals and stops at the last that can be
-reached; a jump to the goal is `wholebody.solve`.
+After Choi and Cremer 1999, section 3: a stream of nearby goals, each met with moderate accuracy and the last one with
+high.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from wholebody.assessment import assess
 from wholebody.errors import InputError
 from wholebody.methods.ccd.method import CCD
 from wholebody.methods.moving_goals import begun_at, moving_goal, own_copy, part_way, retarget
+from wholebody.methods.nearby import for_motions, solve_nearby
 from wholebody.methods.newton.method import Newton
-from wholebody.methods.passage import jumps, snapshot
 from wholebody.methods.qp.method import QP
-from wholebody.methods.solve import Method, method_named
+from wholebody.methods.solve import Method
 from wholebody.problem import Problem, Solution
-from wholebody.tasks import Point, StepLimit
-from wholebody.tasks.inputs import numbers
+from wholebody.tasks import StepLimit
 
 Array = NDArray[np.float64]
 
 FRAME = 1.0 / 60.0  # s: a frame of a screen
-SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from nearer
-MOST_GOALS = 10_000
 ON_THE_WAY = 1e-3  # m, rad: to which a method that solves anew in every frame meets the goal before the end
 OF_A_FRAME = 1e-4  # m, rad: to which "qp" meets the goal in a frame
 PROGRAMS = 3  # most of a frame; more = nearer to a goal that turns quickly, dearer frames where it cannot be met
 WORTH = 0.5  # share of the error that another program must leave at most for one more to follow
-AT_THE_END = 1e-5  # m, rad
-WITHIN = 0.06  # m: pairs nearer than this are measured when a way is judged; larger = dearer, fewer left to a sweep
 LEGS = (np.inf, 0.01, 0.002)  # m, rad: how far the goal is followed in a frame, in turn where a longer way is not free
 GRAZE = 5e-4  # m: deeper than this a way goes into something; soles that are held dip in between two postures
-PASSING = 1e-3  # m: a solution whose way goes in deeper gives way to a nearer one
 SHORT = 0.03  # rad, m: a shorter way of joints whose every step was looked after dips in by less than GRAZE
 
 
@@ -92,7 +83,7 @@ class Drag:
         if not (np.isfinite(dt) and dt > 0.0):
             raise InputError(f"dt is {dt}; give seconds a frame, such as 0.02")
         self.problem, self.dt = own_copy(problem), dt
-        self.method = _chosen(method)
+        self.method = for_motions(method)
         self._rough = replace(self.method, tolerance=ON_THE_WAY) if isinstance(self.method, CCD) else self.method
         moving_goal(problem, goal)
         self._number = goal
@@ -114,7 +105,7 @@ class Drag:
 
     def finish(self) -> Solution:
         """Meet the goal where it is now with the method's full accuracy, and judge the posture."""
-        solution = _solve(self.problem, self.q, self.method)
+        solution = solve_nearby(self.problem, self.q, self.method)
         self.q = solution.q
         return solution
 
@@ -204,106 +195,6 @@ def _depth(problem: Problem, q: Array) -> float:
     return float(-scene.proximity.near(scene.state(q).data, 0.0).distance.min(initial=0.0))
 
 
-def pull(
-    problem: Problem, path: ArrayLike, method: str | Method = "newton", *, goal: int = 0, spacing: float = SPACING
-) -> tuple[Solution, ...]:
-    """Pull a goal along a path, through evenly spaced intermediate goals.
-
-    The first corner is gone to as `solve` would. Each goal after it is solved from the posture before; one whose
-    posture lies beyond something in the way counts as not reached.
-
-    Args:
-        problem: with the goal that moves, a `Point`.
-        path: (k, 3) corners of the path, metres; the first one is where the goal is met first.
-        method: by name, set for 1e-5 and not to restart, or a configured method.
-        goal: which of the problem's goals moves.
-        spacing: metres between intermediate goals, at most.
-
-    Returns:
-        A solution for each intermediate goal; the last one is the first that was not reached, or the end of the path.
-
-    Raises:
-        InputError: the path is not one, the spacing is not positive, or the goal is not a `Point`.
-        UnknownNameError: there is no such method.
-    """
-    places = _spaced(path, spacing)
-    term = moving_goal(problem, goal)
-    if not isinstance(term, Point):
-        raise InputError(f"pull moves a Point along a path, and goals[{goal}] is a {type(term).__name__}; use Drag")
-    chosen = _chosen(method)
-    own, q, found = own_copy(problem), problem.scene.figure.clamp(problem.start), []
-    for number, place in enumerate(places):
-        retarget(own, goal, place)
-        found.append(_solve(own, q, chosen) if number else _solve_freely(own, q, chosen))
-        if not found[-1].solved:
-            break
-        q = found[-1].q
-    return tuple(found)
-
-
-def _chosen(method: str | Method) -> Method:
-    """A method for motions: given by name, it stays near the posture it begins from."""
-    if not isinstance(method, str):
-        return method
-    chosen = method_named(method)
-    if isinstance(chosen, QP):
-        return replace(chosen, restarts=0)
-    if isinstance(chosen, CCD):
-        return replace(chosen, tolerance=AT_THE_END, restarts=0)
-    return chosen
-
-
-def _solve_freely(problem: Problem, q: Array, method: Method) -> Solution:
-    return method.follow(problem, q) if isinstance(method, Newton) else method.solve(begun_at(problem, q))
-
-
-def _solve(problem: Problem, q: Array, method: Method) -> Solution:
-    """Solve from the posture q (nq,); it is kept where the way from it jumps over something.
-
-    Where the way to the best answer goes into something, the nearest answer is preferred; where the goal is not met
-    either way, the posture is kept too.
-    """
-    solution = _solve_freely(problem, q, method)
-    sweeper = problem.scene.sweeper
-    if sweeper.first_contact(q, solution.q, tolerance=PASSING) is None:
-        return solution
-    near = method.solve(begun_at(problem, q, nearest=True))
-    if (near.solved or not solution.solved) and sweeper.first_contact(q, near.q, tolerance=PASSING) is None:
-        return replace(near, assessment=assess(problem, near.q))
-    if solution.solved and not _jumps(problem, q, solution.q):
-        return solution
-    judgement = assess(begun_at(problem, q), q)
-    message = "the posture that was found lies beyond something in the way; the figure stays"
-    return replace(solution, q=q, status="unreachable", assessment=judgement, message=message)
-
-
-def _jumps(problem: Problem, before: Array, after: Array) -> bool:
-    """Whether something is jumped over on the way between two postures (nq,)."""
-    scene = problem.scene
-    first, last = (
-        snapshot(scene.proximity, scene.proximity.near(scene.state(q).data, WITHIN), WITHIN) for q in (before, after)
-    )
-    return jumps(scene, first, last, before, after)
-
-
 def _error(problem: Problem, q: Array) -> float:
     state = problem.scene.state(q)
     return max((float(np.linalg.norm(goal.error(state))) for goal in problem.goals), default=0.0)
-
-
-def _spaced(path: ArrayLike, spacing: float) -> Sequence[Array]:
-    """Places (3,) along the corners of a path, its own among them."""
-    shape = np.shape(path)
-    if len(shape) != 2 or shape[1] != 3 or shape[0] < 1:
-        raise InputError(f"path has shape {shape}; give corners of shape (k, 3), metres")
-    corners = numbers(path, (shape[0], 3), "path")
-    if not (np.isfinite(spacing) and spacing > 0.0):
-        raise InputError(f"spacing is {spacing}; give metres greater than zero")
-    legs = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-    counts = np.ceil(legs / spacing).astype(int)
-    if counts.sum() > MOST_GOALS:
-        raise InputError(f"a spacing of {spacing} m makes {counts.sum()} goals of this path; make it larger")
-    places = [corners[0]]
-    for begin, end, count in zip(corners, corners[1:], counts, strict=False):
-        places += [begin + (end - begin) * k / count for k in range(1, count + 1)]
-    return places

@@ -1,0 +1,80 @@
+"""Pulling with any method: a goal that is brought along a path, from one intermediate goal to the next.
+
+After Choi and Cremer 1999, section 3: the intermediate goals are evenly spaced, and a pull stops at the last that can
+be reached.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wholebody.errors import InputError
+from wholebody.methods.moving_goals import moving_goal, own_copy, retarget
+from wholebody.methods.nearby import for_motions, solve_freely, solve_nearby
+from wholebody.methods.solve import Method
+from wholebody.problem import Problem, Solution
+from wholebody.tasks import Point
+from wholebody.tasks.inputs import numbers
+
+Array = NDArray[np.float64]
+
+SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from nearer
+MOST_GOALS = 10_000
+
+
+def pull(
+    problem: Problem, path: ArrayLike, method: str | Method = "newton", *, goal: int = 0, spacing: float = SPACING
+) -> tuple[Solution, ...]:
+    """Pull a goal along a path, through evenly spaced intermediate goals.
+
+    The first corner is gone to as `solve` would. Each goal after it is solved from the posture before; one whose
+    posture lies beyond something in the way counts as not reached.
+
+    Args:
+        problem: with the goal that moves, a `Point`.
+        path: (k, 3) corners of the path, metres; the first one is where the goal is met first.
+        method: by name, set for 1e-5 and not to restart, or a configured method.
+        goal: which of the problem's goals moves.
+        spacing: metres between intermediate goals, at most.
+
+    Returns:
+        A solution for each intermediate goal; the last one is the first that was not reached, or the end of the path.
+
+    Raises:
+        InputError: the path is not one, the spacing is not positive, or the goal is not a `Point`.
+        UnknownNameError: there is no such method.
+    """
+    places = _spaced(path, spacing)
+    term = moving_goal(problem, goal)
+    if not isinstance(term, Point):
+        raise InputError(f"pull moves a Point along a path, and goals[{goal}] is a {type(term).__name__}; use Drag")
+    chosen = for_motions(method)
+    own, q, found = own_copy(problem), problem.scene.figure.clamp(problem.start), []
+    for number, place in enumerate(places):
+        retarget(own, goal, place)
+        found.append(solve_nearby(own, q, chosen) if number else solve_freely(own, q, chosen))
+        if not found[-1].solved:
+            break
+        q = found[-1].q
+    return tuple(found)
+
+
+def _spaced(path: ArrayLike, spacing: float) -> Sequence[Array]:
+    """Places (3,) along the corners of a path, its own among them."""
+    shape = np.shape(path)
+    if len(shape) != 2 or shape[1] != 3 or shape[0] < 1:
+        raise InputError(f"path has shape {shape}; give corners of shape (k, 3), metres")
+    corners = numbers(path, (shape[0], 3), "path")
+    if not (np.isfinite(spacing) and spacing > 0.0):
+        raise InputError(f"spacing is {spacing}; give metres greater than zero")
+    legs = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    counts = np.ceil(legs / spacing).astype(int)
+    if counts.sum() > MOST_GOALS:
+        raise InputError(f"a spacing of {spacing} m makes {counts.sum()} goals of this path; make it larger")
+    places = [corners[0]]
+    for begin, end, count in zip(corners, corners[1:], counts, strict=False):
+        places += [begin + (end - begin) * k / count for k in range(1, count + 1)]
+    return places
