@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.assessment import _Pairs
 from wholebody.geometry.proximity import Proximity
 
 LENGTHS = (0.5, 0.4)
@@ -139,6 +140,32 @@ def test_optimality_counts_contacts_that_push_back(free_bodies, shape):
     assert at(0.0, 0.1) < 1e-4
     assert at(0.1, 0.1) > 0.01
     assert at(0.0, 0.2) > 0.01
+
+
+def test_gradients_of_the_gaps_against_finite_differences(free_bodies):
+    """A ball on a ball, and both near a wall, at a chance turn: the gaps' derivatives in every direction."""
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1), wb.Sphere(0.07)))
+    scene.add(wb.Box((0.1, 2.0, 2.0)), name="wall", at=(-0.15, 0.0, 0.0))
+    q = scene.figure.neutral
+    for body, place in ((0, (0.0, 0.0, 0.0)), (1, (-0.03, 0.0, 0.17))):
+        q[7 * body : 7 * body + 3] = place
+        q[7 * body + 3 : 7 * body + 7] = pin.Quaternion(pin.exp3(np.array([0.3, -0.5, 0.7]))).coeffs()
+    problem = wb.Problem(scene, q)
+    pairs = _Pairs(problem)
+    pairs.move(q)
+    touching = np.flatnonzero(pairs.distance < 0.01)
+    assert len(touching) == 3
+    pairs.clearances = problem.clearances = np.full(len(pairs.distance), 0.01)
+    rows = pairs.gradients(problem, pairs.state)
+    differences = np.zeros((len(touching), scene.model.nv))
+    for k in range(scene.model.nv):
+        for sign in (1.0, -1.0):
+            pairs.move(pin.integrate(scene.model, q, sign * 1e-6 * np.eye(scene.model.nv)[k]))
+            differences[:, k] += sign * pairs.distance[touching] / 2e-6
+    for expected in differences:
+        assert np.abs(rows - expected).max(axis=1).min() < 1e-4
+    for row in rows:
+        assert np.abs(differences - row).max(axis=1).min() < 1e-2  # corners of patches lie beside the nearest points
 
 
 @pytest.mark.parametrize("q", [np.zeros(3), np.array([0.0, np.nan]), np.array([[0.0, 0.0]])])

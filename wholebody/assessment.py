@@ -115,6 +115,9 @@ class _Pairs:
         self.clearances = problem.clearances
         self.state = State(self.model)
         self.results = pin.GeometryData(self.geometry)
+        moves = [piece.parentJoint for piece in self.geometry.geometryObjects]
+        sides = [(moves[pair.first], moves[pair.second]) for pair in self.geometry.collisionPairs]
+        self._joints = np.array(sides, dtype=np.intp).reshape(-1, 2)  # that move the pieces of each pair; 0: none
 
     def move(self, q: Array) -> None:
         """Measure all pairs at the posture q."""
@@ -130,12 +133,22 @@ class _Pairs:
 
     def gradients(self, problem: Problem, state: State) -> Array:
         """Derivatives (k, nv) of the gaps of all pairs that push: at every corner of their contact patch."""
-        rows = [
-            self._row(state, pair, normal, point)
+        corners = [
+            (pair, normal, point)
             for pair in np.flatnonzero(self.distance < problem.clearances + ACTIVE).tolist()
             for normal, point in self._patch(pair)
         ]
-        return np.array(rows).reshape(-1, state.model.nv)
+        rows = np.zeros((len(corners), state.model.nv))
+        if not corners:
+            return rows
+        normals, points = np.array([corner[1] for corner in corners]), np.array([corner[2] for corner in corners])
+        wrenches = np.hstack([normals, np.cross(points, normals)])
+        joints = self._joints[[corner[0] for corner in corners]]
+        for side, sign in ((1, 1.0), (0, -1.0)):
+            for joint in set(joints[:, side].tolist()) - {0}:
+                moved = joints[:, side] == joint
+                rows[moved] += sign * wrenches[moved] @ pin.getJointJacobian(state.model, state.data, joint, pin.WORLD)
+        return rows
 
     def _patch(self, pair: int) -> list[tuple[Array, Array]]:
         """Normal and place of the witness point and of the corners of the contact patch."""
@@ -166,16 +179,6 @@ class _Pairs:
         pieces = [self.geometry.geometryObjects[i].geometry for i in (index.first, index.second)]
         places = [self.results.oMg[i] for i in (index.first, index.second)]
         return (*pieces, *(coal.Transform3s(place.rotation, place.translation) for place in places))
-
-    def _row(self, state: State, pair: int, normal: Array, point: Array) -> Array:
-        index = self.geometry.collisionPairs[pair]
-        wrench = np.concatenate([normal, np.cross(point, normal)])
-        row = np.zeros(state.model.nv)
-        for sign, piece in ((1.0, index.second), (-1.0, index.first)):
-            joint = self.geometry.geometryObjects[piece].parentJoint
-            if joint:
-                row += sign * wrench @ pin.getJointJacobian(state.model, state.data, joint, pin.WORLD)
-        return row
 
 
 _PAIRS: WeakKeyDictionary[Problem, _Pairs] = WeakKeyDictionary()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.methods.drag import qp_frame
 
 
 @pytest.fixture(scope="module")
@@ -85,3 +86,21 @@ def test_what_cannot_be_moved_is_named(scene: wb.Scene) -> None:
     other = wb.Problem(scene, "standing", goals=[wb.CenterOfMass((0, 0, 1))])
     with pytest.raises(wb.InputError, match="CenterOfMass"):
         wb.Drag(other)
+
+
+def test_a_frame_by_quadratic_programs_is_as_near_as_it_is_asked_for(scene: wb.Scene) -> None:
+    """A finer tolerance is kept, takes more programs, and leaves the measures as good."""
+    spent, measures = [], []
+    for tolerance in (1e-3, 1e-5, 1e-7):
+        problem, method = _problem(scene), wb.QP()
+        q, programs = problem.start, 0
+        for frame in range(70):
+            problem.retarget([wb.Point("right_index_tip", _circle(0.2 * max(frame - 40, 0)))])
+            q, count = qp_frame(method, problem, q, 1.0 / 60.0, tolerance)
+            programs += count if frame > 40 else 0
+            if frame > 40:
+                assert wb.assess(problem, q).goal_error < tolerance
+        spent.append(programs)
+        measures.append(wb.assess(problem, q).measure)
+    assert spent[0] < spent[1] < spent[2]
+    assert max(measures) < 1.01 * min(measures)

@@ -98,7 +98,7 @@ class Drag:
         began = time.perf_counter()
         retarget(self.problem, self._number, target)
         if isinstance(self.method, QP):
-            self.q, iterations = qp_frame(self.method, self.problem, self.q, self.dt)
+            self.q, iterations = qp_frame(self.method, self.problem, self.q, self.dt, OF_A_FRAME)
         else:
             iterations = self._followed()
         return DragFrame(self.q, _error(self.problem, self.q), iterations, time.perf_counter() - began)
@@ -156,7 +156,7 @@ class Drag:
         return deep > GRAZE and _depth(self.problem, q) < deep
 
 
-def qp_frame(method: QP, problem: Problem, q: Array, dt: float) -> tuple[Array, int]:
+def qp_frame(method: QP, problem: Problem, q: Array, dt: float, tolerance: float) -> tuple[Array, int]:
     """One frame of dragging by quadratic programs: until the goals are met as a frame should, or another brings little.
 
     Args:
@@ -164,6 +164,7 @@ def qp_frame(method: QP, problem: Problem, q: Array, dt: float) -> tuple[Array, 
         problem: with the goals of this frame.
         q: (nq,) posture of the frame before.
         dt: seconds a frame.
+        tolerance: to which the goals of a frame are met, metres and radians.
 
     Returns:
         The posture (nq,), and how many programs it took.
@@ -172,9 +173,9 @@ def qp_frame(method: QP, problem: Problem, q: Array, dt: float) -> tuple[Array, 
     here, error = method.step(problem, q, dt).q, np.inf
     for spent in range(1, 1 if bounded else PROGRAMS):
         before, error = error, _error(problem, here)
-        if error <= OF_A_FRAME or error > WORTH * before:
+        if error <= tolerance or error > WORTH * before:
             return here, spent
-        there = method.step(problem, here, dt).q
+        there = method.step(problem, here, dt, measures=False).q
         if not _free(problem, q, there, SHORT):
             return here, spent + 1
         here = there

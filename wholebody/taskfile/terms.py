@@ -142,6 +142,7 @@ METHODS = {
             Key("budget", Number(0, 1_000_000, whole=True), "programs for further tries; 1000 if left out"),
             Key("restarts", Number(0, 1000, whole=True), "most of those tries"),
             Key("seed", Number(0, 2**32 - 1, whole=True), "of those tries"),
+            Key("measures", kinds.Flag(), "whether the measures are to be least; false is faster, true if left out"),
         ),
         QP,
     ),

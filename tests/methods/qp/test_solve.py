@@ -280,3 +280,26 @@ def test_what_is_no_problem_or_method_is_refused(planar_arm):
     problem.scene.add(wb.Sphere(0.1), name="late", at=(3.0, 0.0, 0.0))
     with pytest.raises(wb.InputError, match="state the problem anew"):
         wb.solve(problem)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
+def test_the_first_posture_that_fits_meets_the_goals_sooner_and_costs_more(honest, tolerance):
+    human = wb.load("human")
+    scene = wb.Scene(human).add(wb.Box((0.6, 1.2, 0.03)), name="table", at=(0.75, 0.0, 0.75))
+    goals = [wb.Point("right_index_tip", (0.55, 0.1, 0.85)), wb.Point("left_index_tip", (0.5, 0.3, 1.1))]
+    problem = wb.Problem(scene, "standing", goals=goals, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")])
+    best = honest(problem, wb.QP(tolerance=tolerance).solve(problem), tolerance)
+    first = honest(problem, wb.QP(tolerance=tolerance, measures=False).solve(problem), tolerance)
+    assert best.status == first.status == "solved"
+    assert first.iterations < best.iterations
+    assert first.assessment.measure > best.assessment.measure
+
+
+def test_a_start_that_fits_is_the_first_that_does(planar_arm):
+    scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
+    start = np.array([0.1, 0.4, 0.3])
+    tip = scene.state(start).frame(scene.frame_id("tip")).translation
+    problem = wb.Problem(scene, start=start, goals=[wb.Point("tip", tip)], measures=[wb.Discomfort()])
+    solution = wb.QP(measures=False).solve(problem)
+    assert solution.iterations == 0
+    assert solution.q == pytest.approx(start, abs=1e-12)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -264,3 +266,21 @@ def test_a_limb_gets_out_of_the_way_of_a_thrown_ball(planar_arm, least_distance,
         scene.move("ball", at=(0.7, -0.6 + speed * dt * frame, 0.0))
         q = method.step(problem, q, dt).q
         assert least_distance(scene, q) > -2e-4, frame
+
+
+def test_steps_without_measures_converge_quadratically_and_change_nothing_else(planar_arm):
+    """What a step with measures leaves of a goal is squared by each step without; at the goal nothing moves."""
+    scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
+    start = np.array([0.4, 0.9, 0.3])
+    place = scene.state(start).frame(scene.frame_id("tip")).translation + np.array([-0.02, 0.01, 0.0])
+    problem = wb.Problem(scene, start, goals=[wb.Point("tip", place)], measures=[wb.Discomfort()])
+    method, errors = wb.QP(), []
+    q = method.step(problem, problem.start, 0.02).q
+    for _ in range(4):
+        errors.append(float(np.linalg.norm(problem.goals[0].error(scene.state(q)))))
+        q = method.step(problem, q, 0.02, measures=False).q
+    assert errors[0] > 1e-5
+    for before, after in itertools.pairwise(errors[:3]):
+        assert after < max(10.0 * before**2, 1e-11)
+    assert method.step(problem, q, 0.02, measures=False).displacement == pytest.approx(0.0, abs=1e-9)
+    assert np.abs(method.step(problem, q, 0.02).displacement).max() > 1e-3  # with them it goes on along its self-motion

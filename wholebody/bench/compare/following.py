@@ -63,7 +63,7 @@ def _advance(method: Any, problem: Problem, q: Array, dt: float) -> tuple[Array,
         made = method.step(problem, q)
         return made.q, made.iterations, 0.0
     if isinstance(method, QP):
-        return (*qp_frame(method, problem, q, dt), 0.0)
+        return (*qp_frame(method, problem, q, dt, method.tolerance), 0.0)
     problem.start = q
     solution = method.solve(problem)
     return np.asarray(solution.q, dtype=float), solution.iterations, solution.assessment.seconds

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
-from wholebody.bench.entrants.base import Budget
+from wholebody.bench.entrants.base import FIRST_FIT, Budget
 
 DEFAULT: Budget = (1e-4, None)
 """The budget at which all cases are solved: a tenth of a millimetre and of a milliradian, iterations as they come."""
@@ -25,7 +25,8 @@ class Record:
     Attributes:
         set, number: which case.
         entrant: which method.
-        tolerance, budget: of this solve; a budget of 0 iterations is the method's own.
+        tolerance, budget: of this solve; a budget of 0 iterations is the method's own, one of -1 is
+            `FIRST_FIT`.
         outcome: "answered", "refused", "failed" or "overtime".
         status: what the method claims: "solved", "unreachable", "infeasible", "stalled"; empty without an answer.
         said: its message, its refusal or the exception.
@@ -107,4 +108,6 @@ class Record:
 def budget_text(level: Budget) -> str:
     """The budget as people read it."""
     tolerance, iterations = level
+    if iterations == FIRST_FIT:
+        return f"{tolerance:g}, first fit"
     return f"{tolerance:g}" if iterations is None else f"{iterations} it."

@@ -10,7 +10,10 @@ from wholebody.methods.solve import Method
 from wholebody.problem import Problem
 
 Budget = tuple[float, "int | None"]
-"""Tolerance [m, rad], and the most iterations, or None for the method's own default."""
+"""Tolerance [m, rad], and the most iterations, or None for the method's own default, or FIRST_FIT."""
+
+FIRST_FIT = -1
+"""In place of a count of iterations: the first posture that fits, whatever its measures are."""
 
 LADDER: tuple[Budget, ...] = (
     (1e-1, None),

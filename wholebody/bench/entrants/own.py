@@ -5,8 +5,25 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from wholebody.bench.entrants.base import LADDER, Budget, Entrant
+from wholebody.bench.entrants.base import FIRST_FIT, LADDER, Budget, Entrant
 from wholebody.methods.solve import Method
+
+_QP_BUDGETS: tuple[Budget, ...] = (
+    (3e-2, FIRST_FIT),
+    (3e-2, None),
+    (1e-2, None),
+    (3e-3, FIRST_FIT),
+    (3e-3, None),
+    (1e-3, FIRST_FIT),
+    (1e-3, None),
+    (1e-4, FIRST_FIT),
+    (1e-5, FIRST_FIT),
+    (1e-5, None),
+    (1e-6, FIRST_FIT),
+    (1e-6, None),
+    (1e-8, FIRST_FIT),
+    (1e-8, None),
+)
 
 NEWTONS: dict[str, dict[str, Any]] = {
     "slack": {"inequalities": "slack"},
@@ -27,9 +44,9 @@ def qp_entrant(solver: str, package: str | None = None) -> Entrant:
     return Entrant(
         name=f"qp/{solver}",
         make=partial(_qp, solver),
-        loose=(*_few(3, 6, 12, 25), *LADDER[1:]),
+        loose=_QP_BUDGETS,
         setup=f"wb.QP(solver={solver!r}), all else as it comes: stages and seeded starts follow where the first "
-        "descent does not reach the goals. A budget of few iterations has one descent only.",
+        "descent does not reach the goals. Budgets of first fit are wb.QP(measures=False).",
         package=package,
     )
 
@@ -107,9 +124,7 @@ def _few(*iterations: int) -> tuple[Budget, ...]:
 def _qp(solver: str, tolerance: float, iterations: int | None) -> Method:
     from wholebody.methods.qp.method import QP
 
-    if iterations is None:
-        return QP(solver=solver, tolerance=tolerance)
-    return QP(solver=solver, tolerance=tolerance, iterations=iterations, budget=0, restarts=0)
+    return QP(solver=solver, tolerance=tolerance, measures=iterations != FIRST_FIT)
 
 
 def _ccd(tolerance: float, iterations: int | None) -> Method:

@@ -80,7 +80,8 @@ class Descent:
         offset: (goal rows,) subtracted from the goal errors: a nearer goal on the way to the true one.
         trace: grows by one entry an iteration.
         note: what to call the iterations in the trace.
-        measures: whether the measures count from the beginning; without them only the goals are sought.
+        measures: whether the measures count from the beginning; without them only the goals are sought, and the first
+            posture that fits is the end.
         hasty: whether to give up where the violation hardly lessens for a while.
     """
 
@@ -115,6 +116,9 @@ class Descent:
         history: list[float] = []
         count, converged, renewals = 0, False, RENEWALS
         while count < self.iterations:
+            if not self.measures and here.violation.worst <= self.tolerance:
+                converged = True
+                break
             count += 1
             program = self.subproblem.program(
                 here.at, here.rows, self._radius, self._pull, self._damping, self._shift, self._measures

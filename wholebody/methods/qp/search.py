@@ -34,6 +34,7 @@ class Settings(NamedTuple):
     budget: int
     restarts: int
     seed: int
+    measures: bool
 
 
 class Search:
@@ -137,7 +138,7 @@ class Search:
         # it began at the best and came to rest: nothing nearer is near that
         best = self.best._replace(converged=self.best.converged or nearest.converged)
         self._best = best
-        if best.violation.left > tolerance and self.problem.measures:
+        if best.violation.left > tolerance and self.problem.measures and self.settings.measures:
             local = self._stay(best)
             if _held(local, tolerance) and local.violation.left <= best.violation.left + tolerance:
                 self._best = local
@@ -185,7 +186,7 @@ class Search:
     ) -> Descent:
         return Descent(
             self.subproblem, self.lineariser, self.solver, self.settings.tolerance, iterations, offset, self.trace,
-            note, measures, hasty,
+            note, measures and self.settings.measures, hasty,
         )  # fmt: skip
 
     def _accept(self, local: Local, how: str) -> bool:

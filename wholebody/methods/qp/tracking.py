@@ -79,17 +79,21 @@ class Tracker:
         self._support = self._lineariser.state.support[proximity.joint[self._moving]]
         self._reach = proximity.reach[self._moving]
 
-    def step(self, q: Array) -> Step:
-        """One step from q, shape (nq,); a posture out of limits is brought back first."""
+    def step(self, q: Array, measures: bool = True) -> Step:
+        """One step from q, shape (nq,); a posture out of limits is brought back first.
+
+        Without `measures` it is the least step that meets the goals, which puts right what a step with them left: it
+        ends as near to the goals as its own curvature lets it, and does not go on to improve the measures.
+        """
         self.problem.check_fresh()
         if self.problem.goals is not self._lineariser.goals:
             self._retarget()
-        at, rows, program, answer = self._solved(q)
+        at, rows, program, answer = self._solved(q, measures)
         motion, turn = self._motion(answer.x)
         if motion > 0.5 * self._within and rows.lack.max(initial=0.0) > UNSEEN:
             # something came in fast: to get out of its way, one must look as far as one has to go
             self._within = min(HEADROOM * motion, LARGEST_WITHIN)
-            at, rows, program, answer = self._solved(q)
+            at, rows, program, answer = self._solved(q, measures)
             motion, turn = self._motion(answer.x)
         share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
         displacement = answer.x if share == 1.0 else share * answer.x
@@ -102,12 +106,12 @@ class Tracker:
             answer.iterations, answer.by, share,
         )  # fmt: skip
 
-    def _solved(self, q: Array) -> tuple[Linearisation, Rows, QuadraticProgram, QPSolution]:
+    def _solved(self, q: Array, measures: bool) -> tuple[Linearisation, Rows, QuadraticProgram, QPSolution]:
         """Linearisation, rows, program and its answer at a posture (nq,)."""
         at = self._lineariser.at(q, self._within)
         rows = self._subproblem.rows(at)
         program = self._subproblem.program(
-            at, rows, RADIUS, PULL * RADIUS, DAMPING, np.zeros(len(rows.soft_error)), True
+            at, rows, RADIUS, PULL * RADIUS, DAMPING, np.zeros(len(rows.soft_error)), measures
         )
         return at, rows, program, self._working_set.solve(program, rows.key)
 
