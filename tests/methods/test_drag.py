@@ -104,3 +104,25 @@ def test_a_frame_by_quadratic_programs_is_as_near_as_it_is_asked_for(scene: wb.S
         measures.append(wb.assess(problem, q).measure)
     assert spent[0] < spent[1] < spent[2]
     assert max(measures) < 1.01 * min(measures)
+
+
+@pytest.mark.parametrize("speed", [0.3, 1.5])
+@pytest.mark.parametrize("method", ["ccd", "newton", "qp"])
+def test_an_arm_gives_way_to_what_comes_into_it_and_comes_back(planar_arm, method: str, speed: float) -> None:
+    """A ball is pushed 25 cm into where the forearm is, and taken away again; the goal stays where the tip was."""
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.08), name="ball", at=(0.7, 0.6, 0.0))
+    start = np.array([0.1, 0.2, 0.2])
+    tip = scene.state(start).frame(scene.frame_id("tip")).translation.copy()
+    problem = wb.Problem(scene, start, goals=[wb.Point("tip", tip)])
+    drag = wb.Drag(problem, method)
+    down = np.arange(0.6, 0.0, -speed / 60.0)
+    before, errors = drag.q, []
+    for y in [*down, *down[::-1], *[0.6] * 20]:
+        scene.move("ball", at=(0.7, float(y), 0.0))
+        errors.append(drag.to(tip).error)
+        assert wb.assess(problem, drag.q).penetration < 1e-3
+        assert scene.sweeper.first_contact(before, drag.q, tolerance=1e-3) is None
+        assert scene.figure.within_limits(drag.q)
+        before = drag.q
+    assert max(errors) > 0.05  # it had to give way
+    assert drag.finish().assessment.goal_error < 1.1e-5

@@ -112,18 +112,22 @@ class Drag:
     def _followed(self) -> int:
         """Move to a posture whose way is free, nearer to the goal by as long a leg as goes; the iterations it took."""
         goal, spent = moving_goal(self.problem, self._number), 0
+        tried: list[Array] = []
         left = goal.error(self.problem.scene.state(self.q))
         error = max(float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:])))
         for leg in LEGS:
             if leg < error:
                 retarget(self.problem, self._number, part_way(self.problem, goal, self.q, leg / error))
             elif np.isfinite(leg):
-                break  # the goal is no farther than that, and was asked for already
+                continue  # the goal is no farther than that, and was asked for already
             q, iterations, short = self._attempt()
             spent, q = spent + iterations, self._bounded(q)
-            if _free(self.problem, self.q, q, short) or self._leaves(q):
+            if _free(self.problem, self.q, q, short):
                 self.q = q
                 break
+            tried.append(q)
+        else:
+            self._leave(tried)
         retarget(self.problem, self._number, goal.target)
         return spent
 
@@ -148,12 +152,19 @@ class Drag:
         share = float(np.min(np.where(np.abs(way) > most, most / np.maximum(np.abs(way), 1e-12), 1.0)))
         return q if share >= 1.0 else np.asarray(pin.integrate(scene.model, self.q, share * way))
 
-    def _leaves(self, q: Array) -> bool:
-        """Whether something came into the figure, and q (nq,) is less deep in it; newton sees to that by itself."""
-        if isinstance(self.method, Newton):
-            return False
+    def _leave(self, tried: list[Array]) -> None:
+        """Where something came into the figure: out of it, by a way that gets no deeper if there is one.
+
+        "ccd" pushes the present posture out; others come out only where a posture (nq,) that was tried does. "newton"
+        sees to it in its own steps.
+        """
         deep = _depth(self.problem, self.q)
-        return deep > GRAZE and _depth(self.problem, q) < deep
+        if deep <= GRAZE or isinstance(self.method, Newton):
+            return
+        pushed = [self.method.pushed_out(self.problem, self.q)] if isinstance(self.method, CCD) else []
+        out = [q for q in map(self._bounded, [*pushed, *tried]) if _depth(self.problem, q) < deep]
+        free = (q for q in out if _free(self.problem, self.q, q, 0.0))
+        self.q = next(free, out[0] if out else self.q)
 
 
 def qp_frame(method: QP, problem: Problem, q: Array, dt: float, tolerance: float) -> tuple[Array, int]:

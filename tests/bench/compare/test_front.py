@@ -76,6 +76,21 @@ def test_failures_are_infinitely_slow() -> None:
     assert found.method == ""
 
 
+def test_nine_in_ten_count_where_a_method_must_not_fail() -> None:
+    """The fast one solves three of five: it is ahead by the median, and nowhere by nine in ten."""
+    fast = curve_of("other", (1e-4, 0.001, 1e-5))
+    broken = [one if one.number < 3 else record("other", one.number, 1e-4, 0.001, inf, outcome=FAILED) for one in fast]
+    both = results(OURS_CURVE, broken)
+    assert time_to(both, "s", "other", WORST, 1e-3, frozenset(CASES)) == pytest.approx(0.001)
+    assert isinf(time_to(both, "s", "other", WORST, 1e-3, frozenset(CASES), 0.9))
+    assert time_to(both, "s", OURS, WORST, 1e-3, frozenset(CASES), 0.9) == pytest.approx(0.080)
+    by_median, by_most = front(both, "s", WORST), front(both, "s", WORST, share=0.9)
+    assert by_median is not None
+    assert not by_median.on_front
+    assert by_most is not None
+    assert by_most.on_front
+
+
 def test_an_answer_inside_of_something_is_no_accurate_one() -> None:
     inside = [record("other", number, 1e-4, 0.001, 1e-6, penetration=0.05) for number in CASES]
     for quantity in (WORST, GOAL, EFFORT):

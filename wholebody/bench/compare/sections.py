@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import inf, isfinite
 
 from wholebody.bench.compare.advice import words
 from wholebody.bench.compare.blocks import Block, Chart, Heading, Table, Text
-from wholebody.bench.compare.front import OURS, Rival, fronts
+from wholebody.bench.compare.front import MOST, OURS, Rival, fronts
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.summary import Summary
+from wholebody.bench.entrants.base import Entrant
 from wholebody.bench.problem_sets.case import ProblemSet
 
 
@@ -50,9 +51,9 @@ def _row(row: Summary, moving: bool) -> list[str]:
     return [*cells, f"{100 * row.effort:.2g} %" if isfinite(row.effort) else ""]
 
 
-def front_part(results: Results) -> list[Block]:
-    """Whether our method is on the front of every chart, by wall time and by the processor's."""
-    wall, processor = fronts(results), fronts(results.by_processor())
+def front_part(results: Results, entrants: Sequence[Entrant]) -> list[Block]:
+    """Whether our method is on the front of every chart, by wall time, the processor's, and nine problems in ten."""
+    wall, processor, dependable = fronts(results), fronts(results.by_processor()), fronts(results, share=MOST)
     if not wall:
         return [Text(f"`{OURS}` did not take part, so nothing is said about its front.")]
     off = [rival for rival in wall if not rival.on_front]
@@ -62,27 +63,45 @@ def front_part(results: Results) -> list[Block]:
         else f"`{OURS}` is on the front of {len(wall) - len(off)} of {len(wall)} charts."
     )
     columns = ("problems", "chart", "on the front", "nearest or faster", "at accuracy", f"{OURS} ms", "other ms",
-               "ratio", "ratio by CPU time", "problems compared")  # fmt: skip
-    by_cpu = {(rival.set, rival.quantity): rival for rival in processor}
+               "ratio", "ratio by CPU time", "ratio for nine in ten", "problems compared")  # fmt: skip
+    still = sum(rival.on_front for rival in dependable)
+    by_cpu, by_most = ({(rival.set, rival.quantity): rival for rival in rivals} for rivals in (processor, dependable))
+    ahead = sorted({rival.method for rival in off})
+    known = {entrant.name: entrant.differences for entrant in entrants}
     return [
         Text(
             f"A method is on the front where no other is faster at any accuracy from 1e-3 down to 1e-8. The time to an "
             "accuracy is the least over the budgets of the median over the problems, a failure counting as infinitely "
-            f"long; methods are compared on the problems that both solved at all budgets. {verdict} A ratio above 1 "
-            "says how many times longer it takes than the fastest other, at the accuracy where that is worst."
+            f"long; methods are compared on the problems that both were given at all budgets. {verdict} By the time in "
+            f"which nine problems in ten are solved, instead of half of them, it is on the front of {still}. A ratio "
+            "above 1 says how many times longer it takes than the fastest other, at the accuracy where that is worst."
         ),
-        Table(columns, [_rival(rival, by_cpu.get((rival.set, rival.quantity))) for rival in wall]),
+        *([Text(f"What is ahead of it somewhere: {'; '.join(_known(name, known) for name in ahead)}.")] if off else []),
+        Table(
+            columns,
+            [_rival(rival, *(other.get((rival.set, rival.quantity)) for other in (by_cpu, by_most))) for rival in wall],
+        ),
     ]
 
 
-def _rival(rival: Rival, processor: Rival | None) -> list[str]:
+def _known(name: str, differences: Mapping[str, Sequence[str]]) -> str:
+    """A method, and what it does not do, if anything."""
+    told = differences.get(name, ())
+    return f"`{name}` ({told[0]})" if told else f"`{name}`"
+
+
+def _rival(rival: Rival, processor: Rival | None, dependable: Rival | None) -> list[str]:
     if not rival.method:
-        return [words(rival.set), rival.quantity, "yes", "no other gets there", *[""] * 5, str(rival.cases)]
+        return [words(rival.set), rival.quantity, "yes", "no other gets there", *[""] * 6, str(rival.cases)]
     return [
         words(rival.set), rival.quantity, "yes" if rival.on_front else "no", rival.method, f"{rival.accuracy:.0e}",
         _number(1e3 * rival.ours) or "never", _number(1e3 * rival.other), _ratio(rival.ratio),
-        f"{_ratio(processor.ratio)} ({processor.method})" if processor and processor.method else "", str(rival.cases),
+        _told(processor), _told(dependable), str(rival.cases),
     ]  # fmt: skip
+
+
+def _told(rival: Rival | None) -> str:
+    return f"{_ratio(rival.ratio)} ({rival.method})" if rival and rival.method else ""
 
 
 def _ratio(value: float) -> str:

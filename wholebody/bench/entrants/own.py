@@ -124,7 +124,9 @@ def _few(*iterations: int) -> tuple[Budget, ...]:
 def _qp(solver: str, tolerance: float, iterations: int | None) -> Method:
     from wholebody.methods.qp.method import QP
 
-    return QP(solver=solver, tolerance=tolerance, measures=iterations != FIRST_FIT)
+    if iterations is None or iterations == FIRST_FIT:
+        return QP(solver=solver, tolerance=tolerance, measures=iterations is None)
+    return QP(solver=solver, tolerance=tolerance, iterations=iterations, budget=0, restarts=0)
 
 
 def _ccd(tolerance: float, iterations: int | None) -> Method:

@@ -109,6 +109,14 @@ class CCD:
             message=_message(status, judgement, len(search.trace)),
         )
 
+    def pushed_out(self, problem: Problem, q: Array) -> Array:
+        """The posture q (nq,) pushed out of what it overlaps, whatever the goals are; as far out as was found.
+
+        Raises:
+            UnsupportedTermError: the problem has terms that this method cannot take.
+        """
+        return _Search(self, problem).pushed_out(q)
+
     def _status(self, best: _Trial, judgement: Assessment) -> Status:
         slack = 1.05 * self.tolerance + 1e-6
         if not judgement.holds(slack):
@@ -149,6 +157,10 @@ class _Search:
                 break
         assert best is not None
         return best
+
+    def pushed_out(self, q: Array) -> Array:
+        """A posture q (nq,) without its overlaps."""
+        return self._remover.separate(q, self._rng)[0]
 
     def _serves(self, trial: _Trial) -> bool:
         return trial.error <= SHARE * self._method.tolerance and trial.overlap <= self._touch
