@@ -22,7 +22,7 @@ from wholebody.methods.newton.method import Newton
 from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import Method
 from wholebody.problem import Problem, Solution
-from wholebody.tasks import StepLimit
+from wholebody.tasks import Frame, Point, StepLimit
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,8 @@ class Drag:
 
     "qp" makes one quadratic program a frame, seldom up to three, "newton" a few Newton steps; other methods solve every
     frame anew from the posture at hand, "ccd" to a millimetre. No method restarts elsewhere. Where the way to a posture
-    goes into something, the goal is followed by a shorter leg, or not in that frame.
+    goes into something, the goal is followed by a shorter leg, or not in that frame. Where something came into the
+    figure, getting out of it comes first.
 
     Attributes:
         problem: what is asked; its goals are replaced as they move.
@@ -110,9 +111,18 @@ class Drag:
         return solution
 
     def _followed(self) -> int:
-        """Move to a posture whose way is free, nearer to the goal by as long a leg as goes; the iterations it took."""
-        goal, spent = moving_goal(self.problem, self._number), 0
-        tried: list[Array] = []
+        """Move to a posture whose way is free, nearer to the goal by as long a leg as goes; the iterations it took.
+
+        Where something came into the figure, out of it.
+        """
+        goal, deep = moving_goal(self.problem, self._number), self._came_in()
+        try:
+            return self._follow(goal, deep)
+        finally:
+            retarget(self.problem, self._number, goal.target)
+
+    def _follow(self, goal: Point | Frame, deep: float) -> int:
+        spent, tried = 0, list[Array]()
         left = goal.error(self.problem.scene.state(self.q))
         error = max(float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:])))
         for leg in LEGS:
@@ -122,13 +132,13 @@ class Drag:
                 continue  # the goal is no farther than that, and was asked for already
             q, iterations, short = self._attempt()
             spent, q = spent + iterations, self._bounded(q)
-            if _free(self.problem, self.q, q, short):
+            if _free(self.problem, self.q, q, short) and (not deep or _depth(self.problem, q) <= GRAZE):
                 self.q = q
                 break
             tried.append(q)
         else:
-            self._leave(tried)
-        retarget(self.problem, self._number, goal.target)
+            if deep:
+                self._leave(tried, deep)
         return spent
 
     def _attempt(self) -> tuple[Array, int, float]:
@@ -152,19 +162,22 @@ class Drag:
         share = float(np.min(np.where(np.abs(way) > most, most / np.maximum(np.abs(way), 1e-12), 1.0)))
         return q if share >= 1.0 else np.asarray(pin.integrate(scene.model, self.q, share * way))
 
-    def _leave(self, tried: list[Array]) -> None:
-        """Where something came into the figure: out of it, by a way that gets no deeper if there is one.
+    def _came_in(self) -> float:
+        """How deep something is in the figure, metres; 0 for little, and for newton, which sees to that by itself."""
+        deep = 0.0 if isinstance(self.method, Newton) else _depth(self.problem, self.q)
+        return deep if deep > GRAZE else 0.0
 
-        "ccd" pushes the present posture out; others come out only where a posture (nq,) that was tried does. "newton"
-        sees to it in its own steps.
+    def _leave(self, tried: list[Array], deep: float) -> None:
+        """Out of what came in by `deep` metres, where no way that was tried is free and leads out.
+
+        "ccd" pushes the present posture out. Of this and the postures (nq,) that were tried, a free way is better than
+        one that gets deeper first, and then the less deep end.
         """
-        deep = _depth(self.problem, self.q)
-        if deep <= GRAZE or isinstance(self.method, Newton):
-            return
-        pushed = [self.method.pushed_out(self.problem, self.q)] if isinstance(self.method, CCD) else []
-        out = [q for q in map(self._bounded, [*pushed, *tried]) if _depth(self.problem, q) < deep]
-        free = (q for q in out if _free(self.problem, self.q, q, 0.0))
-        self.q = next(free, out[0] if out else self.q)
+        pushed = [self._bounded(self.method.pushed_out(self.problem, self.q))] if isinstance(self.method, CCD) else []
+        ends = ((_depth(self.problem, q), q) for q in (*pushed, *tried))
+        out = [(not _free(self.problem, self.q, q, 0.0), depth, k) for k, (depth, q) in enumerate(ends) if depth < deep]
+        if out:
+            self.q = [*pushed, *tried][min(out)[2]]
 
 
 def qp_frame(method: QP, problem: Problem, q: Array, dt: float, tolerance: float) -> tuple[Array, int]:

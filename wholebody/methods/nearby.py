@@ -54,7 +54,8 @@ def solve_nearby(problem: Problem, q: Array, method: Method) -> Solution:
     sweeper = problem.scene.sweeper
     if sweeper.first_contact(q, solution.q, tolerance=PASSING) is None:
         return solution
-    near = method.solve(begun_at(problem, q, nearest=True))
+    nearest = replace(method, measures=True) if isinstance(method, QP) else method  # the measures say what is near
+    near = nearest.solve(begun_at(problem, q, nearest=True))
     if (near.solved or not solution.solved) and sweeper.first_contact(q, near.q, tolerance=PASSING) is None:
         return replace(near, assessment=assess(problem, near.q))
     if solution.solved and not _jumps(problem, q, solution.q):

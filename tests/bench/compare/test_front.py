@@ -91,6 +91,20 @@ def test_nine_in_ten_count_where_a_method_must_not_fail() -> None:
     assert by_most.on_front
 
 
+def test_where_nobody_gets_there_ours_is_on_no_front() -> None:
+    """Four of five are solved by both: enough for the median, by nine in ten it is nowhere."""
+    ours, other = (
+        [one if one.number else record(name, 0, one.tolerance, 0.001, inf, outcome=FAILED) for one in curve]
+        for name, curve in ((OURS, OURS_CURVE), ("other", curve_of("other", (1e-4, 0.1, 1e-5))))
+    )
+    both = results(ours, other)
+    by_median, by_most = front(both, "s", WORST), front(both, "s", WORST, share=0.9)
+    assert by_median is not None
+    assert by_median.method == "other"
+    assert by_most is not None
+    assert (by_most.method, by_most.on_front) == ("", False)
+
+
 def test_an_answer_inside_of_something_is_no_accurate_one() -> None:
     inside = [record("other", number, 1e-4, 0.001, 1e-6, penetration=0.05) for number in CASES]
     for quantity in (WORST, GOAL, EFFORT):

@@ -11,7 +11,10 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench import style
+from wholebody.bench.compare.settings import Settings
 from wholebody.bench.entrants import Entrant, Prepared, entrants, missing, names, set_up
+from wholebody.bench.entrants.base import FIRST_FIT
+from wholebody.bench.problem_sets.registry import SETS
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
 INSTALLED = entrants()
@@ -140,3 +143,17 @@ def test_every_entrant_has_a_colour_and_a_marker_of_its_own() -> None:
     known = [name for name in names() if name in style.MARKERS]
     assert {"qp/osqp", "qp/daqp", "newton/slack", "ccd", "dls", "placo", "pink", "mink"} <= set(known)
     assert len({style.color(name) for name in known}) == len({style.marker(name) for name in known}) == len(known)
+
+
+def test_budgets_of_first_fit_leave_the_measures_out_and_have_no_part_in_drags(table: wb.Problem) -> None:
+    (entrant,) = entrants(["qp/osqp"])
+    solutions = [entrant.make(1e-4, most).solve(table) for most in (None, FIRST_FIT)]
+    assert all(solution.solved for solution in solutions)
+    assert solutions[1].iterations < solutions[0].iterations
+    assert solutions[1].assessment.measure > solutions[0].assessment.measure
+    kinds = [level[1] for level in entrant.loose]
+    assert FIRST_FIT in kinds
+    assert FIRST_FIT not in kinds[kinds.index(None) :]
+    settings = Settings(sets=tuple(SETS.values()), entrants=(entrant,))
+    assert FIRST_FIT in [level[1] for level in settings.ladder(entrant)]
+    assert FIRST_FIT not in [level[1] for level in settings.ladder(entrant, moving=True)]

@@ -133,3 +133,21 @@ def test_what_cannot_be_taken_is_named(human: wb.Figure) -> None:
 def test_settings_out_of_range(settings: dict[str, Any]) -> None:
     with pytest.raises(wb.InputError):
         wb.CCD(**settings)
+
+
+def test_an_arm_is_pushed_out_of_what_came_onto_it(planar_arm: Callable[..., wb.Figure]) -> None:
+    """A ball 15 mm deep in the middle link: the arm turns away from it, and no farther than that takes."""
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.08), name="ball", at=(0.7, 0.6, 0.0))
+    q = np.array([0.1, 0.0, 0.0])
+    middle = scene.state(q).frame(scene.frame_id("tip")).translation * (0.7 / 1.2)
+    problem = wb.Problem(scene, q, goals=[wb.Point("tip", (1.0, 0.2, 0.0))])
+    across = np.array([-np.sin(0.1), np.cos(0.1), 0.0])
+    scene.move("ball", at=tuple(middle + (0.08 + 0.02 - 0.015) * across))
+    assert wb.assess(problem, q).penetration == pytest.approx(0.015, abs=1e-6)
+    out = wb.CCD().pushed_out(problem, q)
+    assert wb.assess(problem, out).penetration < 1e-4
+    assert 1e-4 < np.abs(out - q).max() < 0.2
+    assert scene.sweeper.first_contact(q, out, tolerance=5e-4) is None
+    scene.add(wb.Sphere(0.1), name="more")
+    with pytest.raises(wb.InputError):
+        wb.CCD().pushed_out(problem, q)

@@ -268,7 +268,7 @@ def test_a_limb_gets_out_of_the_way_of_a_thrown_ball(planar_arm, least_distance,
         assert least_distance(scene, q) > -2e-4, frame
 
 
-def test_steps_without_measures_converge_quadratically_and_change_nothing_else(planar_arm):
+def test_steps_without_measures_converge_quadratically_and_stay_where_goals_are_met(planar_arm):
     """What a step with measures leaves of a goal is squared by each step without; at the goal nothing moves."""
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
     start = np.array([0.4, 0.9, 0.3])

@@ -17,7 +17,7 @@ class Point(NamedTuple):
         level: the budget.
         cases: how many it stands for.
         seconds, seconds_p95: median, and 95 %, of the call [s].
-        value: median; infinite where half of the answers or more are none.
+        value: median; infinite where more than half of the answers are none.
         low, high: quartiles.
     """
 

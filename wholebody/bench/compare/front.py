@@ -23,7 +23,7 @@ ACCURACIES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 1e-7, 1e-8)
 """From where an accuracy is worth the name to where coal's distances end."""
 
 OURS = "qp/osqp"
-"""What `wb.QP()` is."""
+"""Our default solver, with all its budgets: with least measures as `wb.QP()` has it, and the first that fits."""
 
 HALF, MOST = 0.5, 0.9
 """Shares of the cases that the time to an accuracy is of: the median, and nine in ten."""
@@ -38,7 +38,7 @@ class Rival:
 
     Attributes:
         set, quantity: which chart.
-        method: which other method; empty where none is faster at any accuracy.
+        method: which other method; empty where no other gets to any accuracy.
         accuracy: at which the ratio is greatest.
         ratio: our time over the other's there; up to 1 we are on the front. Infinite where we do not get there.
         ours, other: seconds.
@@ -100,7 +100,8 @@ def front(results: Results, family: str, quantity: Quantity, ours: str = OURS, s
             if worst is None or rival.ratio > worst.ratio:
                 worst = rival
     if worst is None:
-        return Rival(family, quantity.name, "", 0.0, 0.0, 0.0, inf, len(own))
+        here = time_to(results, family, ours, quantity, ACCURACIES[0], own, share)
+        return Rival(family, quantity.name, "", ACCURACIES[0], 0.0 if here < inf else inf, here, inf, len(own))
     return worst
 
 

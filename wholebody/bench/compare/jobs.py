@@ -12,7 +12,7 @@ from wholebody.bench.compare.messages import Build, Solve
 from wholebody.bench.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Record
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.compare.worker import EndedError, Worker, own_worker
-from wholebody.bench.entrants.base import Budget, Entrant
+from wholebody.bench.entrants.base import FIRST_FIT, Budget, Entrant
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.errors import MissingPackageError, WholebodyError
 
@@ -64,17 +64,22 @@ def work(task: Task) -> Chunk:
 def _sweep(
     worker: Worker, entrant: Entrant, ladder: Iterable[Budget], task: Task, first: Record, ended: bool
 ) -> list[Record]:
-    """All further budgets; where the process has ended over one, the rest count as what they would have been."""
+    """All further budgets; where the process has ended over one, the rest count as what they would have been.
+
+    Budgets of first fit are cheaper than all others, and count for themselves.
+    """
     records: list[Record] = []
     if first.outcome == REFUSED:
         return records
-    last = first
+    last = {False: (first, ended), True: (first, False)}
     for level in ladder:
-        if not ended:
-            last, ended = _solve(worker, entrant, level, task)
-            records.append(last)
+        kind = level[1] == FIRST_FIT
+        record, over = last[kind]
+        if not over:
+            last[kind] = record, over = _solve(worker, entrant, level, task)
+            records.append(record)
         else:
-            records.append(replace(last, tolerance=level[0], budget=level[1] or 0))
+            records.append(replace(record, tolerance=level[0], budget=level[1] or 0))
     return records
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
-from wholebody.bench.entrants.base import FIRST_FIT, Budget
+from wholebody.bench.entrants.base import Budget
 
 DEFAULT: Budget = (1e-4, None)
 """The budget at which all cases are solved: a tenth of a millimetre and of a milliradian, iterations as they come."""
@@ -103,11 +103,3 @@ class Record:
     def false_claim(self) -> bool:
         """Whether the method calls solved what is judged to be off by more than it was asked for, and than 1 mm."""
         return self.status == "solved" and self.worst > max(COARSE, 1.05 * self.tolerance)
-
-
-def budget_text(level: Budget) -> str:
-    """The budget as people read it."""
-    tolerance, iterations = level
-    if iterations == FIRST_FIT:
-        return f"{tolerance:g}, first fit"
-    return f"{tolerance:g}" if iterations is None else f"{iterations} it."

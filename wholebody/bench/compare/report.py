@@ -139,12 +139,13 @@ def _reading(given: Material) -> list[Block]:
         Heading(2, "How to read the charts"),
         Points(
             [
-                "Down and to the left is better: more accurate, sooner. Each marker is one budget (a tolerance, or a "
-                "number of iterations): its median time and median error over the same problems; thin bars show the "
-                "quartiles of the error and 95 % of the time. The line joins the best budgets of a method.",
+                "Down and to the left is better: more accurate, sooner. Each marker is one budget (a tolerance, a "
+                "number of iterations, or for qp the first posture that fits at a tolerance): its median time and "
+                "median error over the same problems; thin bars show the quartiles of the error and 95 % of the time. "
+                "The line joins the best budgets of a method.",
                 "**Worst of all** is the accuracy of an answer: the largest of goal error, overlap, lack of clearance, "
                 "violated limits and constraints. In the other panels an answer that fails in anything else by more "
-                "than 1 mm or mrad is none; an empty marker in the red band says that half of them or more are.",
+                "than 1 mm or mrad is none; an empty marker in the red band says that more than half of them are.",
                 "Errors below 1e-9 are drawn as 1e-9. Effort is compared with the least that is known of the problem, "
                 "from the witness and from all answers exact to 1e-6.",
                 f"The steps show the share of problems solved within a time at the tolerance {DEFAULT[0]:g}; the "

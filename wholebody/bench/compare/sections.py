@@ -70,13 +70,18 @@ def front_part(results: Results, entrants: Sequence[Entrant]) -> list[Block]:
     known = {entrant.name: entrant.differences for entrant in entrants}
     return [
         Text(
-            f"A method is on the front where no other is faster at any accuracy from 1e-3 down to 1e-8. The time to an "
+            "A method is on the front where no other is faster at any accuracy from 1e-3 down to 1e-8. The time to an "
             "accuracy is the least over the budgets of the median over the problems, a failure counting as infinitely "
-            f"long; methods are compared on the problems that both were given at all budgets. {verdict} By the time in "
-            f"which nine problems in ten are solved, instead of half of them, it is on the front of {still}. A ratio "
-            "above 1 says how many times longer it takes than the fastest other, at the accuracy where that is worst."
+            "long; budgets of first fit count with the others. Methods are compared on the problems that both were "
+            f"given at all budgets. {verdict} By the time in which nine problems in ten are solved, instead of half "
+            f"of them, it is on the front of {still}. A ratio above 1 says how many times longer it takes than the "
+            "fastest other, at the accuracy where that is worst."
         ),
-        *([Text(f"What is ahead of it somewhere: {'; '.join(_known(name, known) for name in ahead)}.")] if off else []),
+        *(
+            [Text(f"What is farthest ahead of it in a chart: {'; '.join(_known(name, known) for name in ahead)}.")]
+            if off
+            else []
+        ),
         Table(
             columns,
             [_rival(rival, *(other.get((rival.set, rival.quantity)) for other in (by_cpu, by_most))) for rival in wall],
@@ -92,7 +97,9 @@ def _known(name: str, differences: Mapping[str, Sequence[str]]) -> str:
 
 def _rival(rival: Rival, processor: Rival | None, dependable: Rival | None) -> list[str]:
     if not rival.method:
-        return [words(rival.set), rival.quantity, "yes", "no other gets there", *[""] * 6, str(rival.cases)]
+        there = "no other gets there" if rival.on_front else "none gets there"
+        shown = "yes" if rival.on_front else "no"
+        return [words(rival.set), rival.quantity, shown, there, *[""] * 5, _told(dependable), str(rival.cases)]
     return [
         words(rival.set), rival.quantity, "yes" if rival.on_front else "no", rival.method, f"{rival.accuracy:.0e}",
         _number(1e3 * rival.ours) or "never", _number(1e3 * rival.other), _ratio(rival.ratio),
@@ -101,7 +108,9 @@ def _rival(rival: Rival, processor: Rival | None, dependable: Rival | None) -> l
 
 
 def _told(rival: Rival | None) -> str:
-    return f"{_ratio(rival.ratio)} ({rival.method})" if rival and rival.method else ""
+    if rival is None or not rival.method:
+        return "" if rival is None else "no other" if rival.on_front else "none"
+    return f"{_ratio(rival.ratio)} ({rival.method})"
 
 
 def _ratio(value: float) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wholebody.bench.compare.record import DEFAULT
-from wholebody.bench.entrants.base import Budget, Entrant
+from wholebody.bench.entrants.base import FIRST_FIT, Budget, Entrant
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.errors import InputError
 from wholebody.version import __version__
@@ -72,7 +72,7 @@ class Settings:
 
     def ladder(self, entrant: Entrant, moving: bool = False) -> list[Budget]:
         """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`."""
-        listed = [level for level in entrant.loose if level != DEFAULT]
+        listed = [level for level in entrant.loose if level != DEFAULT and not (moving and level[1] == FIRST_FIT)]
         most = min(self.levels, MOVING_LEVELS) if moving else self.levels
         if len(listed) <= most:
             return listed

@@ -47,8 +47,8 @@ class Entrant:
 
     Attributes:
         name: "qp/osqp", "ccd", "newton/slack", ...; it has one colour in all charts.
-        make: a fresh method from a tolerance and the most iterations (None for its own default).
-        loose: budgets from cheap to exact, that draw its curve of speed against accuracy.
+        make: a fresh method from a tolerance and the most iterations, as in a `Budget`.
+        loose: budgets from cheap to exact, that draw its curve of speed against accuracy; those of first fit go before.
         setup: how it was set up, for reports.
         differences: what it cannot express, or does otherwise; one sentence each.
         package: what has to be installed for it; None where it comes with wholebody.

@@ -9,20 +9,8 @@ from wholebody.bench.entrants.base import FIRST_FIT, LADDER, Budget, Entrant
 from wholebody.methods.solve import Method
 
 _QP_BUDGETS: tuple[Budget, ...] = (
-    (3e-2, FIRST_FIT),
-    (3e-2, None),
-    (1e-2, None),
-    (3e-3, FIRST_FIT),
-    (3e-3, None),
-    (1e-3, FIRST_FIT),
-    (1e-3, None),
-    (1e-4, FIRST_FIT),
-    (1e-5, FIRST_FIT),
-    (1e-5, None),
-    (1e-6, FIRST_FIT),
-    (1e-6, None),
-    (1e-8, FIRST_FIT),
-    (1e-8, None),
+    *((tolerance, FIRST_FIT) for tolerance in (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),
+    *LADDER[1:],
 )
 
 NEWTONS: dict[str, dict[str, Any]] = {
@@ -46,7 +34,8 @@ def qp_entrant(solver: str, package: str | None = None) -> Entrant:
         make=partial(_qp, solver),
         loose=_QP_BUDGETS,
         setup=f"wb.QP(solver={solver!r}), all else as it comes: stages and seeded starts follow where the first "
-        "descent does not reach the goals. Budgets of first fit are wb.QP(measures=False).",
+        "descent does not reach the goals. Budgets of first fit are wb.QP(measures=False), those of "
+        "few iterations have one descent only.",
         package=package,
     )
 

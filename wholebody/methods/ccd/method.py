@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
+from wholebody.methods.ccd.overlap import SHAKES
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.remover import TOUCH, Remover
 from wholebody.methods.ccd.terms import read
@@ -110,11 +111,15 @@ class CCD:
         )
 
     def pushed_out(self, problem: Problem, q: Array) -> Array:
-        """The posture q (nq,) pushed out of what it overlaps, whatever the goals are; as far out as was found.
+        """Where pushing the posture q (nq,) out of what it overlaps ends, whatever the goals are.
+
+        It may be inside of something still, where nothing leads out.
 
         Raises:
             UnsupportedTermError: the problem has terms that this method cannot take.
+            InputError: the scene changed after the problem was stated.
         """
+        problem.check_fresh()
         return _Search(self, problem).pushed_out(q)
 
     def _status(self, best: _Trial, judgement: Assessment) -> Status:
@@ -159,8 +164,16 @@ class _Search:
         return best
 
     def pushed_out(self, q: Array) -> Array:
-        """A posture q (nq,) without its overlaps."""
-        return self._remover.separate(q, self._rng)[0]
+        """Where pushing a posture q (nq,) out ends, or pushing one a little beside it, where that leads farther out."""
+        least, out = inf, q
+        for size in (0.0, *SHAKES):
+            shaken = self._reach.disturbed(q, size, self._rng) if size else q
+            pushed, left = self._remover.separate(shaken, self._rng)
+            if self._remover.deepest < least:
+                least, out = self._remover.deepest, pushed
+            if not left:
+                break
+        return out
 
     def _serves(self, trial: _Trial) -> bool:
         return trial.error <= SHARE * self._method.tolerance and trial.overlap <= self._touch
