@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.bench.stability.starts import Cancelling
 
 LENGTHS = (0.5, 0.4)
 
@@ -303,3 +304,13 @@ def test_a_start_that_fits_is_the_first_that_does(planar_arm):
     solution = wb.QP(measures=False).solve(problem)
     assert solution.iterations == 0
     assert solution.q == pytest.approx(start, abs=1e-12)
+
+
+def test_a_start_whose_contacts_cancel_ends_outside(honest):
+    """A fork over a plate too thick for it: both prongs push, in opposite directions, and no gradient is left."""
+    problem = Cancelling().question().problem
+    assert wb.assess(problem, problem.start).penetration > 0.01
+    solution = honest(problem, wb.solve(problem))
+    assert solution.status == "unreachable"
+    assert solution.assessment.penetration < 1e-5
+    assert solution.assessment.goal_error < 0.15  # 0.12 is the nearest place

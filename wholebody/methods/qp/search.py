@@ -107,6 +107,8 @@ class Search:
             if ghost.violation.left > REACHED * self.settings.tolerance:
                 continue
             scout = self._scout(ghost.q, 0.0)
+            if not _held(scout, self.settings.tolerance) and not _held(self.best, self.settings.tolerance):
+                scout = self._scout(q, 0.0)  # nothing leads out from there; to be outside comes before the goals
             reached = scout.violation.worst <= self.settings.tolerance
             yield self._try(scout.q, "restart") if reached else scout, "from another start"
 
