@@ -245,3 +245,46 @@ def test_the_nearest_ring_is_nearer_than_what_least_steps_find() -> None:
     near = errors[(errors < 0.05) & (errors > 1e-12)]
     assert (near[1:] <= 50.0 * near[:-1] ** 2 + 1e-10).all()
     assert way(nearest, start) < way(stepped, start) - 1e-6
+
+
+def _bar(x: float, z: float, angle: float) -> pin.SE3:
+    """Placement of a bar that begins at (x, z) and rises from x by an angle; turns about y lower z."""
+    return pin.SE3(pin.rpy.rpyToMatrix(0.0, -angle, 0.0), np.array((x, 0.0, z)))
+
+
+def _scissor_lift(stages: int, angle: float, length: float) -> Assembly:
+    """Crossed bars on crossed bars; one foot is pinned, one rolls on the ground, the platform lies on the last two."""
+    wide, high, made = length * np.cos(angle), length * np.sin(angle), Assembly()
+    for k in range(stages):
+        made.body(f"up{k}", _bar(0.0, k * high, angle), size=length)
+        made.body(f"down{k}", _bar(wide, k * high, np.pi - angle), size=length)
+        made.revolute(f"up{k}", f"down{k}", at=(wide / 2.0, 0.0, (k + 0.5) * high), axis=Y)
+        if k:
+            made.revolute(f"down{k - 1}", f"up{k}", at=(0.0, 0.0, k * high), axis=Y)
+            made.revolute(f"up{k - 1}", f"down{k}", at=(wide, 0.0, k * high), axis=Y)
+    top = stages * high
+    made.body("platform", (0.0, 0.0, top), size=length).revolute("world", "up0", at=(0.0, 0.0, 0.0), axis=Y)
+    made.on_plane("down0", (0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0), through=(0.0, 0.0, 0.0))
+    made.revolute(f"down{stages - 1}", "platform", at=(0.0, 0.0, top), axis=Y)
+    here = {"normal": (0.0, 0.0, 1.0), "through": (0.0, 0.0, 0.0)}
+    return made.on_plane(f"up{stages - 1}", (length, 0.0, 0.0), of="platform", **here)
+
+
+@pytest.mark.parametrize("stages", [1, 4, 12])
+def test_a_scissor_lift_rises_level_with_all_its_bars_alike(stages: int) -> None:
+    """One degree of freedom and many redundant loops: the height says how steep every bar is."""
+    length = 0.5
+    made = _scissor_lift(stages, 0.3, length)
+    for angle in (0.5, 1.1, 0.2):
+        height = stages * length * np.sin(angle)
+        answer = made.drop_goals().point_goal("platform", (0.0, 0.0, height)).solve(tolerance=1e-9)
+        assert answer.status == "solved", answer.message
+        assert pin.log3(answer.placements["platform"].rotation) == pytest.approx(np.zeros(3), abs=1e-8)
+        for k in range(stages):
+            ends = (answer.placements[f"up{k}"].act(np.array((x, 0.0, 0.0))) for x in (0.0, length))
+            low, high = (k * length * np.sin(angle), (k + 1) * length * np.sin(angle))
+            for end, wanted in zip(ends, ((0.0, 0.0, low), (length * np.cos(angle), 0.0, high)), strict=True):
+                assert end == pytest.approx(np.array(wanted), abs=1e-7)
+    beyond = made.drop_goals().point_goal("platform", (0.0, 0.0, stages * length + 0.1)).solve()
+    assert beyond.status == "unreachable"
+    assert beyond.placements["platform"].translation[2] == pytest.approx(stages * length, abs=2e-3)
