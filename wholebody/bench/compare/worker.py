@@ -22,6 +22,7 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_
 """Set to 1 in the process, so that methods are compared on one core each."""
 
 ORPHANED = 1.0  # s: how often a process looks whether its parent is still there
+FULL = 2e9  # bytes: a process that holds more is started anew; placo's robots stay in memory (some 6 MB each) for ever
 
 _local = threading.local()
 
@@ -48,11 +49,13 @@ class Worker:
         self._built: Build | None = None
 
     def build(self, request: Build) -> str | None:
-        """Build a case; return what went wrong, if anything did.
+        """Build a case, in a new process where this one holds more memory than `FULL`; return what went wrong, if any.
 
         Raises:
             EndedError: the process has ended over it.
         """
+        if self._process is not None and _memory(self._process.pid) > FULL:
+            self.close()
         self._built = request
         answer: str | None = self._ask(request)
         return answer
@@ -124,6 +127,15 @@ class Worker:
             return EndedError("ended because it took too long", overtime=True)
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
         return EndedError(f"the process ended with {how}{said}", overtime=False)
+
+
+def _memory(process: int) -> float:
+    """Return the bytes of memory that a process holds; 0 where the system does not say."""
+    try:
+        pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
+    except OSError:
+        return 0.0
+    return float(pages * os.sysconf("SC_PAGE_SIZE"))
 
 
 def own_worker() -> Worker:
