@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.large_models import geometry_model
+from wholebody.geometry.moved_pairs import compiled_kernel
 from wholebody.geometry.proximity import Proximity
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ class SceneGeometry:
         self.geometry, self.owners, self.pieces_of = geometry, owners, pieces_of
         self.proximity = Proximity(model, geometry)
         self.rows = ContactRowBuilder(self.proximity)
+        compiled_kernel()  # of `far_moved`, not in the middle of a solve
         self.sweep: Sweep | None = None
 
 

@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.passage import doubtful_pairs, jumps, snapshot
+from wholebody.geometry.moved_pairs import snapshot
+from wholebody.methods.passage import doubtful_pairs, jumps
 
 WITHIN = 0.05
 

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.assessment import assess
+from wholebody.geometry.moved_pairs import snapshot
 from wholebody.methods.ccd.method import CCD
 from wholebody.methods.moving_goals import begun_at
 from wholebody.methods.newton.method import Newton
-from wholebody.methods.passage import jumps, snapshot
+from wholebody.methods.passage import jumps
 from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import Method, method_named
 from wholebody.problem import Problem, Solution

@@ -8,13 +8,12 @@ describe. What is left is swept.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.geometry.proximity import Contacts, Indices, Proximity
+from wholebody.geometry.moved_pairs import Placed, distances, far_moved, snapshot
+from wholebody.geometry.proximity import Indices, Proximity
 from wholebody.scene import Scene
 
 Array = NDArray[np.float64]
@@ -22,20 +21,6 @@ Array = NDArray[np.float64]
 DIP = 5e-4  # m: between two postures a piece may dip in by this much; half of the thinnest plate that counts
 OVERLAP = 2e-4  # m: overlap on the way that does not count; finer than any piece is thick
 HALVINGS = 3  # of a way before what is still in doubt is swept
-ARC = 1.1  # length of an arc over its chord, at the most, for the turns that one step makes
-
-
-class Placed(NamedTuple):
-    """Where the pieces are at a posture, and which pairs are near: what a passage is judged by."""
-
-    placements: Array
-    contacts: Contacts
-    within: float
-
-
-def snapshot(proximity: Proximity, contacts: Contacts, within: float) -> Placed:
-    """Remember the pieces' placements of the last query."""
-    return Placed(proximity.placements.copy(), contacts, within)
 
 
 def jumps(scene: Scene, before: Placed, after: Placed, q0: Array, q1: Array) -> bool:
@@ -52,7 +37,7 @@ def jumps(scene: Scene, before: Placed, after: Placed, q0: Array, q1: Array) -> 
         q0: (nq,) posture before the step.
         q1: (nq,) posture after it.
     """
-    moved = _far_moved(scene.proximity, before, after)
+    moved = far_moved(scene.proximity, before, after)
     if not len(moved):
         return False
     moved = moved[~_passing_by(scene, before, after, q0, q1, moved)]
@@ -62,12 +47,12 @@ def jumps(scene: Scene, before: Placed, after: Placed, q0: Array, q1: Array) -> 
 
 def _jumps(scene: Scene, before: Placed, after: Placed, q0: Array, q1: Array, doubtful: Indices, halvings: int) -> bool:
     proximity = scene.proximity
-    end = _distance(after, len(proximity.pairs))
+    end = distances(after, len(proximity.pairs))
     if not halvings:
         return _sweep_jumps(scene, q0, q1, doubtful, end)
     q = pin.interpolate(scene.model, q0, q1, 0.5)
     middle = snapshot(proximity, proximity.near(scene.state(q).data, before.within), before.within)
-    inside = _distance(middle, len(proximity.pairs))[doubtful] < -OVERLAP
+    inside = distances(middle, len(proximity.pairs))[doubtful] < -OVERLAP
     if (inside & (end[doubtful] > -OVERLAP)).any():
         return True
     for first, last, start, stop in ((before, middle, q0, q), (middle, after, q, q1)):
@@ -91,29 +76,7 @@ def _sweep_jumps(scene: Scene, q0: Array, q1: Array, doubtful: Indices, end: Arr
 
 def doubtful_pairs(proximity: Proximity, before: Placed, after: Placed) -> Indices:
     """Pairs (indices into the collision pairs) that may have changed sides between two postures."""
-    return _not_parted(proximity, before, after, _far_moved(proximity, before, after))
-
-
-def _far_moved(proximity: Proximity, before: Placed, after: Placed) -> Indices:
-    """Pairs that moved against each other by more than lay between them."""
-    motion = _motion(proximity, before.placements, after.placements)
-    pairs = proximity.pairs
-    way = motion[pairs[:, 0]] + motion[pairs[:, 1]]
-    room = proximity.widths + _apart(before, len(pairs)) + _apart(after, len(pairs))
-    doubtful = np.flatnonzero(way > room)
-    if not len(doubtful):
-        return doubtful
-    # pairs that were not measured are at least as far apart as their bounding spheres
-    spheres = _spheres_apart(proximity, before, doubtful) + _spheres_apart(proximity, after, doubtful)
-    beyond = way[doubtful] > proximity.widths[doubtful] + spheres
-    doubtful, spheres = doubtful[beyond], spheres[beyond]
-    # neighbouring segments move far together: what counts is the way of one seen from the other
-    seen = np.minimum(
-        _relative_motion(proximity, before.placements, after.placements, pairs[doubtful, 0], pairs[doubtful, 1]),
-        _relative_motion(proximity, before.placements, after.placements, pairs[doubtful, 1], pairs[doubtful, 0]),
-    )
-    moved: Indices = doubtful[seen > proximity.widths[doubtful] + spheres]
-    return moved
+    return _not_parted(proximity, before, after, far_moved(proximity, before, after))
 
 
 def _passing_by(scene: Scene, before: Placed, after: Placed, q0: Array, q1: Array, pairs: Indices) -> NDArray[np.bool_]:
@@ -149,55 +112,6 @@ def _not_parted(proximity: Proximity, before: Placed, after: Placed, doubtful: I
     listed = np.full(len(proximity.pairs), -1, dtype=np.intp)
     listed[before.contacts.number] = np.arange(len(before.contacts.number))
     return np.array([k for k in doubtful if not _parted(proximity, before, after, int(listed[k]))], dtype=np.intp)
-
-
-def _distance(placed: Placed, count: int) -> Array:
-    """Signed distance (pairs,) of every pair: measured where it is near, else what it was looked for within."""
-    distance = np.full(count, placed.within)
-    distance[placed.contacts.number] = placed.contacts.distance
-    return distance
-
-
-def _apart(placed: Placed, count: int) -> Array:
-    """The same, not less than zero."""
-    apart: Array = np.maximum(_distance(placed, count), 0.0)
-    return apart
-
-
-def _spheres_apart(proximity: Proximity, placed: Placed, pairs: Indices) -> Array:
-    """Distance of the bounding spheres of these pairs, or the distance above where it is larger."""
-    first, second = proximity.pairs[pairs, 0], proximity.pairs[pairs, 1]
-    between = placed.placements[first, 3] - placed.placements[second, 3]
-    gap = np.sqrt(np.einsum("ij,ij->i", between, between)) - proximity.reach[first] - proximity.reach[second]
-    apart: Array = np.maximum(gap, _apart(placed, len(proximity.pairs))[pairs])
-    return apart
-
-
-def _relative_motion(proximity: Proximity, before: Array, after: Array, carrier: Indices, other: Indices) -> Array:
-    """Longest way (k,) that any point of the other pieces made in the axes of their carriers, metres."""
-    shift, turn = np.zeros((len(other), 3)), np.zeros((len(other), 3, 3))
-    for sign, placements in ((1.0, after), (-1.0, before)):
-        axes = placements[carrier, :3].transpose(0, 2, 1)
-        shift += sign * np.einsum("ij,ijk->ik", placements[other, 3] - placements[carrier, 3], axes)
-        turn += sign * (placements[other, :3] @ axes)
-    angle = np.sqrt(0.5 * np.einsum("ijk,ijk->i", turn, turn))
-    reach = proximity.reach[other]
-    motion: Array = ARC * (
-        np.sqrt(np.einsum("ij,ij->i", shift, shift))
-        + np.where(angle > 1e-12, angle, 0.0) * np.where(np.isfinite(reach), reach, 1e9)
-    )
-    return motion
-
-
-def _motion(proximity: Proximity, before: Array, after: Array) -> Array:
-    """Longest way that any point of each piece made, metres."""
-    shift = after - before
-    center = np.sqrt(np.einsum("ij,ij->i", shift[:, 3], shift[:, 3]))
-    # |R1 - R0| in the Frobenius norm is 2 sqrt(2) sin(angle / 2): no point moves more than 1/sqrt(2) of it times reach
-    turn = np.sqrt(0.5 * np.einsum("ijk,ijk->i", shift[:, :3], shift[:, :3]))
-    reach = np.where(np.isfinite(proximity.reach), proximity.reach, 0.0)
-    motion: Array = ARC * (center + turn * reach)
-    return motion
 
 
 def _parted(proximity: Proximity, before: Placed, after: Placed, contact: int) -> bool:

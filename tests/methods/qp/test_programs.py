@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from wholebody import UnknownNameError
-from wholebody.methods.qp.active_set import guess_active_set, minimise_on_face, solve_from
+from wholebody.methods.qp.active_set import (
+    compiled_kernel,
+    guess_active_set,
+    minimise_on_face,
+    solve_from,
+    solve_in_arrays,
+)
 from wholebody.methods.qp.quadratic_program import ActiveSet
 from wholebody.methods.qp.solvers.base import make_solver, solver_names
 from wholebody.methods.qp.solvers.split_form import split
@@ -119,6 +125,31 @@ def test_active_set_method_needs_only_a_guess_that_is_near(random_program):
             settled += 1
             assert program.optimality(answer.x) < 1e-5  # through weights of 1e10 rounding reads as this
     assert settled > 10
+
+
+@pytest.mark.parametrize("rows", [(4, 9), (0, 9), (4, 0), (0, 0), (30, 60)])
+def test_compiled_loops_correct_an_active_set_as_array_code_does(random_program, rows):
+    if compiled_kernel() is None:
+        pytest.skip("numba is not installed")
+    rng = np.random.default_rng(21)
+    settled = []
+    for _ in range(60):
+        program = random_program(rng, int(rng.integers(2, 56)), *rows)
+        program = replace(
+            program, weight=np.minimum(program.weight, 1e4), elastic_weight=np.minimum(program.elastic_weight, 1e4)
+        )
+        guess = ActiveSet(*(rng.random(size) < 0.2 for size in (program.size, program.size, rows[1])))
+        guess = guess._replace(upper=guess.upper & ~guess.lower)
+        kept = ActiveSet(*(part.copy() for part in guess))
+        mine, reference = (way(program, guess, 60) for way in (solve_from, solve_in_arrays))
+        assert kept.same(guess)
+        assert (mine is None) == (reference is None)
+        if mine is not None:
+            assert mine.x == pytest.approx(reference.x, abs=1e-9)
+            assert mine.active.same(reference.active)
+            assert program.optimality(mine.x) < 1e-7
+        settled.append(mine is not None)
+    assert any(settled)
 
 
 def test_active_set_is_read_off_a_near_answer(random_program):

@@ -296,6 +296,26 @@ def test_the_first_posture_that_fits_meets_the_goals_sooner_and_costs_more(hones
     assert first.assessment.measure > best.assessment.measure
 
 
+def test_the_way_to_the_first_fit_begins_like_damped_least_squares(planar_arm):
+    scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
+    goals = [wb.Point("tip", (0.3, 0.5, 0.0))]
+    problem = wb.Problem(scene, start=np.array([0.1, 0.4, 0.3]), goals=goals, measures=[wb.Displacement()])
+    mine = wb.QP(measures=False).solve(problem).trace
+    textbook = wb.DampedLeastSquares().solve(problem).trace[1:]  # whose first entry is the start
+    assert len(mine) >= 4
+    for ours, theirs in zip(mine[:4], textbook, strict=False):
+        assert ours.step == pytest.approx(theirs.step, abs=1e-4)
+        assert ours.goal_error == pytest.approx(theirs.goal_error, abs=1e-4)
+
+
+def test_the_first_fit_of_a_goal_out_of_reach_comes_as_near_as_goes(planar_arm):
+    scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
+    problem = wb.Problem(scene, start=np.array([0.1, 0.4, 0.3]), goals=[wb.Point("tip", (1.2, 0.9, 0.0))])
+    solution = wb.QP(measures=False).solve(problem)
+    assert solution.status == "unreachable"
+    assert solution.assessment.goal_error == pytest.approx(0.5, abs=1e-5)
+
+
 def test_a_start_that_fits_is_the_first_that_does(planar_arm):
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
     start = np.array([0.1, 0.4, 0.3])

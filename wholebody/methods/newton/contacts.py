@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.geometry.moved_pairs import Placed, snapshot
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Coincide
-from wholebody.methods.passage import Placed, jumps, snapshot
+from wholebody.methods.passage import jumps
 from wholebody.problem import Problem
 
 Array = NDArray[np.float64]

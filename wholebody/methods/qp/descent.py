@@ -10,24 +10,26 @@ that could have jumped over something are swept.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.linearisation import Linearisation, Lineariser
-from wholebody.methods.passage import Placed, jumps, snapshot
+from wholebody.geometry.moved_pairs import snapshot
+from wholebody.linearisation import Lineariser
+from wholebody.methods.passage import jumps
 from wholebody.methods.qp.acceleration import Anderson
 from wholebody.methods.qp.funnel import Funnel, Outlook, Verdict
 from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem, Violation
+from wholebody.methods.qp.subproblem import PULL, Subproblem
+from wholebody.methods.qp.visit import Local, Visit
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Iterate
 
 FIRST_RADIUS = 0.3  # rad, m: of the trust region; larger = fewer iterations in the open, more rejected ones in clutter
 LARGEST_RADIUS = 0.8
 LEAST_RADIUS = 1e-7
+EAGER_DAMPING = (0.5, 2.0)  # shares of the squared error; the second after a step was rejected, nothing eager after two
 LEAST_WITHIN = 0.05  # m: pairs nearer than what a step asks for get rows, and at least those nearer than this
 MOST_WITHIN = 0.12  # m: but none farther apart than this; more is slower, less means more steps that meet things unseen
 SLOW = 0.1  # share of the violation that must go in PATIENCE iterations, else only the nearest posture is sought
@@ -38,33 +40,6 @@ MENDABLE = 0.03  # m, rad: violation that the next step is trusted to mend
 DULL, FLAT = 1e-3, 1e-7  # shares of the violation that a step must be foreseen to gain, with measures and without
 LAST_STRETCH = 2e-3  # violation foreseen to go, below which steps may be extrapolated
 NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
-
-
-class Local(NamedTuple):
-    """Where a descent ended.
-
-    Attributes:
-        q: (nq,) posture.
-        violation: what is left there.
-        measure: weighted sum of the measures.
-        converged: whether it ended because nothing better is near, rather than out of iterations.
-        iterations: how many programs were solved.
-    """
-
-    q: Array
-    violation: Violation
-    measure: float
-    converged: bool
-    iterations: int
-
-
-class _Visit(NamedTuple):
-    """A posture that was looked at."""
-
-    at: Linearisation
-    rows: Rows
-    violation: Violation
-    placed: Placed
 
 
 @dataclass
@@ -83,6 +58,8 @@ class Descent:
         measures: whether the measures count from the beginning; without them only the goals are sought, and the first
             posture that fits is the end.
         hasty: whether to give up where the violation hardly lessens for a while.
+        eager: whether to ask for all of the way to the goals in every step, damped by how far they are, until steps are
+            rejected; else for a piece of it.
     """
 
     subproblem: Subproblem
@@ -95,16 +72,18 @@ class Descent:
     note: str = ""
     measures: bool = True
     hasty: bool = False
+    eager: bool = False
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
-        self._radius, self._damping, self._measures = FIRST_RADIUS, 0.0, self.measures
+        self._radius, self._measures, self._eager = FIRST_RADIUS, self.measures, self.eager
+        self._damping = EAGER_DAMPING[0] if self.eager else 0.0
         self._stretch = (
             1.0  # goals that conflict stay far while steps get short: then all of their errors are asked for
         )
-        self._anchor: _Visit | None = None  # where to go back to if a step that broke a rule is not mended
+        self._anchor: Visit | None = None  # where to go back to if a step that broke a rule is not mended
         self._memory = Anderson()
-        self._kept: _Visit | None = None  # best posture that fits, and how many since were hardly better
+        self._kept: Visit | None = None  # best posture that fits, and how many since were hardly better
         self._idle = 0
 
     def run(self, start: Array) -> Local:
@@ -121,7 +100,13 @@ class Descent:
                 break
             count += 1
             program = self.subproblem.program(
-                here.at, here.rows, self._radius, self._pull, self._damping, self._shift, self._measures
+                here.at,
+                here.rows,
+                self._radius,
+                None if self._eager else self._pull,
+                self._damping,
+                self._shift,
+                self._measures,
             )
             answer = working_set.solve(program, here.rows.key)
             outlook = Outlook(
@@ -132,7 +117,7 @@ class Descent:
             if self._settled(here, answer, outlook):
                 if self._radius < FIRST_RADIUS and renewals:  # small steps alone are no sign of an optimum
                     renewals -= 1
-                    self._radius, self._damping = FIRST_RADIUS, 0.0
+                    self._radius, self._damping, self._eager = FIRST_RADIUS, 0.0, False
                     continue
                 converged = True
                 break
@@ -162,7 +147,7 @@ class Descent:
             here = self._kept
         return Local(here.at.q, here.violation, here.at.measure, converged, count)
 
-    def _keep(self, here: _Visit) -> None:
+    def _keep(self, here: Visit) -> None:
         """Remember the best posture that fits: curved constraints make the measures go to and fro near an optimum."""
         if here.violation.worst > self.tolerance or not self._measures:
             return
@@ -172,7 +157,7 @@ class Descent:
         if self._better_than_kept(here):
             self._kept = here
 
-    def _better_than_kept(self, here: _Visit) -> bool:
+    def _better_than_kept(self, here: Visit) -> bool:
         fits = here.violation.worst <= self.tolerance
         return fits and (self._kept is None or here.at.measure < self._kept.at.measure)
 
@@ -180,7 +165,7 @@ class Descent:
     def _pull(self) -> float:
         return PULL * self._radius * self._stretch
 
-    def _settled(self, here: _Visit, answer: QPSolution, outlook: Outlook) -> bool:
+    def _settled(self, here: Visit, answer: QPSolution, outlook: Outlook) -> bool:
         """Whether nothing worth having is foreseen."""
         violation = here.violation
         held = max(violation.hold, violation.elastic) <= self.tolerance
@@ -198,7 +183,7 @@ class Descent:
             return False
         return min(history[-PATIENCE:]) > (1.0 - SLOW) * min(history[:-PATIENCE])
 
-    def _advance(self, here: _Visit, program: QuadraticProgram, answer: QPSolution, outlook: Outlook) -> _Visit | None:
+    def _advance(self, here: Visit, program: QuadraticProgram, answer: QPSolution, outlook: Outlook) -> Visit | None:
         """Go where the program says, or farther along what the last steps foretell; None if neither is good."""
         dq = answer.x
         fast = self._memory.propose(dq) if self._measures and outlook.gain <= LAST_STRETCH else None
@@ -220,6 +205,10 @@ class Descent:
             self._memory.forget()
             self._shift = np.zeros_like(self._shift)
             return there
+        if not verdict.accepted and self._eager:
+            self._eager = self._damping < EAGER_DAMPING[1]
+            self._damping = EAGER_DAMPING[1] if self._eager else 0.0
+            return None
         if not verdict.accepted:
             self._stretch = 1.0
             self._radius = 0.3 * min(step, self._radius)
@@ -230,17 +219,17 @@ class Descent:
         if verdict.by == "goal":
             self._memory.forget()
             self._funnel.narrow(here.violation.total, there.violation.total)
-        if here.violation.left > self._pull and step < 0.25 * self._radius:
+        if not self._eager and here.violation.left > self._pull and step < 0.25 * self._radius:
             self._stretch *= 2.0
         if verdict.good:
-            self._damping *= 0.3
+            self._damping *= 1.0 if self._eager else 0.3
             if step > 0.5 * self._radius or here.violation.left > PULL * self._radius:
                 self._radius = min(2.0 * self._radius, LARGEST_RADIUS)
         elif verdict.poor:
             self._radius = 0.5 * self._radius
         return self._take(there, program, dq, dq)
 
-    def _take(self, there: _Visit, program: QuadraticProgram, dq: Array, way: Array) -> _Visit:
+    def _take(self, there: Visit, program: QuadraticProgram, dq: Array, way: Array) -> Visit:
         """Note that a step was taken.
 
         What the rows would still lack after the program's own step dq, because the measures pull, is asked for in the
@@ -252,26 +241,26 @@ class Descent:
         self._shift = residual if np.abs(residual).max(initial=0.0) < NEAR_MET else np.zeros_like(residual)
         return there
 
-    def _promises(self, here: _Visit, there: _Visit) -> bool:
+    def _promises(self, here: Visit, there: Visit) -> bool:
         """Whether a rejected step went well but for curved constraints: one more may put that right (watchdog)."""
         if self._anchor is not None or not self._measures:
             return False
         broken = max(there.violation.elastic, there.violation.hold)
         return there.violation.goal < here.violation.goal and broken < MENDABLE
 
-    def _jumps(self, here: _Visit, there: _Visit) -> bool:
+    def _jumps(self, here: Visit, there: Visit) -> bool:
         return jumps(self.lineariser.scene, here.placed, there.placed, here.at.q, there.at.q)
 
-    def _visit(self, q: Array) -> _Visit:
+    def _visit(self, q: Array) -> Visit:
         within = min(max(LEAST_WITHIN, PULL * self._radius), MOST_WITHIN)
         at = self.lineariser.at(q, within)
         rows = self.subproblem.rows(at)
         if self.offset is not None:
             rows.soft_error[: rows.goals] -= self.offset
         proximity = self.lineariser.scene.proximity
-        return _Visit(at, rows, self.subproblem.violation(rows), snapshot(proximity, at.contacts, within))
+        return Visit(at, rows, self.subproblem.violation(rows), snapshot(proximity, at.contacts, within))
 
-    def _judge(self, here: _Visit, there: _Visit, outlook: Outlook) -> Verdict:
+    def _judge(self, here: Visit, there: Visit, outlook: Outlook) -> Verdict:
         """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""
         if self._anchor is not None:
             outlook = outlook._replace(gain=max(0.1 * outlook.gain, 1e-3 * self._anchor.violation.total))
@@ -283,7 +272,7 @@ class Descent:
             self._measures,
         )
 
-    def _record(self, there: _Visit, dq: Array, what: str) -> None:
+    def _record(self, there: Visit, dq: Array, what: str) -> None:
         note = f"{self.note}: {what}" if self.note else what
         violation = there.violation
         self.trace.append(

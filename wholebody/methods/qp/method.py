@@ -9,11 +9,11 @@ import numpy as np
 
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
-from wholebody.methods.qp.descent import Local
 from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.search import Search, Settings
 from wholebody.methods.qp.solvers.base import make_solver
 from wholebody.methods.qp.tracking import Step, Tracker
+from wholebody.methods.qp.visit import Local
 from wholebody.problem import Problem, Solution, Status
 
 LEAST_TOLERANCE = 1e-10

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.methods.qp.descent import Descent, Local
+from wholebody.methods.qp.descent import Descent
 from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem
+from wholebody.methods.qp.visit import Local
 from wholebody.methods.starts import bent, restarts
 from wholebody.problem import Iterate, Problem
 
@@ -66,7 +67,7 @@ class Search:
 
     def _try_ways(self) -> None:
         start = self.problem.scene.figure.clamp(self.problem.start)
-        if self._accept(self._descend(start), "directly"):
+        if self._accept(self._descend(start, eager=not self.settings.measures), "directly"):
             return
         rng = np.random.default_rng(self.settings.seed)
         starts = chain([start], restarts(self.problem, start, rng, self.settings.restarts))
@@ -173,10 +174,11 @@ class Search:
         *,
         measures: bool = True,
         most: int | None = None,
+        eager: bool = False,
     ) -> Local:
         """Descend from a start; where that ends with something that must hold not holding, mend it."""
         iterations = self.settings.iterations if most is None else min(most, self.settings.iterations)
-        local = self._descent(iterations, offset, note, measures=measures).run(start)
+        local = self._descent(iterations, offset, note, measures=measures, eager=eager).run(start)
         self.spent += local.iterations
         if not _held(local, self.settings.tolerance) and offset is None and (most is None or local.iterations < most):
             stayed = self._stay(local)
@@ -184,11 +186,18 @@ class Search:
         return local
 
     def _descent(
-        self, iterations: int, offset: Array | None, note: str, *, measures: bool = True, hasty: bool = False
+        self,
+        iterations: int,
+        offset: Array | None,
+        note: str,
+        *,
+        measures: bool = True,
+        hasty: bool = False,
+        eager: bool = False,
     ) -> Descent:
         return Descent(
             self.subproblem, self.lineariser, self.solver, self.settings.tolerance, iterations, offset, self.trace,
-            note, measures and self.settings.measures, hasty,
+            note, measures and self.settings.measures, hasty, eager,
         )  # fmt: skip
 
     def _accept(self, local: Local, how: str) -> bool:

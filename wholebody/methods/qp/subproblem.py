@@ -151,7 +151,7 @@ class Subproblem:
         at: Linearisation,
         rows: Rows,
         radius: float,
-        pull: float,
+        pull: float | None,
         damping: float,
         shift: Array,
         measures: bool,
@@ -162,8 +162,9 @@ class Subproblem:
             at: where.
             rows: its rows.
             radius: about the largest entry that the displacement should have, radians and metres.
-            pull: of goals farther away only so much is asked for, metres and radians.
-            damping: how much of the goals' neglected second derivative to add, bounded by |pull| times lever.
+            pull: of goals farther away only so much is asked for, metres and radians; None asks for all of it.
+            damping: how much of the goals' neglected second derivative to add, bounded by |pull| times lever; where all
+                is asked for, how much of the squared error (Sugihara 2011, as in `DampedLeastSquares`).
             shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
             measures: whether the measures count; without them the nearest posture to the goals is sought.
         """
@@ -173,12 +174,17 @@ class Subproblem:
         linear = self.scale * at.gradient if measures else np.zeros_like(at.gradient)
         diagonal = np.maximum(diagonal if measures else ALOOF * diagonal, np.abs(linear) / radius)
         error = rows.soft_error.copy()
-        farthest = float(np.abs(error[: rows.goals]).max(initial=0.0))
-        if farthest > pull:
-            error[: rows.goals] *= pull / farthest
-        if damping > 0.0:
-            force = rows.soft_weight[: rows.goals] * np.abs(error[: rows.goals])
-            diagonal = diagonal + damping * LEVER * float(force.max(initial=0.0))
+        goal, goal_weight = error[: rows.goals], rows.soft_weight[: rows.goals]
+        farthest = float(np.abs(goal).max(initial=0.0))
+        if pull is None:
+            # half way between joints that move alike, which takes the fewest steps, and as the measures would have them
+            middle = len(diagonal) // 2
+            metric = np.sqrt(diagonal / np.partition(diagonal, middle)[middle])
+            diagonal = diagonal + damping * float(goal @ goal) * float(goal_weight.max(initial=0.0)) * metric
+        elif farthest > pull:
+            goal *= pull / farthest
+        if damping > 0.0 and pull is not None:
+            diagonal = diagonal + damping * LEVER * float((goal_weight * np.abs(goal)).max(initial=0.0))
         box = BOX * radius
         lower, upper = np.clip(at.lower, -box, box), np.clip(at.upper, -box, box)
         return QuadraticProgram(

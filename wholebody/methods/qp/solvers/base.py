@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from importlib.util import find_spec
 
 from wholebody.errors import MissingPackageError, UnknownNameError
-from wholebody.methods.qp.active_set import guess_active_set, lacking, solve_from
+from wholebody.methods.qp.active_set import compiled_kernel, guess_active_set, lacking, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution, QuadraticProgram
 
 GUESS_TOLERANCE = 1e-4
@@ -93,6 +93,7 @@ def make_solver(name: str) -> QPSolver:
         UnknownNameError: no installed solver has this name.
         MissingPackageError: it exists but its package is not installed.
     """
+    compiled_kernel()  # not in the middle of a solve
     if name == "osqp":
         from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
 
