@@ -88,8 +88,7 @@ def _dress(panel: Any, quantity: Quantity, what: str) -> None:
     panel.set_ylim(0.5 * quantity.floor, 2.0 * BAND)
     panel.axhspan(0.35 * BAND, 2.0 * BAND, color="#f4dddd", zorder=0)
     panel.axhline(COARSE, color=GREY, linewidth=0.9, linestyle="--", zorder=1)
-    panel.text(0.995, BAND, "more than half of the answers are none ", fontsize=8, color=GREY, ha="right", va="center",
-               transform=panel.get_yaxis_transform())  # fmt: skip
+    panel.set_title("shaded: more than half of the answers are none", loc="right", fontsize=8, color=GREY)
     panel.set_title(quantity.title, loc="left", fontsize=10)
     panel.set_xlabel(f"time of {what} [ms]")
     panel.set_ylabel(quantity.label)
