@@ -15,7 +15,7 @@ WITHIN = 0.05
 @pytest.fixture(scope="module")
 def scene() -> wb.Scene:
     """Return a human on the floor with a few things near it."""
-    made = wb.Scene(wb.load("human"))
+    made = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
     made.add(wb.Box((0.6, 1.2, 0.001)), name="plate", at=(0.4, 0.0, 0.9))
     return made.add(wb.Sphere(0.03), name="ball", at=(0.3, 0.2, 1.1))
 
@@ -38,13 +38,14 @@ def ways(scene, rng, count):
 def test_compiled_loops_find_the_pairs_that_array_code_finds(scene):
     if compiled_kernel() is None:
         pytest.skip("numba is not installed")
-    found = 0
+    found, kinds = 0, len(compiled_kernel().far_moved.signatures)
     for q0, q1 in ways(scene, np.random.default_rng(3), 60):
         before, after = placed(scene, q0), placed(scene, q1)
         mine = far_moved(scene.proximity, before, after)
         assert np.array_equal(mine, far_moved_in_arrays(scene.proximity, before, after))
         found += len(mine)
     assert found > 20
+    assert len(compiled_kernel().far_moved.signatures) == kinds  # nothing was compiled in the middle
 
 
 def test_a_pair_that_is_left_out_had_more_room_than_its_points_moved(scene):

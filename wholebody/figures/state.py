@@ -68,7 +68,7 @@ class State:
             )
         pin.computeJointJacobians(self.model, self.data, q)
         self.q = q
-        self.jacobian = self.data.J
+        self.jacobian = self.data.J.reshape(6, -1)  # of one degree of freedom Pinocchio gives (6,)
         self._frames.clear()
         self._center_of_mass = None
         return self
@@ -111,7 +111,7 @@ class State:
 
         Works on data of its own, because Pinocchio's routine overwrites the joint Jacobians.
         """
-        return np.array(pin.jacobianCenterOfMass(self.model, self._spare(), self.q))
+        return np.array(pin.jacobianCenterOfMass(self.model, self._spare(), self.q)).reshape(3, -1)
 
     def _spare(self) -> pin.Data:
         if not hasattr(self, "_spare_data"):

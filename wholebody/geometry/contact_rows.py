@@ -15,12 +15,12 @@ would forbid turning about that edge.
 from __future__ import annotations
 
 from functools import lru_cache
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.compiled import compiled_module
 from wholebody.geometry.proximity import Contacts, Proximity
 
 Array = NDArray[np.float64]
@@ -216,10 +216,9 @@ class ContactRowBuilder:
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops where numba is installed (the extra "fast"), else None."""
-    if find_spec("numba") is None:
+    patch_kernel = compiled_module("wholebody.geometry.patch_kernel")
+    if patch_kernel is None:
         return None
-    from wholebody.geometry import patch_kernel
-
     none, points, table = np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros((2, 10))
     pair, faces, placement = np.zeros((2, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros((2, 4, 3))
     # compiled, or read back, for columns of a table: here, and not in the middle of a solve

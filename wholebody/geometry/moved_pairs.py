@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from wholebody.compiled import compiled_module
 from wholebody.geometry.proximity import Array, Contacts, Indices, Proximity
 
 ARC = 1.1  # length of an arc over its chord, at the most, for the turns that one step makes
@@ -34,8 +34,8 @@ def far_moved(proximity: Proximity, before: Placed, after: Placed) -> Indices:
         return far_moved_in_arrays(proximity, before, after)
     found: Indices = kernel.far_moved(
         before.placements, after.placements, proximity.pairs, proximity.widths, proximity.reach,
-        before.contacts.number, before.contacts.distance, before.within,
-        after.contacts.number, after.contacts.distance, after.within, ARC, ENDLESS,
+        before.contacts.number, np.ascontiguousarray(before.contacts.distance), float(before.within),
+        after.contacts.number, np.ascontiguousarray(after.contacts.distance), float(after.within), ARC, ENDLESS,
     )  # fmt: skip
     return found
 
@@ -43,15 +43,14 @@ def far_moved(proximity: Proximity, before: Placed, after: Placed) -> Indices:
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops where numba is installed (the extra "fast"), else None."""
-    if find_spec("numba") is None:
+    moved_pairs_kernel = compiled_module("wholebody.geometry.moved_pairs_kernel")
+    if moved_pairs_kernel is None:
         return None
-    from wholebody.geometry import moved_pairs_kernel
-
-    none, places, pairs = np.zeros((0, 2))[:, 0], np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
-    placements, empty = np.zeros((0, 4, 3)), np.zeros(0)
-    # compiled, or read back, for columns of a table: here, and not in the middle of a solve
+    none, places, pairs = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
+    placements = np.zeros((0, 4, 3))
+    # compiled, or read back: here, and not in the middle of a solve
     moved_pairs_kernel.far_moved(
-        placements, placements, pairs, empty, empty, places, none, 0.0, places, none, 0.0, ARC, ENDLESS
+        placements, placements, pairs, none, none, places, none, 0.0, places, none, 0.0, ARC, ENDLESS
     )
     return moved_pairs_kernel
 

@@ -14,12 +14,12 @@ such as OSQP thereby end in answers exact to rounding.
 from __future__ import annotations
 
 from functools import lru_cache
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg.lapack import dposv
 
+from wholebody.compiled import compiled_module
 from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution, QuadraticProgram
 
 BOUND_TOLERANCE = 1e-11  # rad, m: an x this far outside its box counts as inside
@@ -87,10 +87,9 @@ def solve_in_arrays(program: QuadraticProgram, guess: ActiveSet, corrections: in
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops where numba is installed (the extra "fast"), else None."""
-    if find_spec("numba") is None:
+    active_set_kernel = compiled_module("wholebody.methods.qp.active_set_kernel")
+    if active_set_kernel is None:
         return None
-    from wholebody.methods.qp import active_set_kernel
-
     none, one, mask = np.zeros(0), np.ones(1), np.zeros(1, dtype=bool)
     # compiled, or read back: here, and not in the middle of a solve
     active_set_kernel.settle(

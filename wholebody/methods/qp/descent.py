@@ -30,6 +30,7 @@ FIRST_RADIUS = 0.3  # rad, m: of the trust region; larger = fewer iterations in 
 LARGEST_RADIUS = 0.8
 LEAST_RADIUS = 1e-7
 EAGER_DAMPING = (0.5, 2.0)  # shares of the squared error; the second after a step was rejected, nothing eager after two
+EAGER_GAIN = 0.05  # share of the violation that a step must take away, or nothing is eager any more
 LEAST_WITHIN = 0.05  # m: pairs nearer than what a step asks for get rows, and at least those nearer than this
 MOST_WITHIN = 0.12  # m: but none farther apart than this; more is slower, less means more steps that meet things unseen
 SLOW = 0.1  # share of the violation that must go in PATIENCE iterations, else only the nearest posture is sought
@@ -59,7 +60,7 @@ class Descent:
             posture that fits is the end.
         hasty: whether to give up where the violation hardly lessens for a while.
         eager: whether to ask for all of the way to the goals in every step, damped by how far they are, until steps are
-            rejected; else for a piece of it.
+            rejected or gain little; else for a piece of it.
     """
 
     subproblem: Subproblem
@@ -216,6 +217,8 @@ class Descent:
             self._shift = np.zeros_like(self._shift)
             self._memory.forget()
             return None
+        if self._eager and there.violation.total > (1.0 - EAGER_GAIN) * here.violation.total:
+            self._eager, self._damping = False, 0.0
         if verdict.by == "goal":
             self._memory.forget()
             self._funnel.narrow(here.violation.total, there.violation.total)

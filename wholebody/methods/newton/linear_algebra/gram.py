@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.compiled import compiled_module
 from wholebody.methods.newton.linear_algebra.base import Indices, Pattern
 
 Array = NDArray[np.float64]
@@ -68,10 +68,9 @@ class Gram:
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops where numba is installed (the extra "fast"), else None."""
-    if find_spec("numba") is None:
+    gram_kernel = compiled_module("wholebody.methods.newton.linear_algebra.gram_kernel")
+    if gram_kernel is None:
         return None
-    from wholebody.methods.newton.linear_algebra import gram_kernel
-
     none, places = np.zeros(0), np.zeros(0, dtype=np.int32)
     # compiled, or read back: here, and not in the middle of a solve
     gram_kernel.sum_products(none, none, places, places, np.zeros(1, dtype=np.int32), places, none)

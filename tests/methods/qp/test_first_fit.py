@@ -1,0 +1,91 @@
+"""First postures that fit: sooner than the best, by damped steps that ask for the whole way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.methods.qp.subproblem import Subproblem
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
+def test_the_first_posture_that_fits_meets_the_goals_sooner_and_costs_more(honest, tolerance):
+    human = wb.load("human")
+    scene = wb.Scene(human).add(wb.Box((0.6, 1.2, 0.03)), name="table", at=(0.75, 0.0, 0.75))
+    goals = [wb.Point("right_index_tip", (0.55, 0.1, 0.85)), wb.Point("left_index_tip", (0.5, 0.3, 1.1))]
+    problem = wb.Problem(scene, "standing", goals=goals, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")])
+    best = honest(problem, wb.QP(tolerance=tolerance).solve(problem), tolerance)
+    first = honest(problem, wb.QP(tolerance=tolerance, measures=False).solve(problem), tolerance)
+    assert best.status == first.status == "solved"
+    assert first.iterations < best.iterations
+    assert first.assessment.measure > best.assessment.measure
+
+
+def test_the_way_to_the_first_fit_begins_like_damped_least_squares(planar_arm):
+    scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
+    goals = [wb.Point("tip", (0.3, 0.5, 0.0))]
+    problem = wb.Problem(scene, start=np.array([0.1, 0.4, 0.3]), goals=goals, measures=[wb.Displacement()])
+    mine = wb.QP(measures=False).solve(problem).trace
+    textbook = wb.DampedLeastSquares().solve(problem).trace[1:]  # whose first entry is the start
+    assert len(mine) >= 4
+    for ours, theirs in zip(mine[:4], textbook, strict=False):
+        assert ours.step == pytest.approx(theirs.step, abs=1e-4)
+        assert ours.goal_error == pytest.approx(theirs.goal_error, abs=1e-4)
+
+
+def test_a_first_fit_asks_for_the_whole_way_and_damps_it_as_the_page_says():
+    human = wb.load("human")
+    goals = [wb.Point("right_index_tip", (0.5, -0.3, 1.3)), wb.Point("left_index_tip", (0.4, 0.4, 1.1))]
+    problem = wb.Problem(wb.Scene(human), "standing", goals=goals)
+    subproblem, at = Subproblem(problem), problem.lineariser().at(problem.start, 0.1)
+    rows, none = subproblem.rows(at), np.zeros(len(at.goal_error))
+    piece = subproblem.program(at, rows, 0.3, 0.1, 0.0, none, False)
+    whole = subproblem.program(at, rows, 0.3, None, 0.5, none, False)
+    assert np.abs(piece.target).max() == pytest.approx(0.1)
+    assert whole.target == pytest.approx(-at.goal_error)
+    assert np.ptp(piece.diagonal) > 0.0
+    metric = np.sqrt(piece.diagonal / np.sort(piece.diagonal)[len(piece.diagonal) // 2])
+    damping = 0.5 * at.goal_error @ at.goal_error * rows.soft_weight.max() * metric
+    assert whole.diagonal == pytest.approx(piece.diagonal + damping)
+
+
+def test_a_first_fit_gives_up_haste_after_two_steps_that_are_rejected():
+    """The way up through a board is blocked; the next step is damped more, the third asks for a piece of the way."""
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.5, 1.0, 0.04)), name="table", at=(0.5, 0.0, 0.75))
+    goals = [wb.Point("right_hand", (0.35, -0.2, 0.9), offset=(0.0, 0.0, -0.05))]
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    problem = wb.Problem(scene, goals=goals, constraints=feet, clearance=0.003)
+    solution = wb.QP(tolerance=1e-4, measures=False).solve(problem)
+    first, second, third = solution.trace[:3]
+    assert [first.note, second.note] == ["blocked", "blocked"]
+    assert second.step < first.step
+    assert third.note == "goal"
+    assert third.step < 0.9 * second.step
+    assert solution.status == "solved"
+
+
+def test_a_first_fit_far_away_does_not_crawl():
+    problem = wb.Problem(wb.Scene(wb.load("human")), goals=[wb.Point("right_hand", (40.0, 0.0, 1.0))])
+    solution = wb.QP(measures=False).solve(problem)
+    assert solution.status == "solved"
+    assert solution.message == "solved directly"
+
+
+def test_the_first_fit_of_a_goal_out_of_reach_comes_as_near_as_goes(planar_arm):
+    scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
+    problem = wb.Problem(scene, start=np.array([0.1, 0.4, 0.3]), goals=[wb.Point("tip", (1.2, 0.9, 0.0))])
+    solution = wb.QP(measures=False).solve(problem)
+    assert solution.status == "unreachable"
+    assert solution.assessment.goal_error == pytest.approx(0.5, abs=1e-5)
+
+
+def test_a_start_that_fits_is_the_first_that_does(planar_arm):
+    scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
+    start = np.array([0.1, 0.4, 0.3])
+    tip = scene.state(start).frame(scene.frame_id("tip")).translation
+    problem = wb.Problem(scene, start=start, goals=[wb.Point("tip", tip)], measures=[wb.Discomfort()])
+    solution = wb.QP(measures=False).solve(problem)
+    assert solution.iterations == 0
+    assert solution.q == pytest.approx(start, abs=1e-12)
