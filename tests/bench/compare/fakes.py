@@ -50,7 +50,8 @@ class Fake:
     """A method that does as it is told, whatever the problem.
 
     Attributes:
-        does: "solves", "raises", "refuses", "hangs", "spins", "dies", "nan", "lies" or "sleeps".
+        does: "solves", "raises", "refuses", "hangs", "spins", "dies", "nan", "lies", "sleeps", or "compiles" once in a
+            process.
     """
 
     does: str
@@ -73,6 +74,9 @@ class Fake:
             os._exit(3)
         if self.does == "sleeps":
             time.sleep(0.4)
+        if self.does == "compiles" and "COMPILED" not in os.environ:
+            os.environ["COMPILED"] = "in this process"
+            time.sleep(1.5)
         solution = wb.QP(solver="daqp", tolerance=self.tolerance).solve(problem)
         if self.does == "nan":
             return replace(solution, q=np.full_like(solution.q, np.nan))

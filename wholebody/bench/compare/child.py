@@ -15,7 +15,7 @@ import sys
 from dataclasses import replace
 from typing import Any
 
-from wholebody.bench.compare.messages import Build, Draw, Solve, receive, send
+from wholebody.bench.compare.messages import Build, Draw, Solve, Warm, receive, send
 from wholebody.bench.compare.record import DEFAULT
 from wholebody.bench.entrants.base import Entrant
 
@@ -44,7 +44,7 @@ class _Served:
         self._ready: Any = None
         self._warm: set[tuple[str, bool]] = set()
 
-    def answer(self, request: Build | Solve | Draw) -> Any:
+    def answer(self, request: Build | Warm | Solve | Draw) -> Any:
         from wholebody.bench.compare.solving import ready, sentence, solve
 
         if isinstance(request, Build):
@@ -61,6 +61,9 @@ class _Served:
 
             with _Alarm(2.0 * request.cap):
                 return page(request.good, request.bad, self._ready)
+        if isinstance(request, Warm):
+            self._warm_up(request.entrant, request.cap)
+            return None
         entrant, level, cap = request
         self._warm_up(entrant, cap)
         with _Alarm(max(cap, FRAME_CAP * len(self._ready.case.frames))):

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from typing import Any
 
-from wholebody.bench.compare.messages import Build, Solve
+from wholebody.bench.compare.messages import Build, Solve, Warm
 from wholebody.bench.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Record
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.compare.worker import EndedError, Worker, own_worker
@@ -50,6 +50,7 @@ def work(task: Task) -> Chunk:
     records: list[Record] = []
     spent, swept = {}, {}
     for entrant, ladder in task.solves:
+        worker.warm(Warm(entrant, task.cap))  # seconds of compiling, which say nothing of what its solves cost
         began = time.perf_counter()
         first, ended = _solve(worker, entrant, DEFAULT, task)
         records.append(first)

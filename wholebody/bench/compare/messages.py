@@ -19,6 +19,13 @@ class Build(NamedTuple):
     seed: int
 
 
+class Warm(NamedTuple):
+    """Request to let a method import and compile what it needs, if it has not yet; the answer is None."""
+
+    entrant: Entrant
+    cap: float
+
+
 class Solve(NamedTuple):
     """Request to solve the case that was built last; the answer is a `Record`."""
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import wholebody
-from wholebody.bench.compare.messages import Build, Draw, Solve, receive, send
+from wholebody.bench.compare.messages import Build, Draw, Solve, Warm, receive, send
 from wholebody.errors import MissingPackageError, WholebodyError
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -47,6 +47,7 @@ class Worker:
         self._process: subprocess.Popen[bytes] | None = None
         self._errors: IO[bytes] | None = None
         self._built: Build | None = None
+        self._hopeless: set[str] = set()  # methods that ended the process while they were warmed up
 
     def build(self, request: Build) -> str | None:
         """Build a case, in a new process where this one holds more memory than `FULL`; return what went wrong, if any.
@@ -60,14 +61,23 @@ class Worker:
         answer: str | None = self._ask(request)
         return answer
 
+    def warm(self, request: Warm) -> None:
+        """Let a method import and compile what it needs. What goes wrong over it will do so again in its solve."""
+        if request.entrant.name in self._hopeless:
+            return
+        self._rebuild()
+        try:
+            self._ask(request)
+        except EndedError:
+            self._hopeless.add(request.entrant.name)
+
     def solve(self, request: Solve) -> Any:
         """Solve the case that was built last.
 
         Raises:
             EndedError: the process has ended over it; the next call starts another.
         """
-        if self._process is None and self._built is not None:
-            self._ask(self._built)
+        self._rebuild()
         return self._ask(request)
 
     def draw(self, request: Draw) -> str:
@@ -89,7 +99,11 @@ class Worker:
                     stream.close()
         self._process = self._errors = None
 
-    def _ask(self, request: Build | Solve | Draw) -> Any:
+    def _rebuild(self) -> None:
+        if self._process is None and self._built is not None:
+            self._ask(self._built)
+
+    def _ask(self, request: Build | Warm | Solve | Draw) -> Any:
         process = self._process or self._start()
         assert process.stdin is not None
         assert process.stdout is not None

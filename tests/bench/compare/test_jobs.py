@@ -1,0 +1,23 @@
+"""One case for all methods: what it cost each of them."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import pytest
+
+pytest.importorskip("joblib")
+
+from wholebody.bench.compare.jobs import Task, work
+from wholebody.bench.compare.worker import own_worker
+
+
+def test_what_a_method_compiles_is_not_taken_for_what_its_solves_cost(fakes: ModuleType) -> None:
+    """Or it would be given a handful of problems."""
+    solves = tuple((fakes.entrant(does), ()) for does in ("compiles", "sleeps", "dies"))
+    try:
+        chunk = work(Task(fakes.SET, 0, 0, solves, cap=10.0, most=1.0))
+    finally:
+        own_worker().close()
+    assert chunk.spent["compiles"] < 0.4 <= chunk.spent["sleeps"]
+    assert [record.outcome for record in chunk.records] == ["answered", "answered", "failed"]
