@@ -33,6 +33,11 @@ class Ready:
 
 def ready(family: ProblemSet, number: int, seed: int) -> Ready:
     """Build a case; what is built at first use by whoever asks first is built here, in nobody's time."""
+    from wholebody.methods.newton.linear_algebra import gram
+    from wholebody.methods.qp import active_set
+
+    for module in (active_set, gram):
+        module.compiled_kernel()  # seconds at the first time on a machine, more than the quick comparison gives a solve
     case = family.make(number, seed)
     case.problem.lineariser()
     assess(case.problem, case.problem.start)
