@@ -18,6 +18,7 @@ ROOMS = (
     *(
         "errors",
         "version",
+        "compiled",
         "geometry",
         "figures",
         "scene_geometry",

@@ -155,11 +155,12 @@ def piece_nodes(nodes: Callable[[Sequence[str]], list[Any]]) -> Callable[[Any], 
 
 
 @pytest.fixture
-def as_pinocchio_says(piece_nodes: Callable[[Any], list[Any]]) -> Callable[[Any, Any], None]:
-    """Return a function that checks that every piece in the page is where Pinocchio says it is at a posture."""
+def as_pinocchio_says(piece_nodes: Callable[[Any], list[Any]]) -> Callable[[Any, Any], int]:
+    """Return a function that checks that every piece in the page is where Pinocchio says it is, and counts them."""
 
-    def check(scene: Any, q: Any) -> None:
+    def check(scene: Any, q: Any) -> int:
         found = np.array([entry["matrix"] for entry in piece_nodes(scene)])
         np.testing.assert_allclose(found, piece_placements(scene, q), atol=1e-5)
+        return len(found)
 
     return check

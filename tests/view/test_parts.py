@@ -58,7 +58,7 @@ def test_parts_are_drawn_where_pinocchio_says(browser: Browser, as_pinocchio_say
         q = parts.posture({"board": (0.0, 0.0, 0.5, 0.0, 0.38268343, 0.0, 0.92387953), "pin": (0.5, 0.4, 0.2)})
         viewer.show(q)
         browser.open(viewer.save(tmp_path / "parts.html").as_uri())
-        as_pinocchio_says(parts, q)
+        assert as_pinocchio_says(parts, q) == 3
 
 
 @pytest.mark.browser

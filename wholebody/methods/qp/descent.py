@@ -225,7 +225,8 @@ class Descent:
         if not self._eager and here.violation.left > self._pull and step < 0.25 * self._radius:
             self._stretch *= 2.0
         if verdict.good:
-            self._damping *= 1.0 if self._eager else 0.3
+            if not self._eager:
+                self._damping *= 0.3
             if step > 0.5 * self._radius or here.violation.left > PULL * self._radius:
                 self._radius = min(2.0 * self._radius, LARGEST_RADIUS)
         elif verdict.poor:
