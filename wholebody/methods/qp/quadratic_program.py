@@ -118,8 +118,8 @@ class QPSolution(NamedTuple):
         active: the active set it was found with.
         exact: whether the optimality conditions hold to rounding; otherwise x is the best found.
         iterations: iterations of the solver that was used; 0 where the last active set was right at once.
-        by: what closed the program: "first active set" or "last active set", the solver's name, or "daqp" where
-            another solver's answer did not lead to an exact one.
+        by: what closed the program: "first active set" or "last active set", the solver's name, or
+            "semismooth newton" where its answer did not lead to an exact one.
     """
 
     x: Array
