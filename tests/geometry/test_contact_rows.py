@@ -225,6 +225,26 @@ def test_box_on_a_table_has_a_row_at_every_corner_of_the_patch(free_bodies, size
     assert (np.abs(found[:, :2]) <= np.array([0.2, 0.1]) + 2e-3).all()
 
 
+@pytest.mark.parametrize("compiled", [False, True])
+def test_round_face_has_few_rows_that_keep_it_from_rocking(free_bodies, monkeypatch, compiled):
+    """A disc of 48 corners: whichever way it tips, some row lowers nearly as much as its lowest corner does."""
+    rim = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0.0, 2 * np.pi, 48, endpoint=False)])
+    disc = wb.Hull([(*(0.1 * corner), z) for corner in rim for z in (-0.02, 0.02)])
+    scene = wb.Scene(free_bodies(disc)).add(wb.Box((1.0, 1.0, 0.1)), name="table", at=(0.0, 0.0, -0.05))
+    q = scene.figure.neutral
+    q[2] = 0.021
+    if not compiled:
+        monkeypatch.setattr(scene.row_builder, "_kernel", None)
+    elif scene.row_builder._kernel is None:
+        pytest.skip("numba is not installed")
+    _, rows, jacobian = rows_of(scene, q)
+    assert 5 <= len(rows.gap) <= module.MOST_ENDS + 1
+    for angle in np.linspace(0.0, 2 * np.pi, 60):
+        tip = np.array([0.0, 0.0, 0.0, np.cos(angle), np.sin(angle), 0.0])
+        falls = -(jacobian @ tip).min()
+        assert falls >= 0.1 * np.cos(np.pi / 5)  # the rim itself falls by 0.1 m a radian
+
+
 def test_plank_over_an_edge_may_tip(free_bodies):
     scene, q = on_table(free_bodies, (1.0, 0.1, 0.02), (0.4, 1.0, 0.05))
     q[0] = 0.3  # from -0.2 to 0.8, over a table that ends at 0.2
@@ -317,6 +337,7 @@ def corner_points(piece):
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_array_code_says_what_plain_loops_say(free_bodies, monkeypatch, compiled):
+    monkeypatch.setattr(module, "MOST_ENDS", 1000)  # the plain loops keep all
     rng = np.random.default_rng(4)
     flat = [SHAPES["box"], SHAPES["prism"], wb.Box((1.0, 0.3, 0.05)), wb.Hull(rng.normal(size=(12, 3)) * 0.2)]
     scene = wb.Scene(free_bodies(*flat[:3]))

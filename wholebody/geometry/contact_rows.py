@@ -31,6 +31,7 @@ LEVER_DISTANCE = 0.025  # m: pairs that are this much farther apart than they mu
 INSET = 5e-4  # m: how far below the plane a point must find the other piece; larger = larger patches on round pieces
 SAME_NORMAL = 1.0 - 5e-5  # cosine of 0.01 rad: nearer to a face's normal than this, coal's may be meant to be it
 COAL_ACCURACY = 2e-6  # m: of coal's distances, with some room
+MOST_ENDS = 8  # rows of one contact beside the witness row: a round face has dozens of corners; fewer rows rock more
 SHORTEST_LEVER = 8e-3  # m: rows nearer to the witness point than this say what the witness row says
 
 
@@ -137,6 +138,7 @@ class ContactRowBuilder:
             wide, contacts.pair, contacts.distance, contacts.normal, contacts.point_a, contacts.point_b,
             self.proximity.placements, self._points, self._point_start, self._point_count, self._faces,
             self._face_start, self._face_count, self._radius, self._axis, self._is_capsule, BAND, INSET, SHORTEST_LEVER,
+            MOST_ENDS,
         )  # fmt: skip
         return contact, point, gap
 
@@ -178,6 +180,9 @@ class ContactRowBuilder:
         point = witness[side] + reach[:, None] * lever[keep]
         contact = wide[side % count]
         order = np.argsort(contact, kind="stable")
+        groups = np.split(order, np.flatnonzero(np.diff(contact[order])) + 1)
+        kept = [_farthest_first(group, point, contacts.point_a[contact[group[:1]]]) for group in groups]
+        order = np.concatenate(kept)
         return contact[order], point[order], gap[order]
 
     def _over_other(self, other: Indices, facing: Array, towards: Array, lever: Array) -> tuple[Array, Array]:
@@ -229,8 +234,21 @@ def compiled_kernel() -> Any:
     patch_kernel.patch_ends(
         none, pair, table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], placement, points, none, none, faces,
         none, none, np.zeros(0), points, np.zeros(0, dtype=bool), BAND, INSET, SHORTEST_LEVER,
+        MOST_ENDS,
     )  # fmt: skip
     return patch_kernel
+
+
+def _farthest_first(group: Indices, point: Array, witness: Array) -> Indices:
+    """Which MOST_ENDS rows of one contact to keep: each the farthest from the witness point and those before it."""
+    if len(group) <= MOST_ENDS:
+        return group
+    away = ((point[group] - witness) ** 2).sum(axis=1)
+    chosen: list[int] = []
+    while len(chosen) < MOST_ENDS:
+        chosen.append(int(np.argmax(away)))
+        away = np.minimum(away, ((point[group] - point[group[chosen[-1]]]) ** 2).sum(axis=1))
+    return group[chosen]
 
 
 def _expand(start: Indices, count: Indices, item: Indices) -> tuple[Indices, Indices]:
