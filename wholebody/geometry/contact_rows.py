@@ -240,14 +240,15 @@ def compiled_kernel() -> Any:
 
 
 def _farthest_first(group: Indices, point: Array, witness: Array) -> Indices:
-    """Which MOST_ENDS rows of one contact to keep: each the farthest from the witness point and those before it."""
+    """Which MOST_ENDS rows of one contact to keep: the farthest from the witness point, then from those before."""
     if len(group) <= MOST_ENDS:
         return group
     away = ((point[group] - witness) ** 2).sum(axis=1)
-    chosen: list[int] = []
+    chosen = [int(np.argmax(away))]
+    away = np.full(len(group), np.inf)
     while len(chosen) < MOST_ENDS:
-        chosen.append(int(np.argmax(away)))
         away = np.minimum(away, ((point[group] - point[group[chosen[-1]]]) ** 2).sum(axis=1))
+        chosen.append(int(np.argmax(away)))
     return group[chosen]
 
 

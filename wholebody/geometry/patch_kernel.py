@@ -196,7 +196,7 @@ def patch_ends(
 def _farthest_first(place: Array, gap: Array, witness: Array, count: int) -> None:
     """Move `count` places of a contact to the front, with their gaps: each the farthest from those before it.
 
-    The witness point counts as the first. `place` (m, 3) and `gap` (m,) are changed in place.
+    The first is the farthest from the witness point. `place` (m, 3) and `gap` (m,) are changed in place.
     """
     total = len(gap)
     away = np.empty(total)
@@ -217,4 +217,4 @@ def _farthest_first(place: Array, gap: Array, witness: Array, count: int) -> Non
             square = 0.0
             for k in range(3):
                 square += (place[row, k] - place[chosen, k]) ** 2
-            away[row] = min(away[row], square)
+            away[row] = square if chosen == 0 else min(away[row], square)
