@@ -19,9 +19,11 @@ ROOMS = (
         "errors",
         "version",
         "compiled",
+        "pool",
         "geometry",
         "figures",
         "scene_geometry",
+        "workspace",
         "scene",
         "tasks",
         "linearisation",
@@ -69,7 +71,7 @@ def modules() -> list[Path]:
 @pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_a_module_is_one_idea_and_imports_downwards_only(path: Path) -> None:
     text = path.read_text()
-    assert len(text.splitlines()) <= 300
+    assert len(text.splitlines()) <= 400
     room = room_of("wholebody." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts))
     for node in running(ast.parse(text)):
         names = [node.module] if isinstance(node, ast.ImportFrom) else []

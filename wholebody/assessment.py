@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import coal
 import numpy as np
@@ -19,7 +18,9 @@ from scipy.optimize import nnls
 
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
+from wholebody.geometry.guesses import Guesses
 from wholebody.problem import Problem
+from wholebody.scene_geometry import SceneGeometry
 
 Array = NDArray[np.float64]
 
@@ -84,11 +85,17 @@ def assess(problem: Problem, q: Array) -> Assessment:
     q = np.asarray(q, dtype=float)
     if q.shape != (problem.scene.model.nq,) or not np.isfinite(q).all():
         raise InputError(f"a posture is ({problem.scene.model.nq},) finite numbers; got shape {q.shape}")
+    built = problem.scene.built
     problem.check_fresh()
-    if problem not in _PAIRS:
-        _PAIRS[problem] = _Pairs(problem)
-    pairs = _PAIRS[problem]
+    with built.pool(_Pairs, lambda: _Pairs(built)).lend() as pairs:
+        return _judged(problem, pairs, q, began)
+
+
+def _judged(problem: Problem, pairs: _Pairs, q: Array, began: float) -> Assessment:
     pairs.move(q)
+    if problem.clearances.shape != pairs.distance.shape:
+        count = len(pairs.distance)
+        raise InputError(f"clearances have shape {problem.clearances.shape}; give one for each of the {count} pairs")
     state = pairs.state
     distance, angle, each = _goal_errors(problem, state)
     return Assessment(
@@ -96,7 +103,7 @@ def assess(problem: Problem, q: Array) -> Assessment:
         goal_angle=angle,
         penetration=max(0.0, -pairs.least) if np.isfinite(pairs.least) else 0.0,
         least_distance=pairs.least,
-        clearance_lack=pairs.lack,
+        clearance_lack=float((problem.clearances - pairs.distance).max(initial=0.0)),
         limit_violation=_limit_violation(problem, q),
         constraint_violation=_constraint_violation(problem, state),
         measure=sum(term.weight * term.value(state) for term in problem.measures),
@@ -107,14 +114,14 @@ def assess(problem: Problem, q: Array) -> Assessment:
 
 
 class _Pairs:
-    """All pairs of a problem's scene, at one posture after the other; on data of its own."""
+    """All pairs of a scene, at one posture after the other; on data of its own, lent to one judgement at a time."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, built: SceneGeometry) -> None:
         """Allocate."""
-        self.model, self.geometry = problem.scene.model, problem.scene.geometry
-        self.clearances = problem.clearances
+        self.model, self.geometry, self._lock = built.model, built.geometry, built.lock
         self.state = State(self.model)
         self.results = pin.GeometryData(self.geometry)
+        self._guesses = Guesses(self.results)
         moves = [piece.parentJoint for piece in self.geometry.geometryObjects]
         sides = [(moves[pair.first], moves[pair.second]) for pair in self.geometry.collisionPairs]
         self._joints = np.array(sides, dtype=np.intp).reshape(-1, 2)  # that move the pieces of each pair; 0: none
@@ -122,14 +129,14 @@ class _Pairs:
     def move(self, q: Array) -> None:
         """Measure all pairs at the posture q."""
         self.state.update(q)
-        pin.updateGeometryPlacements(self.model, self.state.data, self.geometry, self.results)
+        with self._lock:  # not while a thing is moved, one piece after the other
+            pin.updateGeometryPlacements(self.model, self.state.data, self.geometry, self.results)
+        self._guesses.forget()  # the judgement of a posture does not depend on the one before
         pin.computeDistances(self.geometry, self.results)
-        count = len(self.geometry.collisionPairs)
         self.distance = np.array([result.min_distance for result in self.results.distanceResults])
         if np.isnan(self.distance).any():
             raise InputError("a distance is not a number; an object's placement or shape is broken")
-        self.least = float(self.distance.min()) if count else float("inf")
-        self.lack = float(max(0.0, (self.clearances - self.distance).max())) if count else 0.0
+        self.least = float(self.distance.min()) if len(self.distance) else float("inf")
 
     def gradients(self, problem: Problem, state: State) -> Array:
         """Derivatives (k, nv) of the gaps of all pairs that push: at every corner of their contact patch."""
@@ -147,7 +154,8 @@ class _Pairs:
         for side, sign in ((1, 1.0), (0, -1.0)):
             for joint in set(joints[:, side].tolist()) - {0}:
                 moved = joints[:, side] == joint
-                rows[moved] += sign * wrenches[moved] @ pin.getJointJacobian(state.model, state.data, joint, pin.WORLD)
+                jacobian = pin.getJointJacobian(state.model, state.data, joint, pin.WORLD)
+                rows[moved] += sign * wrenches[moved] @ jacobian.reshape(6, -1)  # of one degree of freedom it is (6,)
         return rows
 
     def _patch(self, pair: int) -> list[tuple[Array, Array]]:
@@ -179,9 +187,6 @@ class _Pairs:
         pieces = [self.geometry.geometryObjects[i].geometry for i in (index.first, index.second)]
         places = [self.results.oMg[i] for i in (index.first, index.second)]
         return (*pieces, *(coal.Transform3s(place.rotation, place.translation) for place in places))
-
-
-_PAIRS: WeakKeyDictionary[Problem, _Pairs] = WeakKeyDictionary()
 
 
 def _goal_errors(problem: Problem, state: State) -> tuple[float, float, tuple[float, ...]]:

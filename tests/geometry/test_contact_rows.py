@@ -48,12 +48,19 @@ def distance_of(scene, q):
     return result.min_distance, np.array(result.normal)
 
 
+def placed_at(scene, q):
+    """Pinocchio's own placements of the pieces."""
+    data, placed = scene.model.createData(), pin.GeometryData(scene.geometry)
+    pin.updateGeometryPlacements(scene.model, data, scene.geometry, placed, q)
+    return placed
+
+
 def rows_of(scene, q, within=0.1):
     """Contacts, rows and their Jacobian at a posture."""
-    state = scene.state(q)
-    contacts = scene.proximity.near(state.data, within)
-    rows = scene.row_builder.rows(contacts)
-    return contacts, rows, state.rows(rows.wrench, rows.second, rows.first)
+    with scene.lend() as workspace:
+        contacts = workspace.near(q, within)
+    rows = scene.built.rows.rows(contacts)
+    return contacts, rows, scene.state(q).rows(rows.wrench, rows.second, rows.first)
 
 
 def posed(scene, gap, rng):
@@ -187,7 +194,7 @@ def test_lever_rows_tell_the_gap_where_they_stand(free_bodies, kind, gap):
     for _ in range(12):
         q = nearly_flat(scene, kind, gap, rng)
         contacts, rows, _ = rows_of(scene, q)
-        placed, normal = scene.proximity.results, contacts.normal[0]
+        placed, normal = placed_at(scene, q), contacts.normal[0]
         assert (rows.gap >= contacts.distance[0] - 1e-12).all()
         assert np.array_equal(rows.contact, np.zeros(len(rows.gap)))
         first, second = contacts.pair[0]
@@ -291,9 +298,9 @@ def test_round_shapes_and_far_ones_need_no_more_than_the_witness(free_bodies):
         assert len(contacts.distance) == len(rows.gap) == 1
 
 
-def slowly(scene, contacts):
+def slowly(scene, q, contacts):
     """The rows of every pair in plain loops over core points and faces, for boxes and hulls: (gap, point) by pair."""
-    placed = scene.proximity.results
+    placed = placed_at(scene, q)
     piece = scene.geometry.geometryObjects
     found = []
     for number in range(len(contacts.distance)):
@@ -344,8 +351,8 @@ def test_array_code_says_what_plain_loops_say(free_bodies, monkeypatch, compiled
     for k, shape in enumerate(flat):
         scene.add(shape, name=f"thing{k}", at=(0.3 * k - 0.5, 0.1 * k, -0.2))
     if not compiled:
-        monkeypatch.setattr(scene.row_builder, "_kernel", None)
-    elif scene.row_builder._kernel is None:
+        monkeypatch.setattr(scene.built.rows, "_kernel", None)
+    elif scene.built.rows._kernel is None:
         pytest.skip("numba is not installed")
     levers = 0
     for _ in range(40):
@@ -354,7 +361,7 @@ def test_array_code_says_what_plain_loops_say(free_bodies, monkeypatch, compiled
             q[k : k + 3] = rng.uniform(-0.5, 0.5, 3)
             q[k + 3 : k + 7] = pin.Quaternion(pin.exp3(rng.normal(size=3) * rng.choice([1e-3, 0.02, 1.0]))).coeffs()
         contacts, rows, _ = rows_of(scene, q)
-        expected = slowly(scene, contacts)
+        expected = slowly(scene, q, contacts)
         assert len(rows.gap) == sum(map(len, expected))
         normal = rows.wrench[:, :3]
         place = np.cross(normal, rows.wrench[:, 3:])

@@ -37,7 +37,7 @@ REST = 1e-2  # share of the tolerance: a step smaller than this has come to rest
 RANK = 1e-8  # squared singular values below this share of the largest are taken for zero
 
 
-@dataclass
+@dataclass(frozen=True)
 class DampedLeastSquares:
     """Damped least squares, the textbook method: goals and equalities, limits by clamping, and no contacts at all.
 
@@ -81,9 +81,9 @@ class DampedLeastSquares:
             InputError: the problem has a constraint that is not an equality, or its scene changed after it was stated.
         """
         began = time.perf_counter()
-        problem.check_fresh()
-        descent = _Descent(problem, self)
-        rested = descent.run()
+        with problem.lend() as workspace:
+            descent = _Descent(problem, self, workspace.state)
+            rested = descent.run()
         judgement = assess(problem, descent.best)
         status = _status(judgement, rested, 1.05 * self.tolerance + 1e-6)
         return Solution(
@@ -101,7 +101,7 @@ class DampedLeastSquares:
 class _Descent:
     """One descent: the best posture so far, and the way there."""
 
-    def __init__(self, problem: Problem, method: DampedLeastSquares) -> None:
+    def __init__(self, problem: Problem, method: DampedLeastSquares, state: State) -> None:
         for number, term in enumerate(problem.constraints):
             if not np.array_equal(term.lower, term.upper):
                 raise InputError(
@@ -109,7 +109,7 @@ class _Descent:
                     "it out or use method='qp'"
                 )
         self._problem, self._method = problem, method
-        self._state = State(problem.scene.model)
+        self._state = state
         self.best: Array = problem.scene.figure.clamp(problem.start)
         self.trace: list[Iterate] = []
         self.steps = 0

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
-from wholebody.figures.state import State
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.problem import Iterate, Problem, Solution, Status
 from wholebody.tasks import Displacement, Effort, Hold
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -128,8 +128,9 @@ class Loop(ABC):
         began = time.perf_counter()
         self.prepare(problem)
         assert self._built is not None
-        run = _Run(problem, self._built[1], self)
-        run.go()
+        with problem.lend() as workspace:
+            run = _Run(problem, workspace, self._built[1], self)
+            run.go()
         judgement = assess(problem, run.q)
         status = _status(judgement, run, 1.05 * self.tolerance + 1e-6)
         return Solution(
@@ -192,9 +193,9 @@ def kept_apart(problem: Problem) -> list[tuple[int, int, float]]:
 class _Run:
     """One solve: the present posture, and how it ended."""
 
-    def __init__(self, problem: Problem, stepper: Stepper, method: Loop) -> None:
+    def __init__(self, problem: Problem, workspace: Workspace, stepper: Stepper, method: Loop) -> None:
         self._problem, self._stepper, self._method = problem, stepper, method
-        self._state = State(problem.scene.model)
+        self._state, self._proximity = workspace.state, workspace.proximity
         self.q: Array = problem.scene.figure.clamp(problem.start)
         self.trace: list[Iterate] = []
         self.steps, self.rested, self.failure = 0, False, ""
@@ -252,7 +253,7 @@ class _Run:
     def _apart(self, tolerance: float) -> bool:
         """Whether all pairs keep their clearance."""
         clearances = self._problem.clearances
-        near = self._problem.scene.proximity.near(self._state.data, float(clearances.max(initial=0.0)))
+        near = self._proximity.near(self._state.data, float(clearances.max(initial=0.0)))
         return bool((near.distance >= clearances[near.number] - tolerance - COAL_ACCURACY).all())
 
 

@@ -17,6 +17,7 @@ from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.remover import TOUCH, Remover
 from wholebody.methods.ccd.terms import read
 from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ class _Trial:
         return (mine, self.error) < (theirs, other.error)
 
 
-@dataclass
+@dataclass(frozen=True)
 class CCD:
     """Cyclic coordinate descent: one joint at a time, each to its best, from the tip inwards.
 
@@ -94,9 +95,9 @@ class CCD:
             InputError: the scene changed after the problem was stated.
         """
         began = time.perf_counter()
-        problem.check_fresh()
-        search = _Search(self, problem)
-        best = search.run()
+        with problem.lend() as workspace:
+            search = _Search(self, problem, workspace)
+            best = search.run()
         judgement = assess(problem, best.q)
         status = self._status(best, judgement)
         return Solution(
@@ -119,8 +120,8 @@ class CCD:
             UnsupportedTermError: the problem has terms that this method cannot take.
             InputError: the scene changed after the problem was stated.
         """
-        problem.check_fresh()
-        return _Search(self, problem).pushed_out(q)
+        with problem.lend() as workspace:
+            return _Search(self, problem, workspace).pushed_out(q)
 
     def _status(self, best: _Trial, judgement: Assessment) -> Status:
         slack = 1.05 * self.tolerance + 1e-6
@@ -134,13 +135,13 @@ class CCD:
 class _Search:
     """One solve: starts, and from each of them reaching and leaving overlap by turns."""
 
-    def __init__(self, method: CCD, problem: Problem) -> None:
+    def __init__(self, method: CCD, problem: Problem, workspace: Workspace) -> None:
         self._method, self._problem = method, problem
         request = read(problem)
         self._reach = Reach(problem.scene.figure, request)
         self._touch = min(TOUCH, SHARE * method.tolerance)
         self._remover = Remover(
-            problem.scene, problem.clearances, fixed=request.fixed, cones=request.cones, touch=self._touch
+            problem.scene, workspace, problem.clearances, fixed=request.fixed, cones=request.cones, touch=self._touch
         )
         self._rng = np.random.default_rng(method.seed)
         self.sweeps = 0

@@ -91,11 +91,11 @@ class Search:
 
     def _starts(self, q: Array) -> Iterator[tuple[Array, str]]:
         problem = self.course.problem
-        start = bent(problem, q)
+        start = bent(problem, self.course.workspace.state, q)
         if start is not None:
             yield start, " from a start with bent joints"
         rng = np.random.default_rng(self.settings.seed)
-        for start in restarts(problem, q, rng, self.settings.restarts):
+        for start in restarts(problem, self.course.workspace.state, q, rng, self.settings.restarts):
             yield start, " from another start"
 
     def _go(self, q: Array, how: str, iterations: int) -> Found:
@@ -122,7 +122,7 @@ class Search:
     def _least_violation(self, best: Found, q: Array) -> Found:
         """The nearest to all constraints, if that breaks less: where they cannot all hold."""
         whole = self.course
-        self.course = FigureCourse(whole.problem, whole.algebra_name, yielding=True)
+        self.course = FigureCourse(whole.problem, whole.workspace, whole.algebra_name, yielding=True)
         found = self._go(q, best.how, self.settings.iterations)
         self.course = whole
         stationary = best.reached.stationary or found.reached.stationary

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
-from wholebody.figures.state import State
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, check, named_frames
 from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ STIFFER, LOOSER = 4.0, 0.5  # factors on that, after another such step and after
 MOST_DAMPING = 10.0
 
 
-@dataclass
+@dataclass(frozen=True)
 class Placo:
     """placo's `KinematicsSolver`, by its documented tasks, iterated.
 
@@ -52,7 +52,6 @@ class Placo:
 
     tolerance: float = 1e-5
     iterations: int = 200
-    _robot: tuple[Problem, Robot] | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -77,7 +76,8 @@ class Placo:
             InputError: placo cannot express the problem, or its scene changed after it was stated.
             MissingPackageError: placo is not installed.
         """
-        self._prepared(problem)
+        with problem.lend() as workspace, problem.scene.built.pool(_Room, _Room).lend() as room:
+            room.robot(problem, workspace)
 
     def solve(self, problem: Problem) -> Solution:
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
@@ -87,8 +87,9 @@ class Placo:
             MissingPackageError: placo is not installed.
         """
         began = time.perf_counter()
-        run = _Run(problem, self._prepared(problem), self)
-        run.go()
+        with problem.lend() as workspace, problem.scene.built.pool(_Room, _Room).lend() as room:
+            run = _Run(problem, workspace, room.robot(problem, workspace), self)
+            run.go()
         judgement = assess(problem, run.q)
         status = _status(judgement, run, 1.05 * self.tolerance + 1e-6)
         return Solution(
@@ -102,13 +103,21 @@ class Placo:
             message=_message(status, judgement, run),
         )
 
-    def _prepared(self, problem: Problem) -> Robot:
-        problem.check_fresh()
+
+class _Room:
+    """Where the robot that one solve built waits for the next one on the same scene, which may be about the same."""
+
+    def __init__(self) -> None:
+        self._robot: Robot | None = None
+
+    def robot(self, problem: Problem, workspace: Workspace) -> Robot:
+        """Placo's robot for a problem, with things where the workspace sees them."""
         check(problem)
         frames = named_frames(problem)
-        if self._robot is None or self._robot[0] is not problem or not set(frames) <= set(self._robot[1].frames):
-            self._robot = (problem, Robot(problem, frames))
-        return self._robot[1]
+        if self._robot is None or not self._robot.serves(problem, frames):
+            self._robot = Robot(problem, frames)
+        self._robot.place_objects(workspace.geometry)
+        return self._robot
 
 
 class _Run:
@@ -121,16 +130,15 @@ class _Run:
         failure: placo's words where it found no solution.
     """
 
-    def __init__(self, problem: Problem, robot: Robot, method: Placo) -> None:
+    def __init__(self, problem: Problem, workspace: Workspace, robot: Robot, method: Placo) -> None:
         import placo
 
         self._problem, self._robot, self._method = problem, robot, method
+        self._proximity, self._state = workspace.proximity, workspace.state
         self.q: Array = problem.scene.figure.clamp(problem.start)
-        self._state = State(problem.scene.model)
         self.trace: list[Iterate] = []
         self.programs, self.rested, self.failure = 0, False, ""
         self._damping, self._last = 0.0, np.zeros(problem.scene.model.nv)
-        robot.place_objects()
         self._solver: Any = placo.KinematicsSolver(robot.wrapper)
         self._tasks = add_terms(self._solver, robot, problem)
         self._regular = self._solver.add_regularization_task(REGULAR * COMFORT)
@@ -182,7 +190,7 @@ class _Run:
     def _apart(self, tolerance: float) -> bool:
         """Whether all pairs keep their clearance."""
         clearances = self._problem.clearances
-        near = self._problem.scene.proximity.near(self._state.data, float(clearances.max(initial=0.0)))
+        near = self._proximity.near(self._state.data, float(clearances.max(initial=0.0)))
         return bool((near.distance >= clearances[near.number] - tolerance - COAL_ACCURACY).all())
 
     def _program(self) -> Array | None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from wholebody.geometry.moved_pairs import snapshot
+from wholebody.geometry.moved_pairs import Placed
 from wholebody.linearisation import Lineariser
 from wholebody.methods.passage import jumps
 from wholebody.methods.qp.acceleration import Anderson
@@ -253,7 +253,7 @@ class Descent:
         return there.violation.goal < here.violation.goal and broken < MENDABLE
 
     def _jumps(self, here: Visit, there: Visit) -> bool:
-        return jumps(self.lineariser.scene, here.placed, there.placed, here.at.q, there.at.q)
+        return jumps(self.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
 
     def _visit(self, q: Array) -> Visit:
         within = min(max(LEAST_WITHIN, PULL * self._radius), MOST_WITHIN)
@@ -261,8 +261,7 @@ class Descent:
         rows = self.subproblem.rows(at)
         if self.offset is not None:
             rows.soft_error[: rows.goals] -= self.offset
-        proximity = self.lineariser.scene.proximity
-        return Visit(at, rows, self.subproblem.violation(rows), snapshot(proximity, at.contacts, within))
+        return Visit(at, rows, self.subproblem.violation(rows), Placed(at.contacts, within))
 
     def _judge(self, here: Visit, there: Visit, outlook: Outlook) -> Verdict:
         """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
-from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.search import Search, Settings
 from wholebody.methods.qp.solvers.base import make_solver
-from wholebody.methods.qp.tracking import Step, Tracker
+from wholebody.methods.qp.tracking import Tracker
 from wholebody.methods.qp.visit import Local
 from wholebody.problem import Problem, Solution, Status
 
 LEAST_TOLERANCE = 1e-10
 
 
-@dataclass
+@dataclass(frozen=True)
 class QP:
     """Quadratic programs, solved by a QP solver of your choice.
+
+    These are settings alone: one object serves any number of problems and threads at the same time.
 
     Attributes:
         solver: "osqp", "daqp" or any name that qpsolvers lists on this machine; see `wholebody doctor`.
@@ -42,7 +43,6 @@ class QP:
     restarts: int = 40
     seed: int = 0
     measures: bool = True
-    _tracker: Tracker | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -55,7 +55,7 @@ class QP:
             raise InputError(f"tolerance is {self.tolerance}; give metres from {LEAST_TOLERANCE} to 0.1")
         if self.iterations < 1 or self.restarts < 0 or self.budget < 0:
             raise InputError("iterations are at least 1, restarts and budget at least 0")
-        self._solver = make_solver(self.solver)
+        make_solver(self.solver)
 
     @property
     def name(self) -> str:
@@ -70,8 +70,9 @@ class QP:
         """
         began = time.perf_counter()
         settings = Settings(self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures)
-        search = Search(problem, self._solver, settings)
-        best = search.run()
+        with problem.lend() as workspace:
+            search = Search(problem, workspace, make_solver(self.solver), settings)
+            best = search.run()
         judgement = assess(problem, best.q)
         status = _status(best, judgement, self.tolerance)
         return Solution(
@@ -85,16 +86,13 @@ class QP:
             message=_message(status, judgement, search.how),
         )
 
-    def step(self, problem: Problem, q: Array, dt: float, *, measures: bool = True) -> Step:
-        """One step of tracking from the posture q, shape (nq,): one program, for goals that move from call to call.
+    def tracker(self, problem: Problem, dt: float) -> Tracker:
+        """What follows the goals of a problem that move from call to call: one program a step of `dt` seconds.
 
-        The workspace lives on between calls with the same problem. Without `measures` the step only puts right what
-        the one before has left of the goals. See `Tracker`.
+        Raises:
+            InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
         """
-        tracker = self._tracker
-        if tracker is None or tracker.problem is not problem or tracker.dt != dt:
-            tracker = self._tracker = Tracker(problem, self._solver, dt)
-        return tracker.step(q, measures)
+        return Tracker(problem, make_solver(self.solver), dt)
 
 
 def _status(local: Local, judgement: Assessment, tolerance: float) -> Status:

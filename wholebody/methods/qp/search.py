@@ -15,6 +15,7 @@ from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.visit import Local
 from wholebody.methods.starts import bent, restarts
 from wholebody.problem import Iterate, Problem
+from wholebody.workspace import Workspace
 
 ALIKE = 1e-5  # share of a goal's error by which two descents may differ and count as equally near
 JUST = 0.05  # tolerances by which what must hold may be missed more and count as held as well
@@ -41,11 +42,11 @@ class Settings(NamedTuple):
 class Search:
     """Descent, continuation and restarts for one problem, remembering the best posture."""
 
-    def __init__(self, problem: Problem, solver: QPSolver, settings: Settings) -> None:
+    def __init__(self, problem: Problem, workspace: Workspace, solver: QPSolver, settings: Settings) -> None:
         """Set up for a problem; `run` does it all."""
         self.problem, self.solver, self.settings = problem, solver, settings
-        self.subproblem = Subproblem(problem)
-        self.lineariser = problem.lineariser()
+        self.subproblem = Subproblem(problem, workspace.state)
+        self.lineariser = problem.lineariser(workspace)
         self.trace: list[Iterate] = []
         self.spent = 0
         self._left = settings.budget  # programs that the ways after the first may still solve
@@ -70,7 +71,7 @@ class Search:
         if self._accept(self._descend(start, eager=not self.settings.measures), "directly"):
             return
         rng = np.random.default_rng(self.settings.seed)
-        starts = chain([start], restarts(self.problem, start, rng, self.settings.restarts))
+        starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, self.settings.restarts))
         ways = chain(
             self._bent(start), self._scouted(islice(starts, FIRST)), self._staged(start), self._scouted(starts)
         )
@@ -80,7 +81,7 @@ class Search:
 
     def _bent(self, start: Array) -> Iterator[tuple[Local, str]]:
         """Straight limbs hide what bending them would do: the same descent with joints moved off their limits."""
-        q = bent(self.problem, start)
+        q = bent(self.problem, self.lineariser.state, start)
         if q is not None:
             yield self._try(q, "bent"), "from a start with bent joints"
 

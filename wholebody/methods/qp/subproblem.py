@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.figures.state import State
 from wholebody.linearisation import Linearisation
 from wholebody.methods.qp.quadratic_program import Array, QuadraticProgram
 from wholebody.problem import Problem
@@ -86,10 +87,15 @@ class Rows(NamedTuple):
 class Subproblem:
     """Builds programs for one problem."""
 
-    def __init__(self, problem: Problem) -> None:
-        """Read off which constraint rows are equalities."""
+    def __init__(self, problem: Problem, state: State) -> None:
+        """Read off which constraint rows are equalities.
+
+        Args:
+            problem: what is asked.
+            state: of the run; it is moved to the problem's start.
+        """
         lower, upper, weight = [], [], []
-        state = problem.scene.state(problem.start)
+        state.update(problem.start)
         for constraint in problem.constraints:
             size = np.atleast_1d(constraint.value(state)).shape
             lower.append(np.broadcast_to(constraint.lower, size))
