@@ -241,8 +241,8 @@ def test_round_face_has_few_rows_that_keep_it_from_rocking(free_bodies, monkeypa
     q = scene.figure.neutral
     q[2] = 0.021
     if not compiled:
-        monkeypatch.setattr(scene.row_builder, "_kernel", None)
-    elif scene.row_builder._kernel is None:
+        monkeypatch.setattr(scene.built.rows, "_kernel", None)
+    elif scene.built.rows._kernel is None:
         pytest.skip("numba is not installed")
     _, rows, jacobian = rows_of(scene, q)
     assert 5 <= len(rows.gap) <= module.MOST_ENDS + 1
