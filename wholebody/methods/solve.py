@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from wholebody.errors import InputError, UnknownNameError
+from wholebody.methods.control import Progress
 from wholebody.problem import Problem, Solution
 
 METHODS = ("qp", "ccd", "newton", "placo", "dls")
@@ -17,7 +18,7 @@ class Method(Protocol):
     def name(self) -> str:
         """Name for tables."""
 
-    def solve(self, problem: Problem) -> Solution:
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture."""
 
 
@@ -50,12 +51,17 @@ def method_named(name: str) -> Method:
     raise UnknownNameError("method", name, METHODS)
 
 
-def solve(problem: Problem, method: str | Method = "qp") -> Solution:
+def solve(problem: Problem, method: str | Method = "qp", progress: Progress | None = None) -> Solution:
     """Find a posture that fits a problem.
+
+    Ctrl-C ends it with the best posture so far, whose status is then "stalled".
 
     Args:
         problem: what is asked.
-        method: "qp", "ccd", "newton", "placo", "dls", or a configured method such as `QP(solver="daqp")`.
+        method: "qp", "ccd", "newton", "placo", "dls", or a configured method such as
+            `QP(solver="daqp", time_limit=0.1)`.
+        progress: called after every iteration with its entry of the trace (see `Iterate`); the solve ends where it
+            returns True.
 
     Returns:
         The posture with its status and the independent assessment. Goals out of reach and starts in penetration are
@@ -68,4 +74,4 @@ def solve(problem: Problem, method: str | Method = "qp") -> Solution:
     if not isinstance(problem, Problem):
         raise InputError(f"solve takes a Problem, not a {type(problem).__name__}")
     chosen = method_named(method) if isinstance(method, str) else method
-    return chosen.solve(problem)
+    return chosen.solve(problem, progress)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -16,6 +16,7 @@ from wholebody.methods.ccd.overlap import SHAKES
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.remover import TOUCH, Remover
 from wholebody.methods.ccd.terms import read
+from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.problem import Iterate, Problem, Solution, Status
 from wholebody.workspace import Workspace
 
@@ -62,12 +63,14 @@ class CCD:
         iterations: most sweeps from one start.
         restarts: most further starts, first near the posture at hand, then anywhere within the limits.
         seed: of the restarts and of the order in which chains leave overlap.
+        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
     """
 
     tolerance: float = 1e-4
     iterations: int = 400
     restarts: int = 12
     seed: int = 0
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -79,24 +82,29 @@ class CCD:
             raise InputError(f"tolerance is {self.tolerance}; give metres from {LEAST_TOLERANCE} to 0.1")
         if self.iterations < 1 or self.restarts < 0:
             raise InputError("iterations are at least 1, restarts at least 0")
+        check_time_limit(self.time_limit)
 
     @property
     def name(self) -> str:
         """Name for tables."""
         return "ccd"
 
-    def solve(self, problem: Problem) -> Solution:
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture.
 
         Goals out of reach and starts in penetration are answers, not errors.
+
+        Args:
+            problem: what is asked.
+            progress: see `wholebody.methods.control.Progress`.
 
         Raises:
             UnsupportedTermError: the problem has terms that this method cannot take.
             InputError: the scene changed after the problem was stated.
         """
         began = time.perf_counter()
-        with problem.lend() as workspace:
-            search = _Search(self, problem, workspace)
+        with problem.lend() as workspace, Control(self.time_limit, progress) as control:
+            search = _Search(self, problem, workspace, control)
             best = search.run()
         judgement = assess(problem, best.q)
         status = self._status(best, judgement)
@@ -108,7 +116,7 @@ class CCD:
             assessment=judgement,
             trace=tuple(search.trace),
             method=self.name,
-            message=_message(status, judgement, len(search.trace)),
+            message=control.message(judgement) or _message(status, judgement, len(search.trace)),
         )
 
     def pushed_out(self, problem: Problem, q: Array) -> Array:
@@ -121,7 +129,7 @@ class CCD:
             InputError: the scene changed after the problem was stated.
         """
         with problem.lend() as workspace:
-            return _Search(self, problem, workspace).pushed_out(q)
+            return _Search(self, problem, workspace, Control()).pushed_out(q)
 
     def _status(self, best: _Trial, judgement: Assessment) -> Status:
         slack = 1.05 * self.tolerance + 1e-6
@@ -135,13 +143,19 @@ class CCD:
 class _Search:
     """One solve: starts, and from each of them reaching and leaving overlap by turns."""
 
-    def __init__(self, method: CCD, problem: Problem, workspace: Workspace) -> None:
-        self._method, self._problem = method, problem
+    def __init__(self, method: CCD, problem: Problem, workspace: Workspace, control: Control) -> None:
+        self._method, self._problem, self._control = method, problem, control
         request = read(problem)
-        self._reach = Reach(problem.scene.figure, request)
+        self._reach = Reach(problem.scene.figure, request, control)
         self._touch = min(TOUCH, SHARE * method.tolerance)
         self._remover = Remover(
-            problem.scene, workspace, problem.clearances, fixed=request.fixed, cones=request.cones, touch=self._touch
+            problem.scene,
+            workspace,
+            problem.clearances,
+            fixed=request.fixed,
+            cones=request.cones,
+            touch=self._touch,
+            control=control,
         )
         self._rng = np.random.default_rng(method.seed)
         self.sweeps = 0
@@ -159,10 +173,10 @@ class _Search:
             trial = self._attempt(q, free, "" if attempt == 0 else "restart")
             if best is None or trial.better(best, self._touch):
                 best = trial
-            if self._serves(best):
+            if self._serves(best) or self._control.over:
                 break
         assert best is not None
-        return best
+        return best if not self._control.over else replace(best, rested=False)
 
     def pushed_out(self, q: Array) -> Array:
         """Where pushing a posture q (nq,) out ends, or pushing one a little beside it, where that leads farther out."""
@@ -197,10 +211,11 @@ class _Search:
                 trial = _Trial(back, self._remover.deepest, self._error(back), True)
             step = float(np.abs(pin.difference(self._problem.scene.model, before, q)).max(initial=0.0))
             self.trace.append(Iterate(trial.error, trial.overlap, 0.0, step, note if turn == 0 else "overlap"))
+            self._control.tell(self.trace[-1])
             gained = best is None or trial.better(best, self._touch)
             if gained:
                 best = trial
-            if self._serves(trial) or not gained:
+            if self._serves(trial) or not gained or self._control.over:
                 break
         assert best is not None
         return best

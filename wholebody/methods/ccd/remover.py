@@ -15,6 +15,7 @@ from wholebody.figures.figure import Figure
 from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.ccd.links import Overlap
 from wholebody.methods.ccd.pushing import SKIN, ChainPusher
+from wholebody.methods.control import Control
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
 
@@ -65,6 +66,7 @@ class Remover:
         cones: Sequence[str] | None = None,
         touch: float = TOUCH,
         exact: bool = True,
+        control: Control | None = None,
     ) -> None:
         """Prepare the chains of the figure.
 
@@ -76,7 +78,9 @@ class Remover:
             cones: names of the reach cones that are kept; all of the figure's where None.
             touch: overlap that does not count, metres.
             exact: where PD_g cancels, look for the least translation that separates, which takes up to 0.1 s.
+            control: what may end the pushing.
         """
+        self.control = Control() if control is None else control
         self.exact, self.skin = exact, SKIN
         self.scene, self.workspace, self.clearances, self.touch = scene, workspace, clearances, touch
         self._within = 0.0 if clearances is None else float(clearances.max(initial=0.0))
@@ -153,7 +157,7 @@ class Remover:
                 break
             before = self.deepest
             for k in rng.permutation(len(names)).tolist():
-                if self.tally.work > most_work:
+                if self.tally.work > most_work or self.control.over:
                     break
                 overlaps = self._leave(self.chains[names[k]], q, overlaps)
             if overlaps and self.deepest > GAIN * before:

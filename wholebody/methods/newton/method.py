@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wholebody.errors import InputError, UnknownNameError
+from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.linear_algebra.choice import NAMES
@@ -37,6 +38,7 @@ class Newton:
         inequalities: "slack" (squared slacks) or "barrier" (logarithmic).
         restarts: most seeded starts that are tried where the straight way does not serve.
         seed: of the restarts.
+        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
     """
 
     tolerance: float = 1e-5
@@ -45,6 +47,7 @@ class Newton:
     inequalities: Kind = "slack"
     restarts: int = 6
     seed: int = 0
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -61,21 +64,28 @@ class Newton:
             raise UnknownNameError("linear algebra", self.algebra, NAMES)
         if self.inequalities not in ("slack", "barrier"):
             raise InputError(f"inequalities is {self.inequalities!r}; give 'slack' or 'barrier'")
+        check_time_limit(self.time_limit)
 
     @property
     def name(self) -> str:
         """Name for tables."""
         return f"newton/{self.algebra}"
 
-    def solve(self, problem: Problem) -> Solution:
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
+
+        Args:
+            problem: what is asked.
+            progress: see `wholebody.methods.control.Progress`.
 
         Raises:
             InputError: the problem has a term that this method has no equations for.
         """
         began = time.perf_counter()
-        with problem.lend() as workspace:
-            search = Search(FigureCourse(problem, workspace, self.algebra), self.settings)
+        with problem.lend() as workspace, Control(self.time_limit, progress) as control:
+            course = FigureCourse(problem, workspace, self.algebra)
+            course.control = control
+            search = Search(course, self.settings)
             found = search.everywhere(problem.scene.figure.clamp(problem.start))
             return answer(search, found, began)
 
@@ -102,7 +112,10 @@ class Newton:
 
 def answer(search: Search, found: Found, began: float) -> Solution:
     """The solution that a search found, with status and message; it began at `began` by `time.perf_counter`."""
+    stopped = search.course.control.message(found.judgement)
     status = _status(found, search.settings)
+    if stopped and status != "solved":
+        status = "stalled"
     return Solution(
         q=found.q,
         status=status,
@@ -111,7 +124,7 @@ def answer(search: Search, found: Found, began: float) -> Solution:
         assessment=found.judgement,
         trace=tuple(Iterate(error, 0.0, 0.0, 0.0) for error in search.residuals),
         method=f"newton/{search.course.algebra.name}",
-        message=_message(status, found, search) + _reported(search.course),
+        message=(stopped or _message(status, found, search)) + _reported(search.course),
     )
 
 

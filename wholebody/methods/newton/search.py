@@ -81,8 +81,10 @@ class Search:
                     found = self._go(found.q, how, self.settings.iterations)
                 if self._better(found, best):
                     best = found
-                if self._serves(best):
+                if self._serves(best) or self.course.control.over:
                     break
+        if self.course.control.over:
+            return best
         if not best.judgement.holds(self.settings.counted):
             best = self._least_violation(best, q)
         if self._serves(best) and self.course.objective.minimised:
@@ -123,6 +125,7 @@ class Search:
         """The nearest to all constraints, if that breaks less: where they cannot all hold."""
         whole = self.course
         self.course = FigureCourse(whole.problem, whole.workspace, whole.algebra_name, yielding=True)
+        self.course.control = whole.control
         found = self._go(q, best.how, self.settings.iterations)
         self.course = whole
         stationary = best.reached.stationary or found.reached.stationary

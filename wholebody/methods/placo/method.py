@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
 from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, check, named_frames
 from wholebody.problem import Iterate, Problem, Solution, Status
@@ -48,10 +49,12 @@ class Placo:
     Attributes:
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most programs.
+        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
     """
 
     tolerance: float = 1e-5
     iterations: int = 200
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -63,6 +66,8 @@ class Placo:
             raise InputError(f"tolerance is {self.tolerance}; give metres from 1e-10 to 0.1")
         if self.iterations < 1:
             raise InputError(f"iterations is {self.iterations}; give 1 or more")
+
+        check_time_limit(self.time_limit)
 
     @property
     def name(self) -> str:
@@ -79,16 +84,24 @@ class Placo:
         with problem.lend() as workspace, problem.scene.built.pool(_Room, _Room).lend() as room:
             room.robot(problem, workspace)
 
-    def solve(self, problem: Problem) -> Solution:
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
+
+        Args:
+            problem: what is asked.
+            progress: see `wholebody.methods.control.Progress`.
 
         Raises:
             InputError: placo cannot express the problem, or its scene changed after it was stated.
             MissingPackageError: placo is not installed.
         """
         began = time.perf_counter()
-        with problem.lend() as workspace, problem.scene.built.pool(_Room, _Room).lend() as room:
-            run = _Run(problem, workspace, room.robot(problem, workspace), self)
+        with (
+            problem.lend() as workspace,
+            problem.scene.built.pool(_Room, _Room).lend() as room,
+            Control(self.time_limit, progress) as control,
+        ):
+            run = _Run(problem, workspace, room.robot(problem, workspace), self, control)
             run.go()
         judgement = assess(problem, run.q)
         status = _status(judgement, run, 1.05 * self.tolerance + 1e-6)
@@ -100,7 +113,7 @@ class Placo:
             assessment=judgement,
             trace=tuple(run.trace),
             method=self.name,
-            message=_message(status, judgement, run),
+            message=control.message(judgement) or _message(status, judgement, run),
         )
 
 
@@ -130,10 +143,10 @@ class _Run:
         failure: placo's words where it found no solution.
     """
 
-    def __init__(self, problem: Problem, workspace: Workspace, robot: Robot, method: Placo) -> None:
+    def __init__(self, problem: Problem, workspace: Workspace, robot: Robot, method: Placo, control: Control) -> None:
         import placo
 
-        self._problem, self._robot, self._method = problem, robot, method
+        self._problem, self._robot, self._method, self._control = problem, robot, method, control
         self._proximity, self._state = workspace.proximity, workspace.state
         self.q: Array = problem.scene.figure.clamp(problem.start)
         self.trace: list[Iterate] = []
@@ -159,13 +172,14 @@ class _Run:
         while True:
             error, violation = self._look()
             self.trace.append(Iterate(error, violation, 0.0, step))
+            self._control.tell(self.trace[-1])
             enough = SHARE * method.tolerance
             if max(error, violation) <= enough and self._apart(enough):
                 return
             if self.programs and step <= REST * method.tolerance:
                 self.rested = True
                 return
-            if self.programs == method.iterations:
+            if self.programs == method.iterations or self._control.over:
                 return
             move = self._program()
             if move is None:

@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from wholebody.geometry.moved_pairs import Placed
 from wholebody.linearisation import Lineariser
+from wholebody.methods.control import Control
 from wholebody.methods.passage import jumps
 from wholebody.methods.qp.acceleration import Anderson
 from wholebody.methods.qp.funnel import Funnel, Outlook, Verdict
@@ -61,6 +62,7 @@ class Descent:
         hasty: whether to give up where the violation hardly lessens for a while.
         eager: whether to ask for all of the way to the goals in every step, damped by how far they are, until steps are
             rejected or gain little; else for a piece of it.
+        control: what may end it.
     """
 
     subproblem: Subproblem
@@ -74,6 +76,7 @@ class Descent:
     measures: bool = True
     hasty: bool = False
     eager: bool = False
+    control: Control = field(default_factory=Control)
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
@@ -95,7 +98,7 @@ class Descent:
         working_set = WorkingSet(self.solver)
         history: list[float] = []
         count, converged, renewals = 0, False, RENEWALS
-        while count < self.iterations:
+        while count < self.iterations and not self.control.over:
             if not self.measures and here.violation.worst <= self.tolerance:
                 converged = True
                 break
@@ -287,3 +290,4 @@ class Descent:
                 note,
             )
         )
+        self.control.tell(self.trace[-1])

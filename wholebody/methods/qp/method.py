@@ -9,6 +9,7 @@ import numpy as np
 
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
+from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.qp.search import Search, Settings
 from wholebody.methods.qp.solvers.base import make_solver
 from wholebody.methods.qp.tracking import Tracker
@@ -34,6 +35,7 @@ class QP:
         seed: of the restarts.
         measures: whether the measures are to be least. Without, the first posture is the answer that meets the goals
             with everything held, which is there in a fifth to nine tenths of the time. This is for `solve`.
+        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
     """
 
     solver: str = "osqp"
@@ -43,6 +45,7 @@ class QP:
     restarts: int = 40
     seed: int = 0
     measures: bool = True
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -55,6 +58,7 @@ class QP:
             raise InputError(f"tolerance is {self.tolerance}; give metres from {LEAST_TOLERANCE} to 0.1")
         if self.iterations < 1 or self.restarts < 0 or self.budget < 0:
             raise InputError("iterations are at least 1, restarts and budget at least 0")
+        check_time_limit(self.time_limit)
         make_solver(self.solver)
 
     @property
@@ -62,16 +66,23 @@ class QP:
         """Name for tables."""
         return f"qp/{self.solver}"
 
-    def solve(self, problem: Problem) -> Solution:
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture; the best of a descent, of goals approached in stages, and of seeded starts.
 
         The later ones are tried only when the earlier ones did not reach the goals, and within the budget. Never
         raises for a goal out of reach or a start in penetration: the status says so.
+
+        Args:
+            problem: what is asked.
+            progress: see `wholebody.methods.control.Progress`.
+
+        Raises:
+            InputError: the scene changed after the problem was stated.
         """
         began = time.perf_counter()
         settings = Settings(self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures)
-        with problem.lend() as workspace:
-            search = Search(problem, workspace, make_solver(self.solver), settings)
+        with problem.lend() as workspace, Control(self.time_limit, progress) as control:
+            search = Search(problem, workspace, make_solver(self.solver), settings, control)
             best = search.run()
         judgement = assess(problem, best.q)
         status = _status(best, judgement, self.tolerance)
@@ -83,7 +94,7 @@ class QP:
             assessment=judgement,
             trace=tuple(search.trace),
             method=self.name,
-            message=_message(status, judgement, search.how),
+            message=control.message(judgement) or _message(status, judgement, search.how),
         )
 
     def tracker(self, problem: Problem, dt: float) -> Tracker:
