@@ -15,6 +15,10 @@ from wholebody.assessment import Assessment
 from wholebody.errors import InputError
 from wholebody.problem import Iterate
 
+TIME_LIMIT = 4.0
+"""Seconds that a solve may take unless its method is told otherwise. Few come near it; answers of those that do depend
+on the machine's load, and say so."""
+
 Progress = Callable[[Iterate], Any]
 """Called after every iteration with its entry of the trace; where it returns True, the solve ends."""
 
@@ -43,15 +47,20 @@ class Control:
             raise InputError(f"progress is a {type(progress).__name__}; give a function of one trace entry")
         self.reason = ""
         self._time_limit, self._progress = time_limit, progress
-        self._end = np.inf if time_limit is None else time.monotonic() + time_limit
+        self._began = time.monotonic()
         self._handler: Any = None
 
     @property
     def over(self) -> bool:
         """Whether the solve has to end now."""
-        if not self.reason and time.monotonic() > self._end:
+        if not self.reason and self.spent > 1.0:
             self.reason = f"the time limit of {self._time_limit:g} s ended it"
         return bool(self.reason)
+
+    @property
+    def spent(self) -> float:
+        """Share of the time limit that is over; 0 without a limit."""
+        return 0.0 if self._time_limit is None else (time.monotonic() - self._began) / self._time_limit
 
     def message(self, judgement: Assessment) -> str:
         """Why the solve was ended and what is left then; empty where it was not ended."""

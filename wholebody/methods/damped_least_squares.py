@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
-from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.problem import Iterate, Problem, Solution, Status
 from wholebody.tasks.base import Constraint, Goal
 
@@ -57,7 +57,7 @@ class DampedLeastSquares:
     tolerance: float = 1e-5
     iterations: int = 300
     damping: float = 1e-3
-    time_limit: float | None = None
+    time_limit: float | None = TIME_LIMIT
 
     def __post_init__(self) -> None:
         """Check the settings.

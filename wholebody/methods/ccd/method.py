@@ -16,7 +16,7 @@ from wholebody.methods.ccd.overlap import SHAKES
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.remover import TOUCH, Remover
 from wholebody.methods.ccd.terms import read
-from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.problem import Iterate, Problem, Solution, Status
 from wholebody.workspace import Workspace
 
@@ -70,7 +70,7 @@ class CCD:
     iterations: int = 400
     restarts: int = 12
     seed: int = 0
-    time_limit: float | None = None
+    time_limit: float | None = TIME_LIMIT
 
     def __post_init__(self) -> None:
         """Check the settings.

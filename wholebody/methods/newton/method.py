@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wholebody.errors import InputError, UnknownNameError
-from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.linear_algebra.choice import NAMES
@@ -47,7 +47,7 @@ class Newton:
     inequalities: Kind = "slack"
     restarts: int = 6
     seed: int = 0
-    time_limit: float | None = None
+    time_limit: float | None = TIME_LIMIT
 
     def __post_init__(self) -> None:
         """Check the settings.

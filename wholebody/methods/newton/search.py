@@ -24,6 +24,7 @@ SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessm
 SLACK = 1.05  # times the tolerance: an assessment measures with other arithmetic, and coal's own accuracy is 1e-6 m
 COAL_ACCURACY = 1e-6  # m
 TRIAL = 30  # iterations that another start is given to come nearer than the best so far
+FOR_STARTS = 0.5  # share of the time limit that other starts may take: to come nearest takes its time too
 ALIKE = 1e-5  # share of a goal's error by which two ends may differ and count as equally near
 
 
@@ -81,7 +82,7 @@ class Search:
                     found = self._go(found.q, how, self.settings.iterations)
                 if self._better(found, best):
                     best = found
-                if self._serves(best) or self.course.control.over:
+                if self._serves(best) or self.course.control.over or self.course.control.spent > FOR_STARTS:
                     break
         if self.course.control.over:
             return best

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
 from wholebody.geometry.proximity import COAL_ACCURACY
-from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, check, named_frames
 from wholebody.problem import Iterate, Problem, Solution, Status
@@ -54,7 +54,7 @@ class Placo:
 
     tolerance: float = 1e-5
     iterations: int = 200
-    time_limit: float | None = None
+    time_limit: float | None = TIME_LIMIT
 
     def __post_init__(self) -> None:
         """Check the settings.

@@ -9,7 +9,7 @@ import numpy as np
 
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
-from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.qp.search import Search, Settings
 from wholebody.methods.qp.solvers.base import make_solver
 from wholebody.methods.qp.tracking import Tracker
@@ -45,7 +45,7 @@ class QP:
     restarts: int = 40
     seed: int = 0
     measures: bool = True
-    time_limit: float | None = None
+    time_limit: float | None = TIME_LIMIT
 
     def __post_init__(self) -> None:
         """Check the settings.
