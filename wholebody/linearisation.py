@@ -116,7 +116,8 @@ class Lineariser:
 
         errors = [np.atleast_1d(goal.error(state)) for goal in self.goals]
         values = [np.atleast_1d(constraint.value(state)) for constraint in self.constraints]
-        jacobian = self._jacobians(state, rows.wrench, rows.second, rows.first)
+        sizes = [len(part) for part in (*errors, *values)]
+        jacobian = self._jacobians(state, sizes, rows.wrench, rows.second, rows.first)
         goal_rows = sum(len(error) for error in errors)
         value_rows = sum(len(value) for value in values)
         lower, upper = self._box(state)
@@ -139,15 +140,21 @@ class Lineariser:
             upper=upper,
         )
 
-    def _jacobians(self, state: State, gap_wrench: Array, second: Indices, first: Indices) -> Array:
-        """Rows of all goals, constraints and contacts, in this order; the wrenches among them in one product."""
+    def _jacobians(
+        self, state: State, sizes: Sequence[int], gap_wrench: Array, second: Indices, first: Indices
+    ) -> Array:
+        """Rows of all goals, constraints and contacts, in this order; the wrenches among them in one product.
+
+        Raises:
+            InputError: a term has other numbers of values (`sizes`) and rows.
+        """
         wrenches: list[Array] = []
         joint: list[int] = []
         against: list[int] = []
         dense: list[tuple[int, Array]] = []
         row = 0
         terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
-        for term in terms:
+        for term, values in zip(terms, sizes, strict=True):
             part = term.jacobian(state)
             if isinstance(part, Wrench):
                 size = len(part.rows)
@@ -160,6 +167,10 @@ class Lineariser:
                 wrenches.append(np.zeros((size, 6)))
                 joint += [0] * size
                 against += [0] * size
+            if size != values:
+                raise InputError(
+                    f"{type(term).__name__} has {values} values and {size} rows at a posture; give as many"
+                )
             row += size
         stacked = np.vstack([*wrenches, gap_wrench])
         result = state.rows(

@@ -271,7 +271,7 @@ def _start(scene: Scene, start: Array | str | None) -> Array:
     if not np.isfinite(q).all():
         raise InputError(f"start entry {int(np.flatnonzero(~np.isfinite(q))[0])} is not finite; give finite numbers")
     normal = pin.normalize(scene.model, q)
-    if np.abs(normal - q).max() > UNIT_TOLERANCE:
+    if np.abs(normal - q).max(initial=0.0) > UNIT_TOLERANCE:
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(normal)
 

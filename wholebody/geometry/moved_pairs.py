@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.compiled import compiled_module
+from wholebody.errors import InputError
 from wholebody.geometry.proximity import Array, Contacts, Indices, PairTable
 
 ARC = 1.1  # length of an arc over its chord, at the most, for the turns that one step makes
@@ -27,7 +28,16 @@ class Placed(NamedTuple):
 
 
 def far_moved(table: PairTable, before: Placed, after: Placed) -> Indices:
-    """Pairs that moved against each other by more than lay between them."""
+    """Pairs that moved against each other by more than lay between them.
+
+    Raises:
+        InputError: the placements are of other pieces.
+    """
+    count = len(table.joint)
+    if len(before.placements) != count or len(after.placements) != count:
+        raise InputError(
+            f"placements of {len(before.placements)} and {len(after.placements)} pieces; give {count} each"
+        )
     kernel = compiled_kernel()
     if kernel is None:
         return far_moved_in_arrays(table, before, after)

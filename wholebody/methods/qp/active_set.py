@@ -56,7 +56,11 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
 
     Returns:
         The answer, or None when the sets did not settle.
+
+    Raises:
+        ValueError: the sizes of the program or of the guess do not fit together.
     """
+    program.check_shapes(guess)
     kernel = compiled_kernel()
     if kernel is None:
         return solve_in_arrays(program, guess, corrections)

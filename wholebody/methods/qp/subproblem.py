@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.linearisation import Linearisation
 from wholebody.methods.qp.quadratic_program import Array, QuadraticProgram
@@ -116,8 +117,17 @@ class Subproblem:
         self._high = np.flatnonzero((self._lower != self._upper) & np.isfinite(self._upper))
 
     def rows(self, at: Linearisation) -> Rows:
-        """Sort the rows of a linearisation."""
+        """Sort the rows of a linearisation.
+
+        Raises:
+            InputError: the terms have other numbers of rows than when this was set up.
+        """
         goals = len(at.goal_error)
+        if goals != len(self._goal_share) or len(at.value) != len(self._lower):
+            raise InputError(
+                f"goals and constraints have {goals} and {len(at.value)} rows here, and had {len(self._goal_share)} "
+                f"and {len(self._lower)} at the start; give each term one number of rows at all postures"
+            )
         soft = np.vstack([at.goal_jacobian, at.value_jacobian[self._equal]])
         error = np.concatenate([at.goal_error, at.value[self._equal] - self._lower[self._equal]])
         distance = float(np.linalg.norm(at.goal_error))
