@@ -28,6 +28,7 @@ ROOMS = (
         "tasks",
         "linearisation",
         "problem",
+        "first_order",
         "assessment",
         "simplification",
         "methods",

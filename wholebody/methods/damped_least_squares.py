@@ -103,7 +103,7 @@ class DampedLeastSquares:
             assessment=judgement,
             trace=tuple(descent.trace),
             method=self.name,
-            message=control.message(judgement) or _message(status, judgement, descent.steps),
+            message=(control.message(judgement) or _message(status, judgement, descent.steps)) + judgement.in_the_way,
         )
 
 

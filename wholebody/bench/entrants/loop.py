@@ -146,7 +146,7 @@ class Loop(ABC):
             assessment=judgement,
             trace=tuple(run.trace),
             method=self.name,
-            message=control.message(judgement) or _message(status, judgement, run, self.name),
+            message=(control.message(judgement) or _message(status, judgement, run, self.name)) + judgement.in_the_way,
         )
 
     def _check(self, problem: Problem) -> None:

@@ -116,7 +116,8 @@ class CCD:
             assessment=judgement,
             trace=tuple(search.trace),
             method=self.name,
-            message=control.message(judgement) or _message(status, judgement, len(search.trace)),
+            message=(control.message(judgement) or _message(status, judgement, len(search.trace)))
+            + judgement.in_the_way,
         )
 
     def pushed_out(self, problem: Problem, q: Array) -> Array:

@@ -124,7 +124,7 @@ def answer(search: Search, found: Found, began: float) -> Solution:
         assessment=found.judgement,
         trace=tuple(Iterate(error, 0.0, 0.0, 0.0) for error in search.residuals),
         method=f"newton/{search.course.algebra.name}",
-        message=(stopped or _message(status, found, search)) + _reported(search.course),
+        message=(stopped or _message(status, found, search)) + found.judgement.in_the_way + _reported(search.course),
     )
 
 

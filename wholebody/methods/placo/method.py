@@ -113,7 +113,7 @@ class Placo:
             assessment=judgement,
             trace=tuple(run.trace),
             method=self.name,
-            message=control.message(judgement) or _message(status, judgement, run),
+            message=(control.message(judgement) or _message(status, judgement, run)) + judgement.in_the_way,
         )
 
 
@@ -236,8 +236,6 @@ def _status(judgement: Assessment, run: _Run, slack: float) -> Status:
         return "infeasible" if ended else "stalled"
     if judgement.met(slack):
         return "solved"
-    if run.failure:
-        return "infeasible"
     return "unreachable" if run.rested else "stalled"
 
 

@@ -94,7 +94,7 @@ class QP:
             assessment=judgement,
             trace=tuple(search.trace),
             method=self.name,
-            message=control.message(judgement) or _message(status, judgement, search.how),
+            message=(control.message(judgement) or _message(status, judgement, search.how)) + judgement.in_the_way,
         )
 
     def tracker(self, problem: Problem, dt: float) -> Tracker:
