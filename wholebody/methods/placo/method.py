@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
 from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.methods.contradictions import explanation
 from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, check, named_frames
@@ -105,6 +106,8 @@ class Placo:
             run.go()
         judgement = assess(problem, run.q)
         status = _status(judgement, run, 1.05 * self.tolerance + 1e-6)
+        why = "" if status == "solved" else explanation(problem)
+        said = why or control.message(judgement) or _message(status, judgement, run)
         return Solution(
             q=run.q,
             status=status,
@@ -113,7 +116,7 @@ class Placo:
             assessment=judgement,
             trace=tuple(run.trace),
             method=self.name,
-            message=(control.message(judgement) or _message(status, judgement, run)) + judgement.in_the_way,
+            message=said + judgement.in_the_way,
         )
 
 
