@@ -88,8 +88,8 @@ class ContactRowBuilder:
         joint = self.table.joint
         if len(contacts.placements) != len(joint):
             raise InputError(
-                f"contacts among {len(contacts.placements)} pieces are not among these {len(joint)}; ask the scene that "
-                "they come from"
+                f"contacts among {len(contacts.placements)} pieces are not among these {len(joint)}; ask the scene "
+                "that they come from"
             )
         wide = np.flatnonzero(self._extended[contacts.number] & (contacts.distance < clearance + LEVER_DISTANCE))
         if len(wide):
