@@ -15,9 +15,9 @@ from wholebody.assessment import Assessment
 from wholebody.errors import InputError
 from wholebody.problem import Iterate
 
-TIME_LIMIT = 4.0
-"""Seconds that a solve may take unless its method is told otherwise. Few come near it; answers of those that do depend
-on the machine's load, and say so."""
+LONGEST = 4.0
+"""Seconds of processor time that a solve may take where no time limit is given. Few come near it, and how loaded the
+machine is does not change their answers."""
 
 Progress = Callable[[Iterate], Any]
 """Called after every iteration with its entry of the trace; where it returns True, the solve ends."""
@@ -37,7 +37,7 @@ class Control:
         """Begin to count.
 
         Args:
-            time_limit: seconds; None for no limit. See `check_time_limit`.
+            time_limit: seconds on the clock; None for `LONGEST` of processor time, infinity for no limit.
             progress: see `Progress`.
 
         Raises:
@@ -47,20 +47,24 @@ class Control:
             raise InputError(f"progress is a {type(progress).__name__}; give a function of one trace entry")
         self.reason = ""
         self._time_limit, self._progress = time_limit, progress
-        self._began = time.monotonic()
+        self._began = self._now()
         self._handler: Any = None
 
     @property
     def over(self) -> bool:
         """Whether the solve has to end now."""
         if not self.reason and self.spent > 1.0:
-            self.reason = f"the time limit of {self._time_limit:g} s ended it"
+            limit, kind = (LONGEST, " of processor time") if self._time_limit is None else (self._time_limit, "")
+            self.reason = f"the time limit of {limit:g} s{kind} ended it"
         return bool(self.reason)
 
     @property
     def spent(self) -> float:
-        """Share of the time limit that is over; 0 without a limit."""
-        return 0.0 if self._time_limit is None else (time.monotonic() - self._began) / self._time_limit
+        """Share of the time limit that is over."""
+        return (self._now() - self._began) / (LONGEST if self._time_limit is None else self._time_limit)
+
+    def _now(self) -> float:
+        return time.thread_time() if self._time_limit is None else time.monotonic()
 
     def message(self, judgement: Assessment) -> str:
         """Why the solve was ended and what is left then; empty where it was not ended."""
@@ -100,8 +104,8 @@ def check_time_limit(value: float | None) -> None:
     """Check a method's setting `time_limit`.
 
     Raises:
-        InputError: it is neither None nor a positive finite number.
+        InputError: it is neither None nor a positive number.
     """
     number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if value is not None and not (number and 0.0 < value < np.inf):
-        raise InputError(f"time_limit is {value!r}; give seconds above zero, or None for no limit")
+    if value is not None and not (number and value > 0.0):
+        raise InputError(f"time_limit is {value!r}; give seconds above zero, math.inf for no limit, or None")
