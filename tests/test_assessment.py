@@ -194,8 +194,8 @@ def test_clearances_are_read_afresh(free_bodies):
 def test_problems_of_one_scene_are_judged_in_the_same_room(free_bodies, monkeypatch):
     """Whatever problem asks: what judging needs is made once for a scene, and anew when things come or go."""
     made = []
-    whole = _Pairs.__init__
-    monkeypatch.setattr(_Pairs, "__init__", lambda self, built: (made.append(built), whole(self, built))[1])
+    whole = AllPairs.__init__
+    monkeypatch.setattr(AllPairs, "__init__", lambda self, built: (made.append(built), whole(self, built))[1])
     scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.1), name="ball", at=(0.25, 0.0, 0.0))
     problem = wb.Problem(scene)
     for one in (problem, copy.copy(problem), wb.Problem(scene, clearance=0.01)):
