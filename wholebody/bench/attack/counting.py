@@ -1,0 +1,73 @@
+"""Counts of an attack: by kind, with the intervals of what was not seen, and the times of solves."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wholebody.bench.attack.case import Outcome
+from wholebody.bench.attack.running import Ended
+
+SLOW = 5.0  # s: of CPU time for a solve
+NORMAL = 1.959963984540054  # quantile of the normal distribution for 95 %
+
+
+@dataclass(frozen=True)
+class Row:
+    """One case, as it is written down.
+
+    Attributes:
+        kind, seed, number: which case.
+        outcome: what came of it.
+        status: what the answer says of itself.
+        seconds: CPU time of the call under attack.
+        words: what was found.
+    """
+
+    kind: str
+    seed: int
+    number: int
+    outcome: str
+    status: str
+    seconds: float
+    words: str
+
+
+def row(ended: Ended) -> Row:
+    """Return the line of a case."""
+    case, verdict = ended.case, ended.verdict
+    words = " ".join(verdict.words.split()).encode("ascii", errors="backslashreplace").decode()
+    return Row(case.kind, case.seed, case.number, verdict.outcome, verdict.status, verdict.seconds, words)
+
+
+def counted(rows: Sequence[Row], kind: str) -> Counter[Outcome]:
+    """Return how many cases of a kind came to what."""
+    return Counter(one.outcome for one in rows if one.kind == kind)  # type: ignore[misc]
+
+
+def is_slow(one: Row) -> bool:
+    """Whether a solve took longer than `SLOW`."""
+    return one.kind == "solve" and one.seconds > SLOW
+
+
+def percentiles(rows: Sequence[Row], status: str | None = None) -> tuple[int, float, float, float]:
+    """Return how many solves there are with a status (None for any), and their p50, p95 and longest, seconds."""
+    times = [one.seconds for one in rows if one.kind == "solve" and one.status and status in (None, one.status)]
+    if not times:
+        return 0, math.nan, math.nan, math.nan
+    return len(times), float(np.median(times)), float(np.quantile(times, 0.95)), max(times)
+
+
+def wilson(count: int, total: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share of which `count` of `total` were seen (Wilson 1927)."""
+    if total == 0:
+        return 0.0, 1.0
+    share, square = count / total, NORMAL**2
+    middle = share + square / (2 * total)
+    spread = NORMAL * math.sqrt(share * (1.0 - share) / total + square / (4 * total * total))
+    scale = 1.0 + square / total
+    return max(0.0, (middle - spread) / scale), min(1.0, (middle + spread) / scale)
