@@ -48,11 +48,9 @@ def verdict(
     found = judge(problem, goals, constraints, solution.q)
     words, said = _words(found), f"{solution.method} says {solution.status!r}"
     for wrong in _wrongs(problem, solution, found, tolerance_of(method)):
-        return Verdict(
-            "wrong", f"{solution.method} says {solution.status!r}: {wrong}; {words}", seconds, solution.status
-        )
-    outcome = "gave up" if witness and solution.status != "solved" else "right"
-    return Verdict(outcome, f"{solution.method} says {solution.status!r}; {words}", seconds, solution.status)  # type: ignore[arg-type]
+        return Verdict("wrong", f"{said}: {wrong}; {words}", seconds, solution.status)
+    gave_up = witness and solution.status != "solved"
+    return Verdict("gave up" if gave_up else "right", f"{said}; {words}", seconds, solution.status)
 
 
 def _wrongs(problem: Problem, solution: Solution, found: Judged, tolerance: float) -> list[str]:
