@@ -13,7 +13,6 @@ from wholebody.bench.attack.case import Outcome
 from wholebody.bench.attack.running import Ended
 
 SLOW = 5.0  # s: of CPU time for a solve
-NORMAL = 1.959963984540054  # quantile of the normal distribution for 95 %
 
 
 @dataclass(frozen=True)
@@ -60,14 +59,3 @@ def percentiles(rows: Sequence[Row], status: str | None = None) -> tuple[int, fl
     if not times:
         return 0, math.nan, math.nan, math.nan
     return len(times), float(np.median(times)), float(np.quantile(times, 0.95)), max(times)
-
-
-def wilson(count: int, total: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share of which `count` of `total` were seen (Wilson 1927)."""
-    if total == 0:
-        return 0.0, 1.0
-    share, square = count / total, NORMAL**2
-    middle = share + square / (2 * total)
-    spread = NORMAL * math.sqrt(share * (1.0 - share) / total + square / (4 * total * total))
-    scale = 1.0 + square / total
-    return max(0.0, (middle - spread) / scale), min(1.0, (middle + spread) / scale)
