@@ -19,7 +19,7 @@ from wholebody.bench.attack.case import SCRIPT, Verdict, Written, write
 from wholebody.errors import WholebodyError
 
 WRITING = 300.0  # s: to write a case, with what it compiles at the first time
-MEMORY = 8 << 30  # bytes: a file that asks for more is no reason to bring the machine down
+MEMORY = 4 << 30  # bytes: a file that asks for more is no reason to bring the machine down
 
 
 def serve(ear: Connection, deadline: float) -> None:

@@ -47,8 +47,9 @@ def verdict(
     """
     found = judge(problem, goals, constraints, solution.q)
     words, said = _words(found), f"{solution.method} says {solution.status!r}"
-    for wrong in _wrongs(problem, solution, found, tolerance_of(method)):
-        return Verdict("wrong", f"{said}: {wrong}; {words}", seconds, solution.status)
+    wrongs = _wrongs(problem, solution, found, tolerance_of(method))
+    if wrongs:
+        return Verdict("wrong", f"{said}: {', '.join(wrongs)}; {words}", seconds, solution.status)
     gave_up = witness and solution.status != "solved"
     return Verdict("gave up" if gave_up else "right", f"{said}; {words}", seconds, solution.status)
 

@@ -70,7 +70,7 @@ def written(rng: np.random.Generator) -> Written:
     chosen = names[0] if rng.random() < 0.85 else names[int(rng.integers(len(names)))]
     path = f"HERE / {names[0]!r}"
     if rng.random() < ELSEWHERE:
-        path = repr(NO_FILES[int(rng.integers(len(NO_FILES)))])
+        path = f"Path({NO_FILES[int(rng.integers(len(NO_FILES)))]!r})"
     else:
         contents[chosen] = mutated(contents[chosen], rng)
     call = reader.call.replace("{path}", path)

@@ -141,7 +141,7 @@ def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q:
         lack=lack,
         closest=closest,
         limits=_limits(scene.model, q),
-        constraints=float(max(held, default=0.0)),
+        constraints=float(max([0.0, *held])),
         unit=float(np.abs(pin.normalize(scene.model, q) - q).max(initial=0.0)),
     )
 
