@@ -13,7 +13,7 @@ from wholebody.methods.solve import METHODS, method_named
 from wholebody.problem import Problem, Solution, Status
 
 ROUNDING = 2e-6  # m, rad: by which two ways of measuring may differ for pieces of up to a metre
-OF_SIZE = 2e-6  # of the size of the largest piece: coal's distances are relative to it
+OF_SIZE = 1e-5  # of the size of the largest piece: coal's distances of ellipsoids are relative to it
 SHARE = 1.1  # of a method's tolerance, to which its answers may be off
 CLEARLY = 0.5  # share of the tolerance within which everything must hold for "infeasible" to be a false claim
 
