@@ -26,9 +26,10 @@ settings.load_profile("ci" if os.environ.get("CI") else "default")
 COAL = {"formula": (0.0, 1e-12), "iterated": (1e-6, 1e-9), "ellipsoid": (1e-6, 1e-5)}
 """Accuracy of coal's distances: metres, and share of the size of both pieces together.
 
-"formula" are pairs of spheres, capsules, boxes with spheres, and all with half-spaces: right to rounding in 100,000 random
-pairs of 1 cm to 2 m. "iterated" are pairs of boxes and hulls: coal stops at 1e-6 m; measured 9e-11 of the size, and 4e-8 m
-inside of small hulls. "ellipsoid" are ellipsoids but with half-spaces: measured 5e-6 of the size, at 1 cm as at 100 m."""
+"formula" are pairs of spheres, capsules, boxes with spheres, and all with half-spaces: right to rounding in 100,000
+random pairs of 1 cm to 2 m. "iterated" are pairs of boxes and hulls: coal stops at 1e-6 m; measured 9e-11 of the size,
+and 4e-8 m inside of small hulls. "ellipsoid" are ellipsoids but with half-spaces: measured 5e-6 of the size, at 1 m as
+at 100 m, and 1e-6 m at 1 cm."""
 
 
 @pytest.fixture(scope="session")
