@@ -39,7 +39,7 @@ def random_placement(rng: np.random.Generator, spread: float = 1.0) -> pin.SE3:
 
 
 def segment_gap(p: Any, u: Any, q: Any, v: Any) -> float:
-    """Distance of the segments p +- u and q +- v: a convex quadratic on a square, least inside, on a side or a corner."""
+    """Distance of the segments p +- u and q +- v: a convex quadratic, least inside a square, on a side or a corner."""
     w = p - q
     a, b, c, d, e = u @ u, u @ v, v @ v, u @ w, v @ w
     places = [(s, t) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]

