@@ -25,7 +25,7 @@ class Choice(NamedTuple):
         fastest: dependable methods with the least time; the median milliseconds of the first.
         exact: dependable methods with the least error at any of their budgets; the median error of the first.
         cheapest: dependable methods with the least effort; the median effort of the first above the best known.
-        leading: those that solve most; their share.
+        leading: those that solve most, of the methods that were given all problems; their share.
     """
 
     set: str
@@ -69,8 +69,11 @@ def choices(results: Results, rows: Sequence[Summary]) -> list[Choice]:
 
 def _choice(results: Results, family: str, rows: Sequence[Summary]) -> Choice:
     good = [row.entrant for row in rows if row.dependable]
+    given = max((row.cases for row in rows), default=0)  # others had easier or harder problems
     shares = {
-        row.entrant: row.success * (row.cases - row.refused) / row.cases for row in rows if row.refused < row.cases
+        row.entrant: row.success * (row.cases - row.refused) / row.cases
+        for row in rows
+        if row.refused < row.cases == given
     }
     most = max(shares.values(), default=0.0)
     leading = tuple(name for name, share in shares.items() if share == most)
@@ -136,12 +139,13 @@ def advice(results: Results, rows: Sequence[Summary]) -> list[str]:
     if exact:
         listed = "; ".join(f"{names} in {', '.join(sets)}" for names, sets in exact.items())
         said.append(f"**Most accurate of the dependable:** {listed}. Errors below {FLOOR:g} are not told apart.")
-    said += [
-        f"**{words(choice.set).capitalize()} is solved dependably by none;** {named(choice.leading)} "
-        f"{'solves' if paired.algorithms(choice.leading) == 1 else 'solve'} most, {100 * choice.leading_share:.0f} %."
-        for choice in picked
-        if not choice.fastest
-    ]
+    for choice in picked:
+        if not choice.fastest:
+            solve = "solves" if len(paired.algorithms(choice.leading)) == 1 else "solve"
+            said.append(
+                f"**{words(choice.set).capitalize()} is solved dependably by none;** {named(choice.leading)} {solve} most, "
+                f"{100 * choice.leading_share:.3g} %."
+            )
     for standing in ranked:
         if standing.dependable == 0 and isfinite(standing.worst_share):
             said += _warning(standing, rows)
@@ -155,10 +159,10 @@ def _in_doubt(results: Results, ranked: Sequence[Standing]) -> str:
         return f"**No method solves {100 * GOOD:.0f} % of any set.** Look at each set before choosing."
     names = [one.entrant for one in ranked if one.dependable == most]
     alike = paired.best({name: paired.times(results, results.sets, name) for name in names})
-    apart = "" if len(alike) == 1 else " Their times cannot be told apart." if paired.algorithms(alike) > 1 else ""
+    apart = "" if len(alike) == 1 else " Their times cannot be told apart." if len(paired.algorithms(alike)) > 1 else ""
     if not apart and len(alike) > 1:
         apart = " Its solvers' times cannot be told apart."
-    solves = "It solves" if paired.algorithms(alike) == 1 else "Each solves"
+    solves = "It solves" if len(paired.algorithms(alike)) == 1 else "Each solves"
     return (
         f"**If in doubt, take {named(alike)}.** {solves} at least {100 * GOOD:.0f} % of the problems in {most} of "
         f"{len(results.sets)} sets.{apart}"

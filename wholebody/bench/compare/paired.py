@@ -5,7 +5,7 @@ Medians over different problems say nothing of two methods, and a ratio whose in
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import exp, inf, isfinite, log, sqrt
 from typing import NamedTuple
 
@@ -96,21 +96,14 @@ def errors(results: Results, family: str, entrant: str) -> Figures:
     return {key: max(value, FLOOR) if isfinite(value) else 1.0 for key, value in chosen.items()}
 
 
-def named(entrants: Sequence[str], quote: Callable[[str], str] = lambda name: f"`{name}`") -> str:
-    """Return methods in words; the solvers of one method are one method."""
+def named(entrants: Sequence[str]) -> str:
+    """Return methods in words, with the solvers of one method that cannot be told apart."""
     ours = [name.removeprefix(FAMILY) for name in entrants if name.startswith(FAMILY)]
-    listed = list(dict.fromkeys(FAMILY if name.startswith(FAMILY) else name for name in entrants))
-    said = []
-    for name in listed:
-        if name != FAMILY:
-            said.append(quote(name))
-        elif len(ours) == 1:
-            said.append(quote(FAMILY + ours[0]))
-        else:
-            said.append(f"{quote(FAMILY.rstrip('/'))} (any of {', '.join(ours)})")
-    return ", ".join(said)
+    solvers = f" (any of {', '.join(ours)})" if len(ours) > 1 else ""
+    return ", ".join(f"`{name}`{solvers if name == FAMILY[:-1] else ''}" for name in algorithms(entrants))
 
 
-def algorithms(entrants: Sequence[str]) -> int:
-    """Return how many methods there are, solvers of one counted as one."""
-    return len({FAMILY if name.startswith(FAMILY) else name for name in entrants})
+def algorithms(entrants: Sequence[str]) -> list[str]:
+    """Return the names of methods; several solvers of one method have the name of the method."""
+    several = sum(name.startswith(FAMILY) for name in entrants) > 1
+    return list(dict.fromkeys(FAMILY[:-1] if several and name.startswith(FAMILY) else name for name in entrants))

@@ -9,7 +9,7 @@ from math import isfinite
 from wholebody.bench.compare import leftout, sections
 from wholebody.bench.compare.advice import advice, choices, effort, error, reference, slowness, standings, words
 from wholebody.bench.compare.blocks import Block, Chart, Heading, Points, Scenes, Table, Text
-from wholebody.bench.compare.paired import named
+from wholebody.bench.compare.paired import algorithms
 from wholebody.bench.compare.record import COARSE, DEFAULT
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.settings import Settings
@@ -160,7 +160,7 @@ def _reading(given: Material) -> list[Block]:
 def _choices(given: Material) -> Table:
     rows = []
     for choice in choices(given.results, given.rows):
-        most = f"{_plain(choice.leading)}, {100 * choice.leading_share:.0f} %"
+        most = f"{_plain(choice.leading)}, {100 * choice.leading_share:.3g} %"
         if not choice.fastest:
             rows.append((words(choice.set), "none", "", "", most))
             continue
@@ -177,7 +177,7 @@ def _choices(given: Material) -> Table:
 
 
 def _plain(entrants: Sequence[str]) -> str:
-    return named(entrants, lambda name: name)
+    return ", ".join(algorithms(entrants))
 
 
 def _standings(given: Material) -> Table:
