@@ -143,8 +143,8 @@ def advice(results: Results, rows: Sequence[Summary]) -> list[str]:
         if not choice.fastest:
             solve = "solves" if len(paired.algorithms(choice.leading)) == 1 else "solve"
             said.append(
-                f"**{words(choice.set).capitalize()} is solved dependably by none;** {named(choice.leading)} {solve} most, "
-                f"{100 * choice.leading_share:.3g} %."
+                f"**{words(choice.set).capitalize()} is solved dependably by none;** "
+                f"{named(choice.leading)} {solve} most, {100 * choice.leading_share:.3g} %."
             )
     for standing in ranked:
         if standing.dependable == 0 and isfinite(standing.worst_share):
