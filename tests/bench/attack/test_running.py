@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from wholebody.bench.attack import child, running
+from wholebody.bench.attack.arguments import CALLS, called
 from wholebody.bench.attack.case import KINDS, PATTERN, SCRIPT, Case, Verdict, Written, kind_of, write
 from wholebody.bench.attack.counting import Row, percentiles
 from wholebody.bench.attack.mutations import mutated
@@ -128,3 +129,11 @@ def test_alike_failures_have_one_signature() -> None:
     one = signature("TypeError in figure.py: 'int' object of 3 at 0.5; rest 1")
     assert one == signature("TypeError in figure.py: 'float' object of 7 at 1e-5; rest 2")
     assert one != signature("ValueError in figure.py: 'int' object of 3 at 0.5")
+
+
+@pytest.mark.parametrize(("name", "given"), CALLS, ids=[f"{k} {name}" for k, (name, _) in enumerate(CALLS)])
+def test_calls_that_are_made_odd_are_right_as_they_stand(name: str, given: tuple[tuple[str, str], ...]) -> None:
+    if name == "wb.ReachCones":
+        pytest.skip("the small robot has none")
+    found = child.run(called(name, dict(given)))
+    assert found.outcome == "right", found.words

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from wholebody.bench.attack.case import Written
@@ -41,11 +43,10 @@ CALLS: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     ("wb.Posture", (("target", "'neutral'"), ("joints", "['joint1']"), ("weight", "1.0"))),
     ("wb.Hold", (("frame", "'link2'"), ("at", "(0, 0, 1)"), ("orientation", "True"), ("relative_to", "'link0'"))),
     ("wb.Plane", (("frame", "'link2'"), ("normal", "(0, 0, 1)"), ("point", "(0, 0, 1)"), ("side", "'on'"))),
-    ("wb.Balance", (("feet", "['link0']"), ("margin", "0.0"))),
-    ("wb.Freeze", (("*joints", "['joint1']"),)),
-    ("wb.StepLimit", (("velocity", "1.0"), ("joints", "{'joint1': 1.0}"), ("root_velocity", "1.0"), ("root_turn",
-         "1.0"))),
-    ("wb.ReachCones", (("names", "None"),)),
+    ("wb.Balance", (("feet", "['link1']"), ("margin", "0.0"))),
+    ("wb.Freeze", (("*joints", "'joint1'"),)),
+    ("wb.StepLimit", (("velocity", "1.0"), ("joints", "{'joint1': 1.0}"))),
+    ("wb.ReachCones", (("names", "['right_shoulder']"),)),
     ("wb.Effort", (("weight", "1.0"),)),
     ("wb.Discomfort", (("weight", "1.0"),)),
     ("wb.Displacement", (("weight", "1.0"),)),
@@ -58,25 +59,27 @@ CALLS: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     ("wb.Problem", (("scene", "scene"), ("start", "'neutral'"), ("goals", "[wb.Point('link2', (0, 0, 1))]"),
                     ("constraints", "[]"), ("measures", "[]"), ("clearance", "0.0"), ("touching", "()"))),
     ("wb.QP", (("solver", "'osqp'"), ("tolerance", "1e-5"), ("iterations", "50"), ("budget", "20"), ("restarts", "2"),
-               ("seed", "0"), ("measures", "True"))),
-    ("wb.CCD", (("tolerance", "1e-4"), ("iterations", "50"), ("seed", "0"))),
-    ("wb.Newton", (("tolerance", "1e-5"), ("iterations", "50"), ("seed", "0"))),
-    ("wb.Placo", (("tolerance", "1e-5"), ("iterations", "50"))),
-    ("wb.DampedLeastSquares", (("tolerance", "1e-5"), ("iterations", "50"))),
+               ("seed", "0"), ("measures", "True"), ("time_limit", "2.0"))),
+    ("wb.CCD", (("tolerance", "1e-4"), ("iterations", "50"), ("seed", "0"), ("time_limit", "2.0"))),
+    ("wb.Newton", (("tolerance", "1e-5"), ("iterations", "50"), ("seed", "0"), ("time_limit", "2.0"))),
+    ("wb.Placo", (("tolerance", "1e-5"), ("iterations", "50"), ("time_limit", "2.0"))),
+    ("wb.DampedLeastSquares", (("tolerance", "1e-5"), ("iterations", "50"), ("time_limit", "2.0"))),
     ("wb.solve", (("problem", "problem"), ("method", "'qp'"))),
     ("wb.assess", (("problem", "problem"), ("q", "figure.neutral"))),
     ("wb.pull", (("problem", "problem"), ("path", "[(0, 0, 1.0), (0, 0.02, 1.0)]"), ("method", "'qp'"), ("goal", "0"),
                  ("spacing", "0.05"))),
     ("wb.Drag", (("problem", "problem"), ("method", "'qp'"), ("goal", "0"), ("dt", "0.02"))),
     ("wb.Drag(problem).to", (("target", "(0, 0, 1)"),)),
-    ("wb.read_task", (("path", "'x.toml'"),)),
-    ("wb.QP().step", (("problem", "problem"), ("q", "figure.neutral"), ("dt", "0.02"), ("measures", "True"))),
+    ("wb.read_task", (("path", "task_paths()['shelf']"),)),
+    ("wb.QP().tracker", (("problem", "problem"), ("dt", "0.02"))),
+    ("wb.QP().tracker(problem, 0.02).step", (("q", "figure.neutral"), ("measures", "True"))),
     ("wb.QP().solve", (("problem", "problem"),)),
     ("wb.CCD().solve", (("problem", "problem"),)),
     ("wb.Newton().solve", (("problem", "problem"),)),
     ("wb.Placo().solve", (("problem", "problem"),)),
     ("wb.DampedLeastSquares().solve", (("problem", "problem"),)),
-    ("wb.Newton().step", (("problem", "problem"), ("q", "figure.neutral"), ("dt", "0.02"))),
+    ("wb.Newton().tracker", (("problem", "problem"), ("dt", "0.02"))),
+    ("wb.Newton().tracker(problem, 0.02).step", (("q", "figure.neutral"),)),
     ("problem.retarget", (("goals", "[wb.Point('link2', (0, 0, 1))]"),)),
     ("scene.add", (("shape", "wb.Sphere(0.1)"), ("name", "'new'"), ("at", "(5, 0, 0)"), ("color", "(1, 0, 0, 1)"))),
     ("scene.attach", (("shape", "wb.Sphere(0.1)"), ("to", "'link2'"), ("name", "'new'"), ("at", "(0, 0, 1)"),
@@ -112,6 +115,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.bench.attack import files
 from wholebody.bench.attack.case import Verdict
+from wholebody.figures.shipped import task_paths
 
 robot = Path(__file__).with_name("robot.urdf")
 figure = wb.load(robot)
@@ -152,10 +156,14 @@ def written(rng: np.random.Generator) -> Written:
     given = dict(arguments)
     for key in rng.permutation([key for key, _ in arguments])[: 1 if rng.random() < 0.85 else 2]:
         given[str(key)] = ODD[int(rng.integers(len(ODD)))]
+    return called(name, given)
+
+
+def called(name: str, given: Mapping[str, str]) -> Written:
+    """Write a call of a public callable with arguments, both as Python."""
     call = f"{name}({', '.join(_argument(key, value) for key, value in given.items())})"
-    return Written(
-        SCRIPT.format(title=f"an odd argument of {name}", call=_used(name, call)), {"robot.urdf": ROBOT.encode()}
-    )
+    script = SCRIPT.format(title=f"an odd argument of {name}", call=_used(name, call))
+    return Written(script, {"robot.urdf": ROBOT.encode()})
 
 
 def _argument(key: str, value: str) -> str:

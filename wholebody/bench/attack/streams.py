@@ -28,13 +28,13 @@ STEPS = (0.001, 1.0 / 60.0, 0.1, 1.0)  # s
 STEPPING = """
 problem = wb.Problem(scene, start, goals=goals, constraints=constraints, clearance={clearance!r})
 watch = streams.Watch(problem, constraints, speed={speed!r}, dt={dt!r})
-method = wb.QP()
+tracker = wb.QP().tracker(problem, {dt!r})
 q = figure.clamp(problem.start)
 for asked, moved in frames:
     for name, at in moved:
         scene.move(name, at=at)
     problem.retarget(asked)
-    step = method.step(problem, q, {dt!r})
+    step = tracker.step(q)
     watch.step(q, step.q)
     q = step.q
 verdict = watch.verdict()
