@@ -133,7 +133,7 @@ ROBOT = """\
 <robot name="two joints">
   <link name="link0"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
   <link name="link1">
-    <collision><origin xyz="0 0 0.2"/><geometry><capsule radius="0.03" length="0.2"/></geometry></collision>
+    <collision><origin xyz="0 0 0.2"/><geometry><box size="0.06 0.06 0.26"/></geometry></collision>
     <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
   <link name="link2">
     <collision><origin xyz="0 0 0.2"/><geometry><capsule radius="0.03" length="0.2"/></geometry></collision>
