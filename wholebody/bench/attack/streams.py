@@ -21,7 +21,9 @@ Array = NDArray[np.float64]
 
 DIP = 5e-4  # m, of pieces of up to a metre: as far as a way between two postures may go deeper into a pair than before
 PARTS = 8  # of a way that are looked at
-DRIFT = 5e-3  # m, rad: by which a step may worsen what must hold: rows are to first order
+DRIFT = (
+    5e-3  # m, rad: by which a step may worsen what must hold, beside the square of its length: rows are to first order
+)
 FRAMES = (10, 40)
 STEPS = (0.001, 1.0 / 60.0, 0.1, 1.0)  # s
 
@@ -81,9 +83,10 @@ class Watch:
         here, there = (judge(self._problem, [], self._constraints, q) for q in (before, after))
         if there.limits > max(here.limits, 1e-9) + 1e-9:
             self._wrongs.append(f"frame {number}: a joint is {there.limits:.3g} out of its limits")
-        if there.constraints > max(here.constraints, DRIFT * max(1.0, Pairs(self._problem.scene).size)):
-            self._wrongs.append(f"frame {number}: what must hold is missed by {there.constraints:.3g}")
         way = pin.difference(model, before, after)
+        turned = (DRIFT + float(way @ way)) * max(1.0, Pairs(self._problem.scene).size)
+        if there.constraints > max(here.constraints, turned):
+            self._wrongs.append(f"frame {number}: what must hold is missed by {there.constraints:.3g}")
         if np.abs(way).max(initial=0.0) > self._most * (1.0 + 1e-6) + 1e-9:
             self._wrongs.append(f"frame {number}: a joint moves {np.abs(way).max():.3g}, allowed are {self._most:.3g}")
         self._dip(number, before, after)
