@@ -85,7 +85,8 @@ class Watch:
             self._wrongs.append(f"frame {number}: a joint is {there.limits:.3g} out of its limits")
         way = pin.difference(model, before, after)
         turned = (DRIFT + float(way @ way)) * max(1.0, Pairs(self._problem.scene).size)
-        if there.constraints > max(here.constraints, turned):
+        apart = here.least > -DIP  # what is inside of something and held cannot have both
+        if apart and there.constraints > max(here.constraints, turned):
             self._wrongs.append(f"frame {number}: what must hold is missed by {there.constraints:.3g}")
         if np.abs(way).max(initial=0.0) > self._most * (1.0 + 1e-6) + 1e-9:
             self._wrongs.append(f"frame {number}: a joint moves {np.abs(way).max():.3g}, allowed are {self._most:.3g}")
