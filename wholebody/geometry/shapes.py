@@ -100,7 +100,7 @@ class Capsule(Shape):
 
 @dataclass(frozen=True)
 class Ellipsoid(Shape):
-    """An ellipsoid, centred at its origin. Its distances are right to about 1e-7 m, those of other shapes to 1e-9.
+    """An ellipsoid, centred at its origin. Its distances are right to 1e-6 m and 1e-5 of its size.
 
     Attributes:
         semi_axes: half lengths along x, y and z, metres.
