@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,10 @@ settings.register_profile("default", deadline=None, suppress_health_check=[Healt
 settings.register_profile(
     "ci", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True, database=None
 )
+# Pieces of meshes are made anew in every run of the tests, by the code under test.
+_CACHE = tempfile.TemporaryDirectory(prefix="wholebody-cache-")
+os.environ["WHOLEBODY_CACHE"] = _CACHE.name
+
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 
