@@ -15,7 +15,7 @@ from wholebody.errors import InputError, UnknownNameError
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
 from wholebody.geometry.hull import hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces, kept
-from wholebody.geometry.meshes import read_mesh
+from wholebody.geometry.meshes import EmptyMeshError, read_mesh
 from wholebody.geometry.pieces import LARGEST, SMALLEST
 
 Array = NDArray[np.float64]
@@ -86,7 +86,10 @@ def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any,
     size, here = shape.size, pin.SE3.Identity()
     if shape.kind in ("mesh", "triangles"):
         share = concavity.get(shape.link) if isinstance(concavity, Mapping) else concavity
-        split = _of_file(shape, share) if shape.file is not None else _of_triangles(shape, share)
+        try:
+            split = _of_file(shape, share) if shape.file is not None else _of_triangles(shape, share)
+        except EmptyMeshError as error:
+            return [], (f"{error}, so it is left out",)
         return [(piece.geometry, piece.placement) for piece in split.pieces], split.notes
     if shape.kind == "halfspace":
         return [(coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), here)], ()

@@ -19,6 +19,10 @@ Y_UP: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Turns a file whose y points up (glTF by its standard, and most modelling programs): a quarter turn about x."""
 
 
+class EmptyMeshError(FileFormatError):
+    """A mesh file that is sound, but has no triangles in it."""
+
+
 def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
     """Read all triangles of a file, every object of it in its place.
 
@@ -64,7 +68,7 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
     finally:
         quiet.setLevel(level)
     if not len(faces):
-        raise FileFormatError(f"mesh {path}: there are no triangles in it")
+        raise EmptyMeshError(f"mesh {path}: there are no triangles in it")
     try:
         return check_mesh(vertices, faces, f"mesh {path}")
     except InputError as error:
