@@ -66,6 +66,28 @@ class Limits(NamedTuple):
     upper: Array
 
 
+class Follower(NamedTuple):
+    """A joint whose value is that of another times a slope plus an offset (mimic).
+
+    Attributes:
+        idx_q: place of the other joint in the posture.
+        slope: never zero.
+        offset: radians or metres.
+    """
+
+    idx_q: int
+    slope: float
+    offset: float
+
+    def value(self, q: Array) -> float:
+        """Value of the joint at a posture."""
+        return self.slope * float(q[self.idx_q]) + self.offset
+
+    def leading(self, value: float) -> float:
+        """Value of the other joint at which this one has a value."""
+        return (value - self.offset) / self.slope
+
+
 class Description(NamedTuple):
     """What a figure knows beyond its model and geometry; all of it by name.
 
@@ -104,3 +126,13 @@ def limits_of(model: pin.Model) -> Limits:
                 rows.append((joint.idx_q, joint.idx_v, low, high))
     columns = np.array(rows).reshape(-1, 4).T
     return Limits(columns[0].astype(np.intp), columns[1].astype(np.intp), columns[2].copy(), columns[3].copy())
+
+
+def followers_of(model: pin.Model) -> dict[str, Follower]:
+    """Return the joints of a model that follow another one."""
+    found = {}
+    for name, joint in zip(model.names, model.joints, strict=True):
+        if joint.shortname() == "JointModelMimic":
+            law = joint.extract()
+            found[name] = Follower(int(joint.idx_q), float(law.scaling), float(law.offset))
+    return found

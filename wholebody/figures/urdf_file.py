@@ -17,6 +17,7 @@ from wholebody.geometry.pieces import LARGEST
 EXTENSION = "wholebody"
 """Name of the element that says what a URDF has no words for; see `wholebody.figures.urdf_extension`."""
 
+
 class UrdfFile(NamedTuple):
     """A checked URDF.
 

@@ -59,7 +59,9 @@ class UrdfJoint(NamedTuple):
     mimic: Mimic | None
 
 
-def read_joints(robot: Element, links: tuple[str, ...], path: Path) -> tuple[tuple[UrdfJoint, ...], str, tuple[str, ...]]:
+def read_joints(
+    robot: Element, links: tuple[str, ...], path: Path
+) -> tuple[tuple[UrdfJoint, ...], str, tuple[str, ...]]:
     """Read and check all joints.
 
     Returns:
@@ -95,7 +97,7 @@ def _with_leaders(joints: list[UrdfJoint], notes: list[str]) -> list[UrdfJoint]:
     for joint in joints:
         if joint.mimic is not None and joint.mimic.joint not in known:
             notes.append(
-                f"joint {joint.name!r}: it mimics {joint.mimic.joint!r}, which is not in the file, so it moves by itself"
+                f"joint {joint.name!r}: it mimics {joint.mimic.joint!r}, which is not in the file, so it is on its own"
             )
             joint = joint._replace(mimic=None)
         made.append(joint)
@@ -111,7 +113,9 @@ def _joint(element: Element, links: frozenset[str], place: str, notes: list[str]
         found = element.find(tag)
         end = found.get("link") if found is not None else None
         if end not in links:
-            raise FileFormatError(f"{place} has the {tag} link {end!r}, which is not in the file; add it or mend the name")
+            raise FileFormatError(
+                f"{place} has the {tag} link {end!r}, which is not in the file; add it or mend the name"
+            )
         ends.append(str(end))
     axis = np.array([1.0, 0.0, 0.0])
     direction = element.find("axis")
@@ -123,7 +127,9 @@ def _joint(element: Element, links: frozenset[str], place: str, notes: list[str]
         axis = axis / length
     lower, upper, velocity, effort = _limits(element, kind, place, notes)
     origin, name = placement(element, place, LARGEST), str(element.get("name"))
-    return UrdfJoint(name, kind, ends[0], ends[1], origin, axis, lower, upper, velocity, effort, _mimic(element, kind, place))
+    return UrdfJoint(
+        name, kind, ends[0], ends[1], origin, axis, lower, upper, velocity, effort, _mimic(element, kind, place)
+    )
 
 
 def _limits(element: Element, kind: str, place: str, notes: list[str]) -> tuple[float, float, float, float]:
@@ -173,9 +179,13 @@ def _check_followers(joints: dict[str, UrdfJoint], path: Path) -> None:
         while (mimic := joints[seen[-1]].mimic) is not None:
             place = f"{path}: joint {seen[-1]!r}"
             if joints[mimic.joint].kind in ("floating", "planar"):
-                raise FileFormatError(f"{place} mimics {mimic.joint!r}, which is {joints[mimic.joint].kind}; name another")
+                raise FileFormatError(
+                    f"{place} mimics {mimic.joint!r}, which is {joints[mimic.joint].kind}; name another"
+                )
             if mimic.joint in seen:
-                raise FileFormatError(f"{place} mimics {mimic.joint!r}, which mimics it in turn; let one of them be free")
+                raise FileFormatError(
+                    f"{place} mimics {mimic.joint!r}, which mimics it in turn; let one of them be free"
+                )
             seen.append(mimic.joint)
 
 

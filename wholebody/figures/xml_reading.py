@@ -138,9 +138,7 @@ def placement(element: Element, place: str, most: float) -> pin.SE3:
     if origin is None:
         return pin.SE3.Identity()
     roll, pitch, yaw = bounded(origin, "rpy", place, 3, "0 0 0", 1e6)
-    return pin.SE3(
-        pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(bounded(origin, "xyz", place, 3, "0 0 0", most))
-    )
+    return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(bounded(origin, "xyz", place, 3, "0 0 0", most)))
 
 
 def _short(text: object) -> str:

@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wholebody.errors import InputError, MissingPackageError
-from wholebody.geometry.components import Component, split_components
+from wholebody.geometry.components import Component, enclosed_volume, split_components
 from wholebody.geometry.hull import hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, kept
 from wholebody.geometry.outer_hull import outer_hull
@@ -89,12 +89,11 @@ def mesh_hull(
     except InputError:
         piece = hull_piece(thickened(points), what, max_vertices)
         notes.append(f"{what}: it is thinner than {SMALLEST} m, so its hull is thickened by {SMALLEST} m to all sides")
-    parts = split_components(cloud, triangles)
-    solid = sum(part.volume for part in parts if part.closed)
-    if not parts or not all(part.closed for part in parts):
+    solid = enclosed_volume(cloud, triangles)
+    if solid is None:
         notes.append(f"{what}: its surface is not closed, so what its convex hull adds is not known")
         return ConvexPieces((piece,), 0.0, tuple(notes))
-    added = max(piece.volume / solid - 1.0, 0.0) if solid > 0.0 else 0.0
+    added = max(piece.volume / solid - 1.0, 0.0)
     if added > TOLD_VOLUME:
         notes.append(f"{what}: its convex hull has {added:.0%} more volume")
     return ConvexPieces((piece,), added, tuple(notes))

@@ -20,6 +20,12 @@ from wholebody.geometry.pieces import LARGEST, SMALLEST, Array, Piece
 MOST_NEIGHBOURS = 255
 """Edges at one vertex that coal can count."""
 
+FEW = 1000
+"""Points up to which duplicates are dropped before their hull is made: qhull drops those of many by itself."""
+
+MOST_LOOKED_AT = 1000
+"""Faces across which the width of a hull is measured, those nearest to its middle."""
+
 MANY_EDGES = 128
 """Vertices of the hull around one that has more edges at a vertex than coal can count."""
 
@@ -37,7 +43,9 @@ def hull_piece(points: ArrayLike, what: str = "hull", max_vertices: int | None =
         InputError: not (n, 3), not finite, fewer than four different points, or thinner than `SMALLEST` in some
             direction (flat and collinear points too).
     """
-    cloud = check_points(points, what)
+    cloud = _finite_points(points, what)
+    if len(cloud) < FEW:
+        cloud = np.unique(cloud, axis=0)
     hull = _solid_hull(cloud, what)
     if max_vertices is not None and len(hull.vertices) > max_vertices:
         hull = _solid_hull(outer_hull(cloud[hull.vertices], max_vertices), what)
@@ -79,6 +87,10 @@ def check_points(points: ArrayLike, what: str) -> Array:
     Raises:
         InputError: another shape, not finite, or farther than `LARGEST` from the origin.
     """
+    return np.unique(_finite_points(points, what), axis=0)
+
+
+def _finite_points(points: ArrayLike, what: str) -> Array:
     try:
         cloud = np.asarray(points, dtype=float)
     except (TypeError, ValueError):
@@ -92,7 +104,7 @@ def check_points(points: ArrayLike, what: str) -> Array:
         raise InputError(
             f"{what}: a point lies {np.abs(cloud).max():.4g} m from the origin; give metres, at most {LARGEST:g}"
         )
-    return np.unique(cloud, axis=0)
+    return cloud
 
 
 def _solid_hull(cloud: Array, what: str) -> Any:
@@ -103,9 +115,8 @@ def _solid_hull(cloud: Array, what: str) -> Any:
         raise InputError(
             f"{what}: {len(cloud)} different points enclose no volume; give at least four that are not in a plane"
         )
-    spread = np.ptp(
-        (cloud - cloud.mean(axis=0)) @ np.linalg.svd(cloud - cloud.mean(axis=0), full_matrices=False)[2].T, axis=0
-    )
+    centred = cloud - cloud.mean(axis=0)
+    spread = np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1][:, ::-1], axis=0)
     if spread.min() < SMALLEST:
         shape = "in one place" if spread[0] < SMALLEST else "on a line" if spread[1] < SMALLEST else "in a plane"
         raise InputError(f"{what}: all points lie {shape} to {SMALLEST} m; give points that enclose a volume")
@@ -115,9 +126,13 @@ def _solid_hull(cloud: Array, what: str) -> Any:
         raise InputError(
             f"{what}: qhull finds no volume in the points ({str(error).splitlines()[0]}); give solid points"
         ) from None
-    width = -(cloud @ hull.equations[:, :3].T + hull.equations[:, 3]).min(axis=0)
-    if width.min() < SMALLEST:
-        raise InputError(f"{what}: the points are {width.min():.2g} m thick; give at least {SMALLEST} m")
+    corners = cloud[hull.vertices]
+    inside = -(hull.equations[:, :3] @ corners.mean(axis=0) + hull.equations[:, 3])
+    if inside.min() < SMALLEST:  # no ball of that size is known to be inside: the width itself is asked for
+        thin = np.argsort(inside)[:MOST_LOOKED_AT]
+        width = -(corners @ hull.equations[thin, :3].T + hull.equations[thin, 3]).min(axis=0)
+        if width.min() < SMALLEST:
+            raise InputError(f"{what}: the points are {width.min():.2g} m thick; give at least {SMALLEST} m")
     return hull
 
 
