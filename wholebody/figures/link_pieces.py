@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,6 +26,8 @@ CYLINDER_SIDES = 32
 
 WHOLE_IN_ONE_FILE = (".obj", ".stl", ".glb", ".dae")
 """Kinds of mesh files whose triangles are all in the file itself, so that its content says what they are."""
+
+_log = logging.getLogger(__name__)
 
 Concavity = float | Mapping[str, float] | None
 """None: a hull for each mesh. A number: what a decomposition of every mesh may leave. A mapping: of which links."""
@@ -120,6 +123,7 @@ def _of_file(shape: LinkShape, share: float | None) -> ConvexPieces:
     scale = np.array(shape.size)
 
     def make() -> ConvexPieces:
+        _log.info("link %s: making convex pieces of %s", shape.link, file)
         vertices, faces = read_mesh(file)
         return _pieces(vertices * scale, faces[:, ::-1] if np.prod(scale) < 0.0 else faces, share, what)
 
