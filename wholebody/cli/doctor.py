@@ -7,7 +7,8 @@ import argparse
 HELP = "check this installation: versions, methods, QP solvers, tools"
 DESCRIPTION = """\
 Print the versions of all packages, use every method and QP solver once, and name wrong combinations and search paths
-with what mends them; and what is kept on disk of the convex pieces of meshes. Ends with exit code 1 when something is wrong; what is absent but not needed is no fault."""
+with what mends them; and say what is kept on disk of the convex pieces of meshes. Ends with exit code 1 when something
+is wrong; what is absent but not needed is no fault."""
 
 _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[red]broken[/]"}
 
@@ -19,7 +20,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser.add_argument(
         "--clear-cache",
         action="store_true",
-        help="throw away the convex pieces of meshes that are kept on disk, and end",
+        help="throw away the pieces of meshes that are kept on disk, and end",
     )
     parser.set_defaults(run=run)
 

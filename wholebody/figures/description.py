@@ -70,11 +70,13 @@ class Follower(NamedTuple):
     """A joint whose value is that of another times a slope plus an offset (mimic).
 
     Attributes:
-        idx_q: place of the other joint in the posture.
+        joint: name of the other one.
+        idx_q: its place in the posture.
         slope: never zero.
         offset: radians or metres.
     """
 
+    joint: str
     idx_q: int
     slope: float
     offset: float
@@ -130,9 +132,13 @@ def limits_of(model: pin.Model) -> Limits:
 
 def followers_of(model: pin.Model) -> dict[str, Follower]:
     """Return the joints of a model that follow another one."""
-    found = {}
-    for name, joint in zip(model.names, model.joints, strict=True):
+    found: dict[str, Follower] = {}
+    leader: dict[int, str] = {}
+    for name, joint in list(zip(model.names, model.joints, strict=True))[1:]:
         if joint.shortname() == "JointModelMimic":
             law = joint.extract()
-            found[name] = Follower(int(joint.idx_q), float(law.scaling), float(law.offset))
+            place = int(joint.idx_q)
+            found[name] = Follower(leader[place], place, float(law.scaling), float(law.offset))
+        else:
+            leader[int(joint.idx_q)] = name
     return found

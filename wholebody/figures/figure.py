@@ -43,6 +43,7 @@ class Figure:
         excluded_pairs: pairs of pieces that are never tested, with the reason.
         notes: sentences on what had to be changed about the geometry of a file.
         limits: joint limits as arrays.
+        followers: joint to the law by which it follows another (mimic).
         effort_weights: (nv,) weight of each degree of freedom in the effort; 0 for the root.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
     """
@@ -72,7 +73,7 @@ class Figure:
         self._frame_ids = {frame.name: index for index, frame in reversed(list(enumerate(model.frames)))}
         self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
         self.limits = limits_of(model)
-        self._followers = followers_of(model)
+        self.followers = MappingProxyType(followers_of(model))
         root = slice(0, 6 if self.root == "free" else 0)
         self.effort_weights = np.ones(model.nv)
         for joint, weight in description.effort.items():
@@ -182,8 +183,8 @@ class Figure:
         values = {}
         for name in self.joints:
             joint = self.model.joints[self._joint_ids[name]]
-            if name in self._followers:
-                values[name] = self._followers[name].value(q)
+            if name in self.followers:
+                values[name] = self.followers[name].value(q)
             elif joint.nq == 1:
                 values[name] = float(q[joint.idx_q])
             elif (joint.nq, joint.nv) == (2, 1):
@@ -209,8 +210,8 @@ class Figure:
             number = float(value)
             if not np.isfinite(number):
                 raise InputError(f"joint {name!r} is {value!r}; give a finite number")
-            if name in self._followers:
-                q[joint.idx_q] = self._followers[name].leading(number)
+            if name in self.followers:
+                q[joint.idx_q] = self.followers[name].leading(number)
             elif joint.nq == 1:
                 q[joint.idx_q] = number
             elif (joint.nq, joint.nv) == (2, 1):

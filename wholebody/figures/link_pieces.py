@@ -44,6 +44,7 @@ class LinkShape(NamedTuple):
             halfspace: none; mesh: scale along x, y, z; triangles: none.
         file: of a mesh.
         triangles: vertices (n, 3) and faces (m, 3).
+        name: of the shape in the file; empty without one.
     """
 
     link: str
@@ -52,6 +53,7 @@ class LinkShape(NamedTuple):
     size: tuple[float, ...]
     file: Path | None = None
     triangles: tuple[Array, NDArray[np.int64]] | None = None
+    name: str = ""
 
 
 def check_concavity(concavity: object, links: Iterable[str]) -> Concavity:

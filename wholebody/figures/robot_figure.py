@@ -90,9 +90,16 @@ def link_chains(model: pin.Model, links: Iterable[str]) -> dict[str, Chain]:
 
 
 def geometry_of_links(
-    model: pin.Model, shapes: Iterable[LinkShape], concavity: Concavity, path: Path
+    model: pin.Model, shapes: Iterable[LinkShape], concavity: Concavity, path: Path, named: bool = False
 ) -> tuple[pin.GeometryModel, tuple[str, ...]]:
     """Return the convex pieces of links, and one sentence on each thing that was changed about them.
+
+    Args:
+        model: Pinocchio's model.
+        shapes: of the links.
+        concavity: see `link_pieces`.
+        path: of the file, for errors.
+        named: call a piece as its shape is called in the file, and not "<link>:<k>".
 
     Raises:
         FileFormatError: a mesh that cannot be read, with the link.
@@ -110,7 +117,7 @@ def geometry_of_links(
         for solid, placement in pieces:
             k = count[shape.link] = count.get(shape.link, -1) + 1
             piece = pin.GeometryObject(
-                f"{shape.link}:{k}",
+                shape.name if named and shape.name and len(pieces) == 1 else f"{shape.link}:{k}",
                 frame.parentJoint,
                 frame_id,
                 frame.placement * shape.placement * placement,

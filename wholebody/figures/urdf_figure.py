@@ -10,6 +10,7 @@ from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
 from wholebody.figures.robot_figure import geometry_of_links, robot_figure
+from wholebody.figures.urdf_extension import extended_figure
 from wholebody.figures.urdf_file import read_urdf
 from wholebody.figures.urdf_model import urdf_model
 
@@ -19,7 +20,7 @@ SAMPLES = 400
 
 def urdf_figure(
     path: str | PathLike[str],
-    root: str = "fixed",
+    root: str | None = None,
     package_dirs: Iterable[str | PathLike[str]] = (),
     concavity: Concavity = None,
     samples: int = SAMPLES,
@@ -29,7 +30,7 @@ def urdf_figure(
 
     Args:
         path: the file.
-        root: "fixed" to the world, or "free".
+        root: "fixed" to the world, or "free"; if left out, as the file says (see `urdf_extension`), or "fixed".
         package_dirs: folders in which ``package://`` names are looked up, before the file's own parents and those of
             ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
         concavity: None for one convex hull for each mesh; or what convex pieces of meshes may leave, 0.01 (close) to 1,
@@ -42,10 +43,16 @@ def urdf_figure(
         InputError: another root, or a concavity out of range.
         UnknownNameError: `concavity` names a link that is not there.
     """
-    if root not in ("fixed", "free"):
+    if root not in (None, "fixed", "free"):
         raise InputError(f"root is {root!r}; give 'fixed' or 'free'")
     folders = [package_dirs] if isinstance(package_dirs, (str, PathLike)) else package_dirs
     urdf = read_urdf(Path(path), [Path(folder) for folder in folders])
+    extension = urdf.extension
+    if root is None:
+        root = "free" if extension is not None and extension.get("root") == "free" else "fixed"
     model, remarks = urdf_model(urdf, root)
-    geometry, notes = geometry_of_links(model, urdf.shapes, check_concavity(concavity, urdf.links), urdf.path)
+    hollows = check_concavity(concavity, urdf.links)
+    geometry, notes = geometry_of_links(model, urdf.shapes, hollows, urdf.path, named=extension is not None)
+    if extension is not None:
+        return extended_figure(urdf.path, extension, urdf.name, model, geometry, (*urdf.notes, *remarks, *notes))
     return robot_figure(urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), samples, seed)

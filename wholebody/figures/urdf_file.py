@@ -124,5 +124,7 @@ def _shapes(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> list[L
             raise FileFormatError(f"{place}: the {kind} has the size {min(size):g}; give metres above zero")
         if kind != "mesh" and max(size) > LARGEST:
             raise FileFormatError(f"{place}: the {kind} has the size {max(size):g}; give metres, at most {LARGEST:g}")
-        found.append(LinkShape(name, placement(collision, place, LARGEST), kind, size, file))
+        found.append(
+            LinkShape(name, placement(collision, place, LARGEST), kind, size, file, name=collision.get("name", ""))
+        )
     return found
