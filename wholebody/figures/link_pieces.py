@@ -39,9 +39,9 @@ class LinkShape(NamedTuple):
     Attributes:
         link: name of the link.
         placement: in the link's frame.
-        kind: "box", "sphere", "cylinder", "capsule", "ellipsoid", "halfspace", "mesh" or "triangles".
+        kind: "box", "sphere", "cylinder", "capsule", "ellipsoid", "mesh" or "triangles".
         size: box: three edges; sphere: radius; cylinder and capsule: radius, length; ellipsoid: three semi-axes;
-            halfspace: none; mesh: scale along x, y, z; triangles: none.
+            mesh: scale along x, y, z; triangles: none.
         file: of a mesh.
         triangles: vertices (n, 3) and faces (m, 3).
         name: of the shape in the file; empty without one.
@@ -96,8 +96,6 @@ def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any,
         except EmptyMeshError as error:
             return [], (f"{error}, so it is left out",)
         return [(piece.geometry, piece.placement) for piece in split.pieces], split.notes
-    if shape.kind == "halfspace":
-        return [(coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), here)], ()
     size, notes = _solid(size, shape.kind)
     if shape.kind == "box":
         return [(coal.Box(*size), here)], notes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.errors import FileFormatError, WholebodyError
+from wholebody.errors import FileFormatError, InputError, WholebodyError
 from wholebody.figures.description import Chain, Description
 from wholebody.figures.figure import ROOT_JOINT, Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces
@@ -19,6 +20,9 @@ from wholebody.figures.self_pairs import choose_pairs
 from wholebody.geometry.large_models import geometry_model
 
 Array = NDArray[np.float64]
+
+DATA_KEPT = 4
+"""Pinocchio's data that a scene with one problem holds."""
 
 COLOR = (0.62, 0.66, 0.70, 1.0)
 
@@ -74,6 +78,30 @@ def _told(rest: RestPosture) -> list[str]:
         notes.append(f"posture 'neutral': moved away from zero, where {shown}{more} overlap")
     notes += [f"pair {pair.a} and {pair.b}: not tested, {pair.reason}" for pair in rest.excluded]
     return notes
+
+
+def check_size(model: pin.Model, path: Path) -> None:
+    """Refuse a model for which the memory of this machine does not suffice.
+
+    Pinocchio's data hold four tables of the cube of the degrees of freedom: 0.26 GB for 200 of them, 108 GB for 1,500.
+
+    Raises:
+        InputError: too many degrees of freedom.
+    """
+    needed = DATA_KEPT * 4 * 8 * model.nv**3
+    if needed > machine_memory():
+        raise InputError(
+            f"{path}: {model.nv} degrees of freedom need {needed / 1e9:.0f} GB, since Pinocchio keeps tables of their "
+            f"cube, and this machine has {machine_memory() / 1e9:.0f} GB; make joints fixed that need not move"
+        )
+
+
+def machine_memory() -> float:
+    """Return the bytes of memory of this machine; inf where the system does not say."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return float("inf")
 
 
 def link_chains(model: pin.Model, links: Iterable[str]) -> dict[str, Chain]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
-from wholebody.figures.robot_figure import geometry_of_links, robot_figure
+from wholebody.figures.robot_figure import check_size, geometry_of_links, robot_figure
 from wholebody.figures.urdf_extension import extended_figure
 from wholebody.figures.urdf_file import read_urdf
 from wholebody.figures.urdf_model import urdf_model
@@ -40,7 +40,7 @@ def urdf_figure(
 
     Raises:
         FileFormatError: a file that cannot be read, with the place and the mend.
-        InputError: another root, or a concavity out of range.
+        InputError: another root, a concavity out of range, or more joints than memory suffices for.
         UnknownNameError: `concavity` names a link that is not there.
     """
     if root not in (None, "fixed", "free"):
@@ -51,6 +51,7 @@ def urdf_figure(
     if root is None:
         root = "free" if extension is not None and extension.get("root") == "free" else "fixed"
     model, remarks = urdf_model(urdf, root)
+    check_size(model, urdf.path)
     hollows = check_concavity(concavity, urdf.links)
     geometry, notes = geometry_of_links(model, urdf.shapes, hollows, urdf.path, named=extension is not None)
     if extension is not None:

@@ -20,9 +20,10 @@ from wholebody.geometry.pieces import LARGEST, SMALLEST, Array, Piece
 CONVEX_VOLUME = 1e-4
 """A closed part is taken as convex when its hull adds at most this share of its volume: float32 files round by less."""
 
-HULL_VERTICES = 48
-"""Most vertices of a link's hull: with 32 the hulls of real robots have 12 % more volume than with all their vertices,
-with 48 they have 6 %, and with 64 they have 4 %. Contacts have more rows with more vertices."""
+HULL_VERTICES = (64, 48)
+"""A hull of a whole mesh with more vertices than the first number gets as many as the second. With 32 the hulls of real
+robots have 12 % more volume than with all their vertices, with 48 they have 6 %, and with 64 they have 4 %. Contacts
+have more rows with more vertices."""
 
 TOLD_VOLUME = 0.01
 """Share of added volume from which on it is told."""
@@ -64,18 +65,15 @@ def convex_pieces(
     return found._replace(pieces=tuple(piece._replace(placement=pin.SE3(piece.placement)) for piece in found.pieces))
 
 
-def mesh_hull(
-    vertices: ArrayLike, faces: ArrayLike, max_vertices: int = HULL_VERTICES, what: str = "mesh"
-) -> ConvexPieces:
+def mesh_hull(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> ConvexPieces:
     """The convex hull of a whole triangle mesh, as one piece that holds all of it.
 
-    A hull of more than `max_vertices` vertices is replaced by one around it, and a mesh that is too thin to be solid is
-    thickened. `notes` says so, and what volume was added.
+    A hull of many vertices is replaced by one around it that has fewer (`HULL_VERTICES`), and a mesh that is too thin
+    to be solid is thickened. `notes` says what volume was added.
 
     Args:
         vertices: (n, 3), metres.
         faces: (m, 3) vertex indices.
-        max_vertices: most vertices of the hull, at least 8.
         what: what the mesh is, for the error's sentence.
 
     Raises:
@@ -85,9 +83,9 @@ def mesh_hull(
     points = cloud[np.unique(triangles)]
     notes: list[str] = []
     try:
-        piece = hull_piece(points, what, max_vertices)
+        piece = hull_piece(points, what, HULL_VERTICES)
     except InputError:
-        piece = hull_piece(thickened(points), what, max_vertices)
+        piece = hull_piece(thickened(points), what, HULL_VERTICES)
         notes.append(f"{what}: it is thinner than {SMALLEST} m, so its hull is thickened by {SMALLEST} m to all sides")
     solid = enclosed_volume(cloud, triangles)
     if solid is None:

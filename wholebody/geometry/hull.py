@@ -30,14 +30,15 @@ MANY_EDGES = 128
 """Vertices of the hull around one that has more edges at a vertex than coal can count."""
 
 
-def hull_piece(points: ArrayLike, what: str = "hull", max_vertices: int | None = None) -> Piece:
+def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] | None = None) -> Piece:
     """Convex hull of points, with its origin at the centre of the smallest sphere around it.
 
     Args:
         points: (n, 3), metres, n >= 4; duplicates and inner points are dropped.
         what: what the points are, for the error's sentence.
-        max_vertices: a hull with more vertices is replaced by one around it that has no more, at least 8. Without it
-            only a hull that coal cannot take, with more than `MOST_NEIGHBOURS` edges at a vertex, is replaced.
+        vertices: (most, few): a hull with more than `most` vertices is replaced by one around it that has no more than
+            `few`, at least 8. Without it only a hull that coal cannot take, with more than `MOST_NEIGHBOURS` edges at a
+            vertex, is replaced.
 
     Raises:
         InputError: not (n, 3), not finite, fewer than four different points, or thinner than `SMALLEST` in some
@@ -47,8 +48,8 @@ def hull_piece(points: ArrayLike, what: str = "hull", max_vertices: int | None =
     if len(cloud) < FEW:
         cloud = np.unique(cloud, axis=0)
     hull = _solid_hull(cloud, what)
-    if max_vertices is not None and len(hull.vertices) > max_vertices:
-        hull = _solid_hull(outer_hull(cloud[hull.vertices], max_vertices), what)
+    if vertices is not None and len(hull.vertices) > vertices[0]:
+        hull = _solid_hull(outer_hull(cloud[hull.vertices], vertices[1]), what)
     if np.bincount(hull.simplices.ravel()).max() > MOST_NEIGHBOURS:
         hull = _solid_hull(outer_hull(cloud[hull.vertices], MANY_EDGES), what)
     used = hull.vertices
