@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 SEED = 7
 """Of the postures whose tips are the targets."""
 
+FAR = 100.0
+"""Metres: pairs farther apart in the default posture do not count."""
+
 SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0625)
 """How far from the default posture towards a random one a target's posture is: the first that is free of contact."""
 
@@ -32,7 +35,7 @@ class Loaded:
     """What loading gave.
 
     Attributes:
-        seconds: wall time of `wholebody.load`, packages imported before.
+        seconds: CPU time of `wholebody.load`, packages imported before.
         refused: the sentence it was refused with; empty where it was loaded.
         kind: "URDF" or "MJCF".
         nv: degrees of freedom.
@@ -73,14 +76,14 @@ def examine(path: str, reaches: int) -> Loaded:
 
     _ = convex, meshes
     wb.load("hand")  # what every load needs is imported
-    began = time.perf_counter()
+    began = time.process_time()
     try:
         figure = wb.load(path)
     except WholebodyError as error:
-        return Loaded(time.perf_counter() - began, refused=str(error))
-    seconds = time.perf_counter() - began
+        return Loaded(time.process_time() - began, refused=str(error))
+    seconds = time.process_time() - began
     scene = wb.Scene(figure)
-    contacts = scene.contacts(figure.neutral, within=float("inf")) if len(figure.geometry.collisionPairs) else None
+    contacts = scene.contacts(figure.neutral, within=FAR) if len(figure.geometry.collisionPairs) else None
     found = Loaded(
         seconds,
         kind="MJCF" if path.endswith(".xml") else "URDF",
@@ -89,7 +92,7 @@ def examine(path: str, reaches: int) -> Loaded:
         pairs=len(figure.geometry.collisionPairs),
         notes=len(figure.notes),
         left_out=sum(pair.reason == UNPARTED for pair in figure.excluded_pairs),
-        free=float(contacts.distance.min()) if contacts is not None else float("inf"),
+        free=float(contacts.distance.min(initial=FAR)) if contacts is not None else float("inf"),
     )
     if not reaches or not figure.chains:
         return found

@@ -112,7 +112,7 @@ def page(robots: list[Robot], facts: Mapping[str, str], reaches: int) -> str:
         f"- {whole} of {len(reached)} robots solve all of their {reaches} reaches; the median over the robots of the "
         f"median time of a reach is {_ms(float(np.median(medians)) if medians else 0.0)} ms.",
         "",
-        "The columns: wall time of loading with an empty cache and again; degrees of freedom; convex pieces; pairs "
+        "The columns: CPU time of loading with an empty cache and again; degrees of freedom; convex pieces; pairs "
         "that can touch; notes on what was changed about the geometry; least distance of any pair in the default "
         "posture, mm; reaches solved; CPU time of a reach, ms. A reach brings the tip of a chain from the default "
         "posture to where a random posture free of contact has it, without touching itself; the chains take turns, "
