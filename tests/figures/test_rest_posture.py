@@ -57,7 +57,7 @@ def test_a_pair_that_nothing_parts_is_left_out_and_named(tmp_path: Path) -> None
     assert not len(figure.geometry.collisionPairs)
     (pair,) = [pair for pair in figure.excluded_pairs if pair.reason != "neighbours"]
     assert {pair.a, pair.b} == {"left_ball:0", "right_ball:0"}
-    assert pair.reason == "overlap in every sampled posture"
+    assert pair.reason == "touch or overlap in every sampled posture"
     unsampled = wb.load(path, samples=0)
     assert [entry.reason for entry in unsampled.excluded_pairs if entry.reason != "neighbours"] == [UNPARTED]
     assert any("not tested" in note for note in unsampled.notes)

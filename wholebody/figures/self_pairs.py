@@ -16,6 +16,9 @@ Indices = NDArray[np.intp]
 SELDOM = 0.02
 """Share of the sampled postures: pairs that are free in no more of them are shells in shells, and are left out."""
 
+TOUCHING = 2e-4
+"""Metres: pieces nearer than this touch. The phalanges of some hands come no farther apart in any posture."""
+
 UNLIMITED = np.pi
 """Range, each way, in which joints without limits are sampled: radians, or metres for sliding joints."""
 
@@ -24,8 +27,8 @@ def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int, se
     """Put the pairs that can touch into the geometry.
 
     Left out are pieces on one link or joint, pieces of neighbours (no piece on any joint between them), and pairs that
-    overlap in all but a few of a number of random postures within the limits: shells in shells, which next to nothing
-    could free.
+    touch or overlap in all but a few of a number of random postures within the limits: shells in shells, which next to
+    nothing could free.
 
     Args:
         model: Pinocchio's model.
@@ -53,9 +56,9 @@ def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int, se
         geometry.addCollisionPair(pin.CollisionPair(i, j))
     postures = random_postures(model, samples, seed)
     for number, seldom in _seldom_free(model, geometry, postures).items():
-        reason = "overlap in every sampled posture"
+        reason = "touch or overlap in every sampled posture"
         if seldom:
-            reason = f"overlap in all but {seldom} of {samples} sampled postures"
+            reason = f"touch or overlap in all but {seldom} of {samples} sampled postures"
         pair = geometry.collisionPairs[number]
         excluded.append(ExcludedPair(names[pair.first], names[pair.second], reason))
         gone.append(number)
@@ -107,13 +110,15 @@ def _carriers_above(model: pin.Model, joint: Indices) -> Indices:
 
 
 def _seldom_free(model: pin.Model, geometry: pin.GeometryModel, postures: Array) -> dict[int, int]:
-    """Pairs that overlap in all but `SELDOM` of these postures, and in how many they do not.
+    """Pairs that touch or overlap in all but `SELDOM` of these postures, and in how many they do not.
 
     A pair is asked about until it was free too often, which of most is at once.
     """
     if not len(geometry.collisionPairs) or not len(postures):
         return {}
     data, results = model.createData(), pin.GeometryData(geometry)
+    for request in results.collisionRequests:
+        request.security_margin = TOUCHING
     free = dict.fromkeys(range(len(geometry.collisionPairs)), 0)
     most = int(SELDOM * len(postures))
     for q in postures:
