@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from wholebody.figures.description import ExcludedPair, limits_of
 from wholebody.figures.self_pairs import drop_pairs, random_postures
 from wholebody.figures.state import State
-from wholebody.geometry.proximity import Contacts, Proximity
+from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def rest_posture(model: pin.Model, geometry: pin.GeometryModel, seed: int) -> Re
     q = search.pulled_back(best.q, frozenset(left))
     names = [piece.name for piece in geometry.geometryObjects]
     at_zero = set(begun.number.tolist()) - set(left)
-    pairs = search.proximity.pairs
+    pairs = search.proximity.table.pairs
     parted = tuple((names[pairs[k, 0]], names[pairs[k, 1]]) for k in sorted(at_zero))
     return RestPosture(q, zero, tuple(drop_pairs(geometry, left, UNPARTED)), parted)
 
@@ -107,7 +107,7 @@ class _Parting:
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel, zero: Array) -> None:
         self.model, self.zero = model, zero
-        self.proximity, self.state = Proximity(model, geometry), State(model)
+        self.proximity, self.state = Proximity(PairTable(model, geometry)), State(model)
         self.limits = limits_of(model)
         self.movable = np.ones(model.nv, dtype=bool)
         if model.njoints > 1 and model.joints[1].nq == 7:
@@ -150,7 +150,7 @@ class _Parting:
         return left.issuperset(self.contacts(q, 0.5 * APART).number.tolist())
 
     def _corrected(self, q: Array, near: Contacts) -> Array:
-        joint = self.proximity.joint
+        joint = self.proximity.table.joint
         lever = np.cross(near.point_a, near.normal)
         rows = self.state.rows(np.hstack([near.normal, lever]), joint[near.pair[:, 1]], joint[near.pair[:, 0]])
         wanted = 1.5 * APART - near.distance
