@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,10 @@ ROOT = Path(__file__).resolve().parent.parent
 # A failure says how to repeat it. In CI, where CI is set, the examples are the same in every run.
 settings.register_profile("default", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True)
 settings.register_profile("ci", settings.get_profile("default"), derandomize=True, database=None)
+# Pieces of meshes are made anew in every run of the tests, by the code under test.
+_CACHE = tempfile.TemporaryDirectory(prefix="wholebody-cache-")
+os.environ["WHOLEBODY_CACHE"] = _CACHE.name
+
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 COAL = {"formula": (0.0, 1e-12), "iterated": (1e-6, 1e-9), "ellipsoid": (1e-6, 1e-5)}

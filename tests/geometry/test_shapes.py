@@ -18,7 +18,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from wholebody import InputError
-from wholebody.geometry.convex import enclosing_ball, hull_piece
+from wholebody.geometry.hull import enclosing_ball, hull_piece
 from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
 
 Slack = Callable[..., float]
