@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -11,9 +11,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody import checks
+from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import Contacts, Proximity
 from wholebody.geometry.shapes import Shape
@@ -36,7 +38,13 @@ class Scene:
     """
 
     def __init__(self, figure: Figure) -> None:
-        """Begin with the figure alone."""
+        """Begin with the figure alone.
+
+        Raises:
+            InputError: it is no figure.
+        """
+        if not isinstance(getattr(figure, "model", None), pin.Model):
+            raise InputError(f"Scene takes a figure, not {checks.shown(figure)}; load one with wb.load('human')")
         self.figure = figure
         self._objects: dict[str, SceneObject] = {}
         self._excluded: dict[tuple[str, str], str] = {}
@@ -121,7 +129,7 @@ class Scene:
         *,
         name: str,
         at: Any = (0.0, 0.0, 0.0),
-        color: tuple[float, float, float, float] | None = None,
+        color: Sequence[float] | None = None,
     ) -> Scene:
         """Put a thing into the world.
 
@@ -129,15 +137,15 @@ class Scene:
             shape: a `wholebody.geometry.shapes.Shape`.
             name: a name that nothing else in the scene has.
             at: (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3.
-            color: red, green, blue, alpha.
+            color: red, green, blue and, if wanted, alpha, each from 0 to 1.
 
         Returns:
             The scene, so that calls can be chained.
 
         Raises:
-            InputError: the name is taken, or the placement cannot be read.
+            InputError: the name is taken, or the shape, placement or color is none.
         """
-        return self._put(SceneObject(self._new_name(name), shape, to_placement(at), None, color))
+        return self._put(self._new_name(name), shape, at, color)
 
     def attach(
         self,
@@ -147,7 +155,7 @@ class Scene:
         name: str,
         at: Any = (0.0, 0.0, 0.0),
         rests_on: Iterable[str] = (),
-        color: tuple[float, float, float, float] | None = None,
+        color: Sequence[float] | None = None,
     ) -> Scene:
         """Give the figure a thing to carry: it moves with a segment, at `at` in the segment's frame.
 
@@ -161,18 +169,18 @@ class Scene:
             name: a name that nothing else in the scene has.
             at: where, in that frame; as for `add`.
             rests_on: more segments that it is not tested against.
-            color: red, green, blue, alpha.
+            color: red, green, blue and, if wanted, alpha, each from 0 to 1.
 
         Raises:
-            InputError: the name is taken, or the placement cannot be read.
+            InputError: the name is taken, or the shape, placement or color is none.
             UnknownNameError: there is no such frame or segment.
         """
         self.frame_id(to)
-        rests = tuple(rests_on)
+        name = self._new_name(name)
+        rests = tuple(checks.listed(rests_on, f"attach {name!r}: rests_on", "['thorax']"))
         for segment in rests:
-            if segment not in self.figure.segments:
-                raise UnknownNameError("segment", segment, self.figure.segments, f"attach {name!r}: rests_on")
-        return self._put(SceneObject(self._new_name(name), shape, to_placement(at), to, color, rests))
+            checks.known(segment, self.figure.segments, "segment", f"attach {name!r}: rests_on")
+        return self._put(name, shape, at, color, to, rests)
 
     def move(self, name: str, *, at: Any) -> Scene:
         """Place a thing anew: in the world, or in its segment's frame.
@@ -182,7 +190,7 @@ class Scene:
             InputError: the placement cannot be read.
         """
         old = self._object(name)
-        moved = replace(old, placement=to_placement(at))
+        moved = replace(old, placement=to_placement(at, f"{name!r}: at"))
         self._objects[name] = moved
         if self._built is not None:
             base = moved.placement
@@ -203,12 +211,13 @@ class Scene:
         self._changed()
         return self
 
-    def _put(self, thing: SceneObject) -> Scene:
-        shape: object = thing.shape
-        if not isinstance(shape, Shape):
-            kind = type(shape).__name__
-            raise InputError(f"{thing.name!r} is a {kind}, not a shape; give wb.Box, wb.Sphere, wb.Mesh or another")
-        self._objects[thing.name] = thing
+    def _put(
+        self, name: str, shape: Shape, at: Any, color: Any, to: str | None = None, rests_on: tuple[str, ...] = ()
+    ) -> Scene:
+        checks.instance(shape, Shape, repr(name), "give wb.Box, wb.Sphere, wb.Mesh or another")
+        place = to_placement(at, f"{name!r}: at")
+        painted = None if color is None else checks.color(color, f"{name!r}: color")
+        self._objects[name] = SceneObject(name, shape, place, to, painted, rests_on)
         self._changed()
         return self
 
@@ -217,13 +226,10 @@ class Scene:
         self.revision += 1
 
     def _object(self, name: str) -> SceneObject:
-        if name not in self._objects:
-            raise UnknownNameError("object", name, self._objects)
-        return self._objects[name]
+        return self._objects[checks.known(name, self._objects, "object")]
 
     def _new_name(self, name: str) -> str:
-        if not isinstance(name, str) or not name:
-            raise InputError("an object needs a name; give name='table'")
+        checks.text(name, "the name of an object")
         if name in self._objects or name in self.figure.segments:
             raise InputError(
                 f"the scene already has a {name!r}; give the new object another name, or move() the old one"
@@ -246,9 +252,8 @@ class Scene:
         Raises:
             InputError: q has the wrong shape or is not finite, or `within` is not a finite number.
         """
-        if not np.isfinite(within):
-            raise InputError(f"within is a finite distance in metres, not {within}")
-        near = self.proximity.near(self.state(q).data, float(within))
+        within = checks.number(within, "within", -FARTHEST, FARTHEST, "m")
+        near = self.proximity.near(self.state(q).data, within)
         order = np.argsort(near.distance, kind="stable")
         return Contacts(
             near.pair[order], near.distance[order], near.normal[order], near.point_a[order], near.point_b[order],
@@ -270,8 +275,12 @@ class Scene:
         """First contact on the way from q0 to q1, both (nq,), along pin.interpolate; None where there is none.
 
         Continuous: no object is too thin to be seen. See `wholebody.geometry.sweep`.
+
+        Raises:
+            InputError: a posture has the wrong shape, is not finite, or its quaternion is not of unit length.
         """
-        return self.sweeper.first_contact(q0, q1)
+        nq = self.model.nq
+        return self.sweeper.first_contact(checks.posture(q0, nq, "q0"), checks.posture(q1, nq, "q1"))
 
     def simplified(self, problem: Problem, *, lock: bool = True) -> Simplified:
         """A smaller problem whose answers are answers of this one: the joints, pairs and corners that matter.
@@ -288,7 +297,8 @@ class Scene:
         """
         from wholebody.simplification.simplify import Parts, simplify
 
-        if problem.scene is self:
+        checks.flag(lock, "lock")
+        if getattr(problem, "scene", None) is self:
             return simplify(problem, Parts(lock=lock))
         raise InputError("the problem is about another scene; call problem.scene.simplified(problem)")
 

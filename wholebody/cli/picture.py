@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody import files
 from wholebody.errors import InputError, MissingPackageError
 from wholebody.problem import Problem
 from wholebody.taskfile.task import View
@@ -20,9 +21,9 @@ def make_folder(folder: Path) -> None:
         InputError: it cannot be made.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made ({error.strerror}); give another folder with --out") from None
+        files.make_folder(folder)
+    except InputError as error:
+        raise InputError(f"--out: {error}") from None
 
 
 def viewer_of(problem: Problem, view: View, title: str) -> Viewer:

@@ -55,6 +55,7 @@ def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False) ->
     """
     from rich.console import Console
 
+    from wholebody import files
     from wholebody.cli import picture, result, tables
     from wholebody.methods.solve import method_named, solve
     from wholebody.taskfile import read_task
@@ -68,7 +69,7 @@ def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False) ->
     with notes.status("posing"):
         solution = solve(task.problem, chosen)
     text = result.as_json(result.describe(task, solution, out))
-    result.write(out / "result.json", text)
+    files.write(out / "result.json", text)
     if as_json:
         print(text, end="")
     else:

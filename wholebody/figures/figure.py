@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody import checks
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.description import (
     Array,
@@ -16,6 +17,9 @@ from wholebody.figures.description import (
     Indices,
     limits_of,
 )
+
+LARGEST = 1e6
+"""Largest value of a joint, radians or metres, and largest tolerance: what is beyond is a slip."""
 
 ROOT_JOINT = "root_joint"
 
@@ -100,8 +104,7 @@ class Figure:
         Raises:
             UnknownNameError: with the nearest names.
         """
-        if name not in self._description.postures:
-            raise UnknownNameError("posture", name, self.postures)
+        checks.known(name, self.postures, "posture")
         if name not in self._made:
             self._made[name] = self._description.postures[name](self)
         return np.array(self._made[name])
@@ -117,9 +120,9 @@ class Figure:
         Raises:
             UnknownNameError: with the nearest names.
         """
-        if name not in self._frame_ids:
-            raise UnknownNameError("frame", name, {*self.frames, *self.segments})
-        return int(self._frame_ids[name])
+        return int(
+            self._frame_ids[checks.known(name, self._frame_ids, "frame", offered={*self.frames, *self.segments})]
+        )
 
     def joint_id(self, name: str) -> int:
         """Return the index of a joint in the model; "root" is the free root.
@@ -127,20 +130,21 @@ class Figure:
         Raises:
             UnknownNameError: with the nearest names.
         """
-        if name == "root" and self.root == "free":
+        if isinstance(name, str) and name == "root" and self.root == "free":
             return 1
-        if name not in self._joint_ids:
-            raise UnknownNameError("joint", name, self.joints)
-        return self._joint_ids[name]
+        return self._joint_ids[checks.known(name, self._joint_ids, "joint", offered=self.joints)]
 
     def joint_names(self, names: str | Iterable[str]) -> tuple[str, ...]:
         """Return joint names with groups replaced by their joints, each once, in the order given.
 
         Raises:
             UnknownNameError: neither a joint nor a group.
+            InputError: not a list of names.
         """
         found: dict[str, None] = {}
-        for name in [names] if isinstance(names, str) else names:
+        for name in [names] if isinstance(names, str) else checks.listed(names, "names", "['left_arm']"):
+            if not isinstance(name, str):
+                raise InputError(f"{checks.shown(name)} is not the name of a joint or group; give a text")
             if name in self.groups:
                 found.update(dict.fromkeys(self.groups[name]))
             elif name in self._joint_ids or (name == "root" and self.root == "free"):
@@ -185,15 +189,17 @@ class Figure:
             InputError: a value that is not finite, or a joint with more than one degree of freedom.
         """
         q = self._checked(q).copy()
-        for name, value in values.items():
+        if not isinstance(values, Mapping):
+            raise InputError(
+                f"values is {checks.shown(values)}; give values by joint, such as {{'left_elbow_flexion': 0.5}}"
+            )
+        for name, given in values.items():
             joint = self.model.joints[self.joint_id(name)]
-            number = float(value)
-            if not np.isfinite(number):
-                raise InputError(f"joint {name!r} is {value!r}; give a finite number")
+            value = checks.number(given, f"joint {name!r}", -LARGEST, LARGEST, "radians (metres for sliding joints)")
             if joint.nq == 1:
-                q[joint.idx_q] = number
+                q[joint.idx_q] = value
             elif (joint.nq, joint.nv) == (2, 1):
-                q[joint.idx_q : joint.idx_q + 2] = np.cos(number), np.sin(number)
+                q[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
             else:
                 raise InputError(
                     f"joint {name!r} has {joint.nv} degrees of freedom; set its part of the posture itself"
@@ -205,6 +211,7 @@ class Figure:
 
         Infinite where there is no limit. Where q is beyond a limit, both bounds have the sign of the way back.
         """
+        q = self._checked(q)
         lower, upper = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
         idx_q, idx_v, low, high = self.limits
         lower[idx_v], upper[idx_v] = low - q[idx_q], high - q[idx_q]
@@ -212,6 +219,7 @@ class Figure:
 
     def within_limits(self, q: Array, tolerance: float = 1e-9) -> bool:
         """Whether every limited joint is within its limits, to a tolerance for rounding."""
+        tolerance = checks.number(tolerance, "tolerance", 0.0, LARGEST)
         value = self._checked(q)[self.limits.idx_q]
         return bool(((value >= self.limits.lower - tolerance) & (value <= self.limits.upper + tolerance)).all())
 
@@ -242,9 +250,4 @@ class Figure:
         return self._description
 
     def _checked(self, q: Any) -> Array:
-        posture = np.asarray(q, dtype=float)
-        if posture.shape != (self.model.nq,):
-            raise InputError(
-                f"a posture has shape ({self.model.nq},), not {posture.shape}; start from figure.posture(...)"
-            )
-        return posture
+        return checks.posture(q, self.model.nq)

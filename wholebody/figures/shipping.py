@@ -11,6 +11,7 @@ from wholebody.figures.avatar import avatar_blueprint
 from wholebody.figures.blueprint import urdf_text
 from wholebody.figures.hand import MESH, hand_blueprint
 from wholebody.figures.human import blueprint
+from wholebody.files import make_folder, write
 
 
 def write_human(path: str | os.PathLike[str], person: Body) -> None:
@@ -46,7 +47,5 @@ def ellipsoid_stl() -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(text, encoding="utf-8")
-    os.replace(beside, path)
+    make_folder(path.parent)
+    write(path, text)

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
+from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.problem import Iterate, Problem, Solution, Status
 from wholebody.tasks.base import Constraint, Goal
 
@@ -62,12 +63,7 @@ class DampedLeastSquares:
         Raises:
             InputError: a setting out of range.
         """
-        if not 1e-10 <= self.tolerance <= 0.1:
-            raise InputError(f"tolerance is {self.tolerance}; give metres from 1e-10 to 0.1")
-        if self.iterations < 1:
-            raise InputError(f"iterations is {self.iterations}; give 1 or more")
-        if not 0.0 < self.damping < np.inf:
-            raise InputError(f"damping is {self.damping}; give a positive number such as 1e-3")
+        check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, damping=DAMPING)
 
     @property
     def name(self) -> str:
@@ -80,6 +76,7 @@ class DampedLeastSquares:
         Raises:
             InputError: the problem has a constraint that is not an equality, or its scene changed after it was stated.
         """
+        check_problem(problem, "DampedLeastSquares.solve: problem")
         began = time.perf_counter()
         problem.check_fresh()
         descent = _Descent(problem, self)

@@ -11,16 +11,16 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
-from wholebody.errors import InputError
+from wholebody.checks import posture
 from wholebody.methods.ccd.overlap import SHAKES
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.remover import TOUCH, Remover
 from wholebody.methods.ccd.terms import read
+from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, check_problem, check_settings
 from wholebody.problem import Iterate, Problem, Solution, Status
 
 Array = NDArray[np.float64]
 
-LEAST_TOLERANCE = 1e-6
 DISTURBANCES = (0.0, 0.05, 0.2, 0.6)  # rad: of the first starts, from the posture at hand; later ones begin anywhere
 ROUNDS = 6  # reaching and leaving overlap by turns, from one start
 HALVINGS = 12  # of the way back to the start, which ends within a 4000th of it
@@ -74,10 +74,7 @@ class CCD:
         Raises:
             InputError: a setting out of range.
         """
-        if not LEAST_TOLERANCE <= self.tolerance <= 0.1:
-            raise InputError(f"tolerance is {self.tolerance}; give metres from {LEAST_TOLERANCE} to 0.1")
-        if self.iterations < 1 or self.restarts < 0:
-            raise InputError("iterations are at least 1, restarts at least 0")
+        check_settings(self, tolerance=CCD_TOLERANCE, iterations=ITERATIONS, restarts=RESTARTS, seed=SEED)
 
     @property
     def name(self) -> str:
@@ -93,6 +90,7 @@ class CCD:
             UnsupportedTermError: the problem has terms that this method cannot take.
             InputError: the scene changed after the problem was stated.
         """
+        check_problem(problem, "CCD.solve: problem")
         began = time.perf_counter()
         problem.check_fresh()
         search = _Search(self, problem)
@@ -119,7 +117,9 @@ class CCD:
             UnsupportedTermError: the problem has terms that this method cannot take.
             InputError: the scene changed after the problem was stated.
         """
+        check_problem(problem, "CCD.pushed_out: problem")
         problem.check_fresh()
+        q = posture(q, problem.scene.model.nq)
         return _Search(self, problem).pushed_out(q)
 
     def _status(self, best: _Trial, judgement: Assessment) -> Status:

@@ -9,9 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody import checks
+from wholebody.errors import InputError
+from wholebody.methods.inputs import ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.newton.figure_course import FigureCourse
-from wholebody.methods.newton.inequalities import Kind
+from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.linear_algebra.base import Pattern
 from wholebody.methods.newton.linear_algebra.choice import NAMES
 from wholebody.methods.newton.reaching import reach
@@ -74,14 +76,9 @@ class Newton:
             InputError: a setting out of range.
             UnknownNameError: no such linear algebra.
         """
-        if not 1e-10 <= self.tolerance <= 0.1:
-            raise InputError(f"tolerance is {self.tolerance}; give metres from 1e-10 to 0.1")
-        if self.iterations < 1 or self.restarts < 0:
-            raise InputError(f"iterations {self.iterations} and restarts {self.restarts}; give at least 1 and 0")
-        if self.algebra not in NAMES:
-            raise UnknownNameError("linear algebra", self.algebra, NAMES)
-        if self.inequalities not in ("slack", "barrier"):
-            raise InputError(f"inequalities is {self.inequalities!r}; give 'slack' or 'barrier'")
+        check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, restarts=RESTARTS, seed=SEED)
+        checks.known(self.algebra, NAMES, "linear algebra")
+        checks.choice(self.inequalities, KINDS, "inequalities")
 
     @property
     def name(self) -> str:
@@ -109,6 +106,7 @@ class Newton:
         """
         began = time.perf_counter()
         search = Search(self._prepared(problem), self._settings())
+        q = checks.posture(q, problem.scene.model.nq)
         return self._answer(search, search.from_here(q), began)
 
     def step(
@@ -127,7 +125,10 @@ class Newton:
         Raises:
             InputError: the problem has a term that this method has no equations for.
         """
-        course = self._prepared(problem)
+        course, q = self._prepared(problem), checks.posture(q, problem.scene.model.nq)
+        tolerance = checks.number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
+        if dt is not None:
+            checks.time_step(dt, "dt")
         course.objective.anchor(q)
         if dt is not None and any(isinstance(bound, StepLimit) for bound in problem.bounds):
             state = problem.scene.state(q)
@@ -163,6 +164,7 @@ class Newton:
 
     def _prepared(self, problem: Problem) -> FigureCourse:
         """The equations of the problem with its present goals; laid out anew where they are others."""
+        check_problem(problem, "Newton: problem")
         problem.check_fresh()
         course = self._course
         if course is None or course.problem is not problem:

@@ -11,9 +11,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
-from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, check, named_frames
 from wholebody.problem import Iterate, Problem, Solution, Status
@@ -60,10 +60,7 @@ class Placo:
         Raises:
             InputError: a setting out of range.
         """
-        if not 1e-10 <= self.tolerance <= 0.1:
-            raise InputError(f"tolerance is {self.tolerance}; give metres from 1e-10 to 0.1")
-        if self.iterations < 1:
-            raise InputError(f"iterations is {self.iterations}; give 1 or more")
+        check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS)
 
     @property
     def name(self) -> str:
@@ -103,6 +100,7 @@ class Placo:
         )
 
     def _prepared(self, problem: Problem) -> Robot:
+        check_problem(problem, "Placo: problem")
         problem.check_fresh()
         check(problem)
         frames = named_frames(problem)

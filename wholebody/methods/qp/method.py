@@ -8,15 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wholebody.assessment import Assessment, assess
-from wholebody.errors import InputError
+from wholebody.checks import flag
+from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.search import Search, Settings
 from wholebody.methods.qp.solvers.base import make_solver
 from wholebody.methods.qp.tracking import Step, Tracker
 from wholebody.methods.qp.visit import Local
 from wholebody.problem import Problem, Solution, Status
-
-LEAST_TOLERANCE = 1e-10
 
 
 @dataclass
@@ -51,10 +50,8 @@ class QP:
             InputError: a setting out of range.
             UnknownNameError: no such QP solver.
         """
-        if not LEAST_TOLERANCE <= self.tolerance <= 0.1:
-            raise InputError(f"tolerance is {self.tolerance}; give metres from {LEAST_TOLERANCE} to 0.1")
-        if self.iterations < 1 or self.restarts < 0 or self.budget < 0:
-            raise InputError("iterations are at least 1, restarts and budget at least 0")
+        check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, budget=BUDGET, restarts=RESTARTS, seed=SEED)
+        flag(self.measures, "measures")
         self._solver = make_solver(self.solver)
 
     @property
@@ -68,6 +65,7 @@ class QP:
         The later ones are tried only when the earlier ones did not reach the goals, and within the budget. Never
         raises for a goal out of reach or a start in penetration: the status says so.
         """
+        check_problem(problem, "QP.solve: problem")
         began = time.perf_counter()
         settings = Settings(self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures)
         search = Search(problem, self._solver, settings)
@@ -91,8 +89,9 @@ class QP:
         The workspace lives on between calls with the same problem. Without `measures` the step only puts right what
         the one before has left of the goals. See `Tracker`.
         """
+        flag(measures, "QP.step: measures")
         tracker = self._tracker
-        if tracker is None or tracker.problem is not problem or tracker.dt != dt:
+        if tracker is None or tracker.problem is not problem or not isinstance(dt, (int, float)) or tracker.dt != dt:
             tracker = self._tracker = Tracker(problem, self._solver, dt)
         return tracker.step(q, measures)
 
