@@ -132,7 +132,7 @@ def test_mistakes_are_answered_before_anything_changes(scene):
         scene.add(wb.Sphere(0.1), name="table")
     with pytest.raises(wb.InputError, match="already has a 'thorax'"):
         scene.add(wb.Sphere(0.1), name="thorax")
-    with pytest.raises(wb.InputError, match="needs a name"):
+    with pytest.raises(wb.InputError, match="the name of an object is ''; give a line of text"):
         scene.add(wb.Sphere(0.1), name="")
     with pytest.raises(wb.InputError):
         scene.add(wb.Sphere(0.1), name="ball", at=(1.0, np.nan, 0.0))

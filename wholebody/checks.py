@@ -80,7 +80,8 @@ def number(value: object, what: str, low: float, high: float, unit: str = "") ->
         if math.isinf(high):
             wanted = f"a finite number of {low:g} or more" if math.isfinite(low) else "a finite number"
         else:
-            wanted = f"a number between {low:g} and {high:g}"
+            odd = isinstance(value, float) and not math.isfinite(value)
+            wanted = f"a {'finite ' if odd else ''}number between {low:g} and {high:g}"
         raise InputError(f"{what} is {shown(value)}; give {wanted}{f' {unit}' if unit else ''}")
     return found
 
@@ -176,7 +177,7 @@ def listed(value: object, what: str, example: str) -> list[Any]:
             return list(value)
         except TypeError:  # an array without dimensions
             pass
-    raise InputError(f"{what} is {shown(value)}; give a list, such as {example}")
+    raise InputError(f"{what} is {shown(value)}, not a list; give one, such as {example}")
 
 
 def function(value: _T, what: str) -> _T:
@@ -218,7 +219,7 @@ def array(value: object, what: str, wanted: str) -> Array:
     except (TypeError, ValueError, OverflowError, RecursionError):
         found = np.empty(0, dtype=object)
     if found.dtype.kind not in NUMERIC:
-        raise InputError(f"{what} is {shown(value)}; give {wanted}")
+        raise InputError(f"{what} is {shown(value)}, not numbers; give {wanted}")
     real: Array = found if found.dtype == np.float64 else found.astype(np.float64)
     return real
 
@@ -250,7 +251,7 @@ def posture(value: object, size: int, what: str = "a posture") -> Array:
         raise InputError(f"{what} has shape ({size},), not {found.shape}; start from figure.posture(...)")
     if not np.isfinite(found).all():
         wrong = int(np.flatnonzero(~np.isfinite(found))[0])
-        raise InputError(f"{what}: entry {wrong} is not finite; give finite numbers")
+        raise InputError(f"{what} entry {wrong} is not finite; give finite numbers")
     return found
 
 

@@ -141,7 +141,10 @@ def weight(value: object, where: str) -> float:
     Raises:
         InputError: it is no number from `LIGHTEST` to `HEAVIEST`.
     """
-    return number(value, where, LIGHTEST, HEAVIEST, "or leave the term out")
+    try:
+        return number(value, where, LIGHTEST, HEAVIEST)
+    except InputError:
+        raise InputError(f"{where} is {shown(value)}; give a positive number such as 1, or leave it out") from None
 
 
 def target_placement(at: PlacementLike, where: str) -> Any:

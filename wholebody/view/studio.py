@@ -21,7 +21,7 @@ def check_size(size: Any) -> tuple[int, int]:
     given = listed(size, "size", "(960, 720), pixels")
     if len(given) != 2:
         raise InputError(f"size is {shown(size)}; give width and height, pixels")
-    return whole(given[0], "width", 16, LARGEST), whole(given[1], "height", 16, LARGEST)
+    return whole(given[0], "the width of size", 16, LARGEST), whole(given[1], "the height of size", 16, LARGEST)
 
 
 class Studio:
