@@ -173,7 +173,7 @@ def check_writable(path: Path) -> Path:
         InputError: it cannot.
     """
     if not is_folder(path.parent):
-        raise InputError(f"{_named(path)} cannot be written: there is no such folder; make it first")
+        raise _unwritable(path, FileNotFoundError())
     if not os.access(path.parent, os.W_OK | os.X_OK):
         raise InputError(f"{_named(path)} cannot be written: its folder may not be written to; give another place")
     return path
@@ -193,8 +193,10 @@ def make_folder(path: Path) -> None:
 
 
 def _unwritable(path: str | PathLike[str], error: Exception) -> InputError:
+    if isinstance(error, FileNotFoundError):
+        return InputError(f"{_named(path)} cannot be written: there is no such folder; make the folder first")
     why = error.strerror if isinstance(error, OSError) else "no file system takes the name"
-    return InputError(f"{_named(path)} cannot be written ({why}); make its folder first, or give another place")
+    return InputError(f"{_named(path)} cannot be written ({why}); give another place")
 
 
 def _remove_left_behind(folder: Path) -> None:
