@@ -91,6 +91,39 @@ def test_the_result_is_the_posture(task: Path, capsys: pytest.CaptureFixture[str
     assert (reach["angle"], gaze["distance"]) == (None, None)
 
 
+@pytest.mark.parametrize("option", ["--json", "--no-picture"])
+def test_no_browser_is_asked_for_where_no_picture_is_wanted(
+    task: Path, option: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(browser, "find_chromium", lambda: pytest.fail("a browser is looked for"))
+    assert main(["pose", str(task), "--out", "here", option]) == 0
+    assert sorted(file.name for file in Path("here").iterdir()) == ["result.json", "scene.html"]
+    assert "no picture" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["pose"], ["drag"]])
+def test_every_method_can_be_named_and_the_help_lists_them(
+    command: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main([*command, "--help"])
+    assert "qp, ccd, newton, placo, dls" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("method", ["newton", "dls", "placo"])
+def test_methods_are_called_the_same_everywhere(
+    tmp_path: Path, method: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "free.toml"
+    path.write_text(
+        "[figure]\nname = 'avatar'\n[[goal]]\ntype = 'point'\nframe = 'right_index_tip'\ntarget = [0.35, -0.25, 1.1]\n"
+    )
+    main(["pose", str(path), "--method", method, "--out", str(tmp_path / "out"), "--json"])
+    assert json.loads(capsys.readouterr().out)["method"].partition("/")[0] == method
+    path.write_text(path.read_text() + f"[method]\nname = '{method}'\n")
+    assert wb.read_task(path).method.name.partition("/")[0] == method
+
+
 @pytest.mark.usefixtures("no_browser")
 def test_a_goal_out_of_reach_is_an_answer_with_its_own_code(task: Path, capsys: pytest.CaptureFixture[str]) -> None:
     far = (

@@ -6,10 +6,9 @@ from typing import Protocol
 
 from wholebody.checks import shown
 from wholebody.errors import InputError, UnknownNameError
+from wholebody.methods import METHODS
 from wholebody.methods.inputs import check_problem
 from wholebody.problem import Problem, Solution
-
-METHODS = ("qp", "ccd", "newton", "placo", "dls")
 
 
 class Method(Protocol):

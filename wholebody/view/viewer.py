@@ -59,6 +59,8 @@ class Viewer:
         see_through: Collection[str] = (),
         names: bool = False,
         title: str = "wholebody",
+        host: str = "127.0.0.1",
+        port: int = 0,
     ) -> None:
         """Prepare to show a scene.
 
@@ -68,6 +70,9 @@ class Viewer:
             see_through: names of things to draw transparent because they would hide the figure.
             names: write the names of things beside them.
             title: of the browser's tab.
+            host: name or address of this machine at which the live page is served. Any other than 127.0.0.1 lets
+                whoever reaches it look on.
+            port: at which it is served; 0 for the first free one from 7000.
 
         Raises:
             InputError: not a scene, or a value of the wrong kind or out of range.
@@ -80,6 +85,7 @@ class Viewer:
             checks.known(name, scene.objects, "object", "see_through")
         checks.flag(names, "names")
         checks.text(title, "title")
+        self._host, self._port = checks.text(host, "host"), checks.whole(port, "port", 0, 65535)
         self.title = title
         self._stage = Stage()
         self._composition = Composition(scene, self._stage, contact_distance, tuple(see_through), names)
@@ -184,9 +190,10 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Address of the live page, on this machine only; starts its server when first asked for.
+        """Address of the live page; starts its server when first asked for.
 
         Raises:
+            InputError: the port is taken, or the host is no address of this machine.
             ViewerClosedError: the server could not be started.
         """
         return self._live().url
@@ -198,16 +205,16 @@ class Viewer:
         return self
 
     def wait(self, timeout: float = 60.0) -> bool:
-        """Wait up to `timeout` seconds until a browser shows the live page; return whether one does."""
-        return self._live().wait(timeout)
+        """Wait up to `timeout` seconds (`math.inf` for ever) until a browser shows the live page; whether one does."""
+        return self._live().wait(_seconds(timeout))
 
     def wait_until_closed(self, timeout: float = math.inf) -> bool:
         """Wait up to `timeout` seconds until no browser shows the live page any more; return whether that is so."""
-        return self._live().wait_until_closed(timeout)
+        return self._live().wait_until_closed(_seconds(timeout))
 
     def sync(self, timeout: float = 10.0) -> bool:
         """Wait up to `timeout` seconds until every open tab has drawn all that was shown; return whether they have."""
-        return self._live().sync(timeout)
+        return self._live().sync(_seconds(timeout))
 
     # ---- files
 
@@ -284,7 +291,7 @@ class Viewer:
 
     def _live(self) -> Sender:
         if self._sender is None:
-            self._sender = Sender(live_page(self.title))
+            self._sender = Sender(live_page(self.title), self._host, self._port)
             self._stage.connect(self._sender)
         return self._sender
 
@@ -297,3 +304,10 @@ class Viewer:
         if not self._seen:
             raise InputError("nothing is shown yet; call show(q) or play(motion) first")
         return [self._aim() if command.op == CAMERA else command for command in self._stage.store.commands()]
+
+
+def _seconds(timeout: object) -> float:
+    """Seconds to wait, perhaps for ever."""
+    if isinstance(timeout, float) and math.isinf(timeout) and timeout > 0.0:
+        return timeout
+    return checks.number(timeout, "timeout", 0.0, 1e9, "s, or math.inf")
