@@ -165,7 +165,7 @@ def require_browser() -> None:
         (["show", "humna"], ["no figure is called 'humna'", "human"]),
         (["show", "human", "--posture", "siting", "--save", "a.html"], ["no posture", "sitting"]),
         (["show", "human", "--save", "a.gif"], [".html", ".png"]),
-        (["show", "absent.json"], ["absent.json", "result.json"]),
+        (["show", "absent.json"], ["absent.json", "no such file"]),
         (["figure", "human", "--stature", "175"], ["175", "between"]),
         (["figure", "avatar", "--out", "a.urdf"], ["--out", "human"]),
         (["figure", "human", "--out", "a.txt"], [".urdf"]),
@@ -188,6 +188,48 @@ def test_what_is_wrong_is_one_sentence_and_code_2(
 @pytest.mark.parametrize(
     "content",
     [
+        "a = " + "[" * 3000 + "]" * 3000,
+        "a = " + "{a = " * 3000,
+        ".".join(["a"] * 100_000) + " = 1",
+        "clearance = " + "9" * 5000,
+        "clearance = 0x" + "f" * 5000,
+        "clearance = 1e999",
+        "clearance = " + "9" * 400,
+        "'a\\nb' = 1",
+        "\ufeffclearance = -1",
+        "x" * 20_000_000,
+    ],
+)
+def test_a_task_that_is_none_is_refused(task: Path, content: str, capsys: pytest.CaptureFixture[str]) -> None:
+    task.write_text(content)
+    assert main(["pose", str(task)]) == 2
+    captured = capsys.readouterr().err
+    assert captured.startswith("wholebody: ")
+    assert captured.count("\n") == 1
+    assert len(captured) < 500
+
+
+@pytest.mark.parametrize("command", [["pose"], ["show", "--save", "a.html"], ["drag", "--path", "line"]])
+@pytest.mark.parametrize("name", ["/dev/zero", "pipe.toml", ".", "x" * 5000 + ".toml", "a\0b.toml", "\ud800.toml"])
+def test_what_is_no_file_is_refused(
+    task: Path, command: list[str], name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    os.mkfifo(task.parent / "pipe.toml")
+    assert main([command[0], name, *command[1:]]) == 2
+    captured = capsys.readouterr().err
+    assert captured.startswith("wholebody: ")
+    assert captured.count("\n") == 1
+    assert len(captured) < 700
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        '{"task": "small.toml", "q": [' + "9" * 400 + "]}",
+        '{"task": "small.toml", "q": [' + "9" * 5000 + "]}",
+        "[" * 200_000,
+        '{"task": "a\\u0000b", "q": [1]}',
+        '{"task": "/dev/zero", "q": [1]}',
         "{}",
         "[]",
         '{"task": "small.toml", "q": [1, 2]}',
