@@ -21,7 +21,44 @@ from wholebody.figures.description import (
 LARGEST = 1e6
 """Largest value of a joint, radians or metres, and largest tolerance: what is beyond is a slip."""
 
+HEAVIEST = 1e6
+"""Kilograms: greatest mass of what one joint carries."""
+
 ROOT_JOINT = "root_joint"
+
+
+def check_model(model: pin.Model, name: str) -> None:
+    """Refuse a model whose numbers no body has: they would come back as postures that are not numbers.
+
+    Args:
+        model: Pinocchio's model.
+        name: of the figure, for the sentence.
+
+    Raises:
+        InputError: a mass is negative or beyond `HEAVIEST`, a place, an inertia or a limit is not a number, or a lower
+            limit is above the upper one.
+    """
+    for joint in range(1, model.njoints):
+        inertia, at = model.inertias[joint], model.jointPlacements[joint]
+        where = f"{name}, joint {model.names[joint]!r}"
+        if not 0.0 <= inertia.mass <= HEAVIEST:
+            raise InputError(f"{where}: what it carries has a mass of {inertia.mass:g} kg; give 0 to {HEAVIEST:g} kg")
+        for what, values in (("centre of mass", inertia.lever), ("inertia", inertia.inertia)):
+            if not np.isfinite(values).all():
+                raise InputError(f"{where}: the {what} of what it carries is not finite; give finite numbers")
+        if not (np.isfinite(at.rotation).all() and (np.abs(at.translation) <= LARGEST).all()):
+            raise InputError(f"{where}: its origin is not finite or beyond {LARGEST:g} m; give metres")
+    low, high = model.lowerPositionLimit, model.upperPositionLimit
+    wrong = np.flatnonzero(~(low <= high))
+    if len(wrong):
+        joint = next(j for j in model.joints if j.idx_q <= wrong[0] < j.idx_q + j.nq)
+        ends = f"{low[wrong[0]]:g} and {high[wrong[0]]:g}"
+        raise InputError(f"{name}, joint {model.names[joint.id]!r}: its limits are {ends}; give the lower one first")
+    if not (model.velocityLimit >= 0.0).all():
+        wrong = np.flatnonzero(~(model.velocityLimit >= 0.0))
+        joint = next(j for j in model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
+        speed = model.velocityLimit[wrong[0]]
+        raise InputError(f"{name}, joint {model.names[joint.id]!r}: its velocity limit is {speed:g}; give 0 or more")
 
 
 class Figure:
@@ -57,7 +94,12 @@ class Figure:
         description: Description,
         visual: pin.GeometryModel | None = None,
     ) -> None:
-        """Assemble a figure; `wholebody.load` is the usual way to get one."""
+        """Assemble a figure; `wholebody.load` is the usual way to get one.
+
+        Raises:
+            InputError: a mass, a place or a limit of the model is not finite or cannot be.
+        """
+        check_model(model, name)
         self.name, self.model, self.geometry, self.detail = name, model, geometry, detail
         self.visual = geometry if visual is None else visual
         self.groups = MappingProxyType(dict(description.groups))
