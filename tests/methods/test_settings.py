@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import Any
 
 import pytest
@@ -18,7 +19,7 @@ REAL = ("tolerance", "damping")
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_setting_that_is_a_number_is_checked(method: Any) -> None:
-    settings = {name for name in vars(method()) if not name.startswith("_")} - {"solver", "algebra", "inequalities"}
+    settings = {field.name for field in fields(method) if field.init} - {"solver", "algebra", "inequalities"}
     assert settings - {"measures"} <= {*WHOLE, *REAL, "time_limit"}
     for name in settings & {*WHOLE, *REAL}:
         for wrong in (*NO_NUMBER, *((1.5, 2.0) if name in WHOLE else (0.0, 1e9))):
@@ -28,7 +29,7 @@ def test_every_setting_that_is_a_number_is_checked(method: Any) -> None:
 
 @pytest.mark.parametrize("wrong", [None, 0, 1, "yes", [], math.nan])
 def test_flags_are_true_or_false(wrong: Any) -> None:
-    with pytest.raises(InputError, match="measures is .*; give True or False"):
+    with pytest.raises(InputError, match=r"measures is .*; give True or False"):
         wb.QP(measures=wrong)
 
 
@@ -38,7 +39,7 @@ def test_names_are_texts(wrong: Any) -> None:
         wb.QP(solver=wrong)
     with pytest.raises(InputError, match="is not the name of a linear algebra"):
         wb.Newton(algebra=wrong)
-    with pytest.raises(InputError, match="inequalities is .*'slack' or 'barrier'"):
+    with pytest.raises(InputError, match=r"inequalities is .*'slack' or 'barrier'"):
         wb.Newton(inequalities=wrong)
 
 
