@@ -251,8 +251,7 @@ def posture(value: object, size: int, what: str = "a posture") -> Array:
     found = array(value, what, f"{size} numbers; start from figure.posture(...)")
     if found.shape != (size,):
         raise InputError(f"{what} has shape ({size},), not {found.shape}; start from figure.posture(...)")
-    # asked at every step: the square is finite where all values are, but for some beyond 1e150, and takes a fifth
-    if not math.isfinite(found.dot(found)) and not np.isfinite(found).all():
+    if np.count_nonzero(np.isfinite(found)) != size:  # asked at every step: a third of the time of all()
         wrong = int(np.flatnonzero(~np.isfinite(found))[0])
         raise InputError(f"{what} entry {wrong} is not finite; give finite numbers")
     return found
