@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.assessment import _Pairs
+from wholebody.first_order import AllPairs
 from wholebody.geometry.proximity import Proximity
 
 LENGTHS = (0.5, 0.4)
@@ -151,12 +151,12 @@ def test_gradients_of_the_gaps_against_finite_differences(free_bodies):
         q[7 * body : 7 * body + 3] = place
         q[7 * body + 3 : 7 * body + 7] = pin.Quaternion(pin.exp3(np.array([0.3, -0.5, 0.7]))).coeffs()
     problem = wb.Problem(scene, q)
-    pairs = _Pairs(problem)
+    pairs = AllPairs(scene.built)
     pairs.move(q)
     touching = np.flatnonzero(pairs.distance < 0.01)
     assert len(touching) == 3
-    pairs.clearances = problem.clearances = np.full(len(pairs.distance), 0.01)
-    rows = pairs.gradients(problem, pairs.state)
+    problem.clearances = np.full(len(pairs.distance), 0.01)
+    rows, _ = pairs.gradients(problem, pairs.state)
     differences = np.zeros((len(touching), scene.model.nv))
     for k in range(scene.model.nv):
         for sign in (1.0, -1.0):

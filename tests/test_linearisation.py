@@ -66,7 +66,7 @@ def moved(problem, q, k, step):
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_goals_constraints_and_measures(problem, seed):
-    lineariser, q, step = problem.lineariser(), posture(problem, seed), 1e-6
+    lineariser, q, step = problem.lineariser(problem.workspace()), posture(problem, seed), 1e-6
     at = lineariser.at(q, 0.1)
     assert at.goal_jacobian.shape == (len(at.goal_error), 55)
     assert at.value_jacobian.shape == (len(at.value), 55)
@@ -83,7 +83,7 @@ def test_goals_constraints_and_measures(problem, seed):
 
 def test_gaps_of_the_contacts(problem):
     """The first rows are the distances; pairs whose nearest places jump within the step are left out."""
-    lineariser, step = problem.lineariser(), 1e-5
+    lineariser, step = problem.lineariser(problem.workspace()), 1e-5
     checked = 0
     for seed in (2, 3):
         q = posture(problem, seed)
@@ -106,7 +106,7 @@ def test_gaps_of_the_contacts(problem):
 
 
 def test_pairs_are_those_near_enough_for_their_clearance(problem):
-    at = problem.lineariser().at(problem.start, 0.1)
+    at = problem.lineariser(problem.workspace()).at(problem.start, 0.1)
     expected = problem.scene.contacts(problem.start, 0.1 + problem.clearances.max())
     assert sorted(at.contacts.number) == sorted(expected.number)
     assert np.array_equal(at.clearance, problem.clearances[at.contacts.number][at.gap_contact])
@@ -115,21 +115,22 @@ def test_pairs_are_those_near_enough_for_their_clearance(problem):
 def test_bounds_are_limits_frozen_joints_and_speed(problem):
     figure, q = problem.scene.figure, posture(problem, 4)
     lower, upper = figure.tangent_bounds(q)
-    free = problem.lineariser().at(q, 0.1)
+    free = problem.lineariser(problem.workspace()).at(q, 0.1)
     frozen = figure.dofs(["neck"])
     others = np.setdiff1d(np.arange(6, 55), frozen)
     assert not free.lower[frozen].any()
     assert not free.upper[frozen].any()
     assert np.array_equal(free.lower[others], lower[others])
     assert np.array_equal(free.upper[others], upper[others])
-    timed = problem.lineariser(0.01).at(q, 0.1)
+    timed = problem.lineariser(problem.workspace(), 0.01).at(q, 0.1)
     assert np.array_equal(timed.upper[others], np.minimum(upper[others], 0.02))
     assert np.array_equal(timed.lower[others], np.maximum(lower[others], -0.02))
 
 
 def test_a_problem_without_anything():
     scene = wb.Scene(wb.load("hand"))
-    at = wb.Problem(scene, measures=[]).lineariser().at(scene.figure.neutral, -1.0)
+    problem = wb.Problem(scene, measures=[])
+    at = problem.lineariser(problem.workspace()).at(scene.figure.neutral, -1.0)
     assert at.goal_error.shape == at.value.shape == (0,)
     assert at.goal_jacobian.shape == at.value_jacobian.shape == (0, scene.model.nv)
     assert at.gap_jacobian.shape == (0, scene.model.nv)
@@ -137,7 +138,7 @@ def test_a_problem_without_anything():
 
 
 def test_what_was_told_is_not_overwritten_by_the_next_posture(problem):
-    lineariser = problem.lineariser()
+    lineariser = problem.lineariser(problem.workspace())
     at = lineariser.at(problem.start, 0.1)
     copies = {name: np.array(getattr(at, name)) for name in ("q", "goal_error", "goal_jacobian", "gap", "gap_jacobian")}
     copies["distance"] = np.array(at.contacts.distance)

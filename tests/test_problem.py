@@ -80,7 +80,7 @@ def test_pairs_keep_what_they_begin_with_and_leave_what_they_are_in(free_bodies)
         q[7 * k : 7 * k + 3] = k, 0.0, height
     problem = wb.Problem(scene, q, clearance=0.005)
     asked = {}
-    for (a, b), clearance in zip(scene.proximity.pairs, problem.clearances, strict=True):
+    for (a, b), clearance in zip(scene.pair_table.pairs, problem.clearances, strict=True):
         asked[scene.piece_owner[a], scene.piece_owner[b]] = clearance
     on_floor = [asked[f"body{k}", "floor"] for k in range(4)]
     assert on_floor == pytest.approx([0.003, 0.0, 0.005, 0.005], abs=2e-6)
@@ -94,7 +94,7 @@ def test_named_pairs_may_touch_in_either_order(free_bodies):
     q[7] = 1.0
     for pair in (("body0", "table"), ("table", "body0")):
         problem = wb.Problem(scene, q, clearance=0.005, touching=[pair])
-        owners = [{scene.piece_owner[i] for i in pair} for pair in scene.proximity.pairs]
+        owners = [{scene.piece_owner[i] for i in pair} for pair in scene.pair_table.pairs]
         expected = [0.0 if names == {"body0", "table"} else 0.005 for names in owners]
         assert problem.clearances.tolist() == expected
 
@@ -116,7 +116,7 @@ def test_goals_are_replaced_and_the_rest_stays(scene):
 def test_a_problem_is_tied_to_the_things_it_was_stated_with(scene):
     problem = wb.Problem(scene, goals=[GOAL])
     scene.add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 1.0))
-    for ask in (problem.check_fresh, problem.lineariser, lambda: wb.assess(problem, problem.start)):
+    for ask in (problem.check_fresh, problem.workspace, lambda: wb.assess(problem, problem.start)):
         with pytest.raises(wb.InputError, match="state the problem anew"):
             ask()
     again = wb.Problem(scene, goals=[GOAL])

@@ -6,16 +6,17 @@ One pass of Pinocchio, one cull, coal for the pairs that survive, and one matrix
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.proximity import Contacts
-from wholebody.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -60,47 +61,63 @@ class Linearisation:
 
 
 class Lineariser:
-    """Linearises one problem at many postures, re-using its state and buffers."""
+    """Linearises one problem at many postures, in the room of one run.
+
+    Attributes:
+        workspace: moves from posture to posture, and sees things where they were when the run began.
+        goals: what is linearised; may be replaced.
+    """
 
     def __init__(
         self,
-        scene: Scene,
+        workspace: Workspace,
+        limits: Callable[[Array], tuple[Array, Array]],
         goals: Sequence[Goal],
         constraints: Sequence[Constraint],
         bounds: Sequence[Bound],
         measures: Sequence[Measure],
         clearances: Array,
-        state: State,
         dt: float | None = None,
     ) -> None:
         """Take the resolved terms of a problem.
 
         Args:
-            scene: figure and things.
+            workspace: of this run alone.
+            limits: bounds that the joints' limits put on the displacement of a posture; see `Figure.tangent_bounds`.
             goals: resolved goals.
             constraints: resolved constraints.
             bounds: resolved bounds on the displacement.
             measures: resolved measures.
             clearances: (pairs,) least distance asked of every collision pair, metres.
-            state: what to move; a problem's linearisers share one, since Pinocchio's data take 2 ms to make.
             dt: step in seconds for bounds that need one.
         """
-        self.scene, self.goals, self.constraints = scene, goals, constraints
-        self.bounds, self.measures, self.clearances, self.dt = bounds, measures, clearances, dt
-        self.state = state
+        self.workspace, self.state, self._limits = workspace, workspace.state, limits
+        self.constraints, self.bounds, self.measures, self.dt = constraints, bounds, measures, dt
+        self.take(goals, clearances)
+
+    def take(self, goals: Sequence[Goal], clearances: Array) -> None:
+        """Put other goals and clearances in the place of the present ones.
+
+        Raises:
+            InputError: there is not one clearance for each pair.
+        """
+        if clearances.shape != (len(self.workspace.table.pairs),):
+            count = len(self.workspace.table.pairs)
+            raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
+        self.goals, self.clearances = goals, clearances
         self._largest_clearance = float(clearances.max(initial=0.0))
 
     def at(self, q: Array, within: float) -> Linearisation:
         """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance."""
-        state, scene = self.state, self.scene
-        state.update(q)
-        contacts = scene.proximity.near(state.data, within + self._largest_clearance)
+        state, workspace = self.state, self.workspace
+        contacts = workspace.near(q, within + self._largest_clearance)
         clearance = self.clearances[contacts.number]
-        rows = scene.row_builder.rows(contacts, clearance)
+        rows = workspace.rows.rows(contacts, clearance)
 
         errors = [np.atleast_1d(goal.error(state)) for goal in self.goals]
         values = [np.atleast_1d(constraint.value(state)) for constraint in self.constraints]
-        jacobian = self._jacobians(state, rows.wrench, rows.second, rows.first)
+        sizes = [len(part) for part in (*errors, *values)]
+        jacobian = self._jacobians(state, sizes, rows.wrench, rows.second, rows.first)
         goal_rows = sum(len(error) for error in errors)
         value_rows = sum(len(value) for value in values)
         lower, upper = self._box(state)
@@ -123,15 +140,21 @@ class Lineariser:
             upper=upper,
         )
 
-    def _jacobians(self, state: State, gap_wrench: Array, second: Indices, first: Indices) -> Array:
-        """Rows of all goals, constraints and contacts, in this order; the wrenches among them in one product."""
+    def _jacobians(
+        self, state: State, sizes: Sequence[int], gap_wrench: Array, second: Indices, first: Indices
+    ) -> Array:
+        """Rows of all goals, constraints and contacts, in this order; the wrenches among them in one product.
+
+        Raises:
+            InputError: a term has other numbers of values (`sizes`) and rows.
+        """
         wrenches: list[Array] = []
         joint: list[int] = []
         against: list[int] = []
         dense: list[tuple[int, Array]] = []
         row = 0
         terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
-        for term in terms:
+        for term, values in zip(terms, sizes, strict=True):
             part = term.jacobian(state)
             if isinstance(part, Wrench):
                 size = len(part.rows)
@@ -144,6 +167,10 @@ class Lineariser:
                 wrenches.append(np.zeros((size, 6)))
                 joint += [0] * size
                 against += [0] * size
+            if size != values:
+                raise InputError(
+                    f"{type(term).__name__} has {values} values and {size} rows at a posture; give as many"
+                )
             row += size
         stacked = np.vstack([*wrenches, gap_wrench])
         result = state.rows(
@@ -156,7 +183,7 @@ class Lineariser:
         return result
 
     def _box(self, state: State) -> tuple[Array, Array]:
-        lower, upper = self.scene.figure.tangent_bounds(state.q)
+        lower, upper = self._limits(state.q)
         for bound in self.bounds:
             # a joint out of its limits comes back no faster than the bound lets it
             low, high = bound.bounds(state, self.dt)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -18,6 +20,7 @@ from wholebody.linearisation import Lineariser
 from wholebody.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
+from wholebody.workspace import Workspace
 
 if TYPE_CHECKING:
     from wholebody.assessment import Assessment
@@ -41,7 +44,10 @@ class Problem:
         goals, constraints, bounds, measures: the terms, resolved on this scene and start.
         measures_given: whether measures were asked for; false where `Effort()` stands in for none.
         clearance: distance asked of every pair, metres.
-        clearances: (pairs,) distance asked of each collision pair of the scene.
+        clearances: (pairs,) distance asked of each collision pair of the scene; may be changed between runs.
+
+    Threads may solve and assess one problem at the same time; changing it is for one thread alone. It can be pickled;
+    a copy shares the scene, a deep copy has its own.
     """
 
     def __init__(
@@ -73,6 +79,7 @@ class Problem:
         from wholebody.tasks import Effort
 
         self.scene = checks.instance(scene, Scene, "Problem: scene", "make one with wb.Scene(figure)")
+        self._revision = scene.revision
         self.start = _start(scene, start)
         self.clearance = _clearance(clearance)
         terms = [*_checked(goals, (Goal,), "goals")]
@@ -87,41 +94,68 @@ class Problem:
             term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
         )
         self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
-        self._state = State(scene.model)
-        self._check_frozen()
-        self._check_terms()
         pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
         self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
-        self.clearances = self._clearances()
-        self._revision = scene.revision
+        with self.lend() as workspace:
+            state = workspace.state.update(self.start)
+            self._check_frozen(state)
+            _check_goals(self.goals, state)
+            self._check_terms(state)
+            self.clearances = self._clearances(workspace)
 
     def retarget(self, goals: Iterable[Goal]) -> None:
         """Replace the goals, for a goal that moves from frame to frame; everything else stays.
 
+        The new goals are checked as the first ones were; where one is refused, the goals stay as they were.
+
         Raises:
-            InputError: not a list of goals.
+            InputError: not a list of goals, or a goal with a value of the wrong kind, shape or range.
             UnknownNameError: a name that the figure does not have.
         """
         listed = _checked(goals, (Goal,), "goals")
-        self.goals = tuple(goal.resolve(self.scene, self.start) for goal in listed)
+        resolved = tuple(goal.resolve(self.scene, self.start) for goal in listed)
+        doubtful = {number: goal for number, goal in enumerate(resolved) if type(goal) not in built_in_goals()}
+        if doubtful:
+            with self.lend() as workspace:
+                _check_goals(doubtful, workspace.state.update(self.start))
+        self.goals = resolved
 
-    def lineariser(self, dt: float | None = None) -> Lineariser:
-        """What linearises this problem at postures; each method makes its own.
+    @contextmanager
+    def lend(self) -> Iterator[Workspace]:
+        """Room for one run on this problem's scene; see `Scene.lend`.
 
         Raises:
             InputError: objects came to or left the scene after the problem was stated.
         """
+        with self.scene.lend() as workspace:
+            self.check_fresh()  # after it was lent: what comes later does not change it
+            yield workspace
+
+    def workspace(self) -> Workspace:
+        """Room for something that lives on; see `Scene.workspace`.
+
+        Raises:
+            InputError: objects came to or left the scene after the problem was stated.
+        """
+        workspace = self.scene.workspace()
         self.check_fresh()
-        if dt is not None:
-            checks.time_step(dt, "dt")
+        return workspace
+
+    def lineariser(self, workspace: Workspace, dt: float | None = None) -> Lineariser:
+        """What linearises this problem at postures, with its terms and clearances as they are now.
+
+        Args:
+            workspace: of this problem's `lend` or `workspace`.
+            dt: step in seconds for bounds that need one.
+        """
         return Lineariser(
-            self.scene,
+            workspace,
+            self.scene.figure.tangent_bounds,
             self.goals,
             self.constraints,
             self.bounds,
             self.measures,
             self.clearances,
-            self._state,
             dt,
         )
 
@@ -130,9 +164,9 @@ class Problem:
         if self.scene.revision != self._revision:
             raise InputError("objects came to or left the scene after the problem was stated; state the problem anew")
 
-    def _check_frozen(self) -> None:
+    def _check_frozen(self, state: State) -> None:
         """Raise InputError if a bound keeps a joint where its limits do not let it be."""
-        figure, state = self.scene.figure, self._state.update(self.start)
+        figure = self.scene.figure
         least, most = figure.tangent_bounds(self.start)
         for bound in self.bounds:
             low, high = bound.bounds(state, None)
@@ -144,26 +178,21 @@ class Problem:
                     f"{type(bound).__name__} keeps {name} where it starts, out of its limits; start it within them"
                 )
 
-    def _check_terms(self) -> None:
+    def _check_terms(self, state: State) -> None:
         """Evaluate every term once at the start, so that one written wrongly is named before anything is computed."""
-        state = self._state.update(self.start)
-        for number, goal in enumerate(self.goals):
-            check_rows(f"goals[{number}]", goal, goal.error(state), goal.jacobian(state), state)
         for number, constraint in enumerate(self.constraints):
             check_rows(f"constraints[{number}]", constraint, constraint.value(state), constraint.jacobian(state), state)
         for number, measure in enumerate(self.measures):
             check_measure(f"measures[{number}]", measure, state)
 
-    def _clearances(self) -> Array:
-        scene = self.scene
-        asked = np.full(len(scene.proximity.pairs), self.clearance)
-        owners = scene.piece_owner
+    def _clearances(self, workspace: Workspace) -> Array:
+        pairs, owners = workspace.table.pairs, workspace.owners
+        asked = np.full(len(pairs), self.clearance)
         allowed = set(self.touching) | {(b, a) for a, b in self.touching}
         if allowed:
-            named = [(owners[a], owners[b]) in allowed for a, b in scene.proximity.pairs]
+            named = [(owners[a], owners[b]) in allowed for a, b in pairs]
             asked[np.array(named, dtype=bool)] = 0.0
-        state = scene.state(self.start)
-        near = scene.proximity.near(state.data, self.clearance + 1e-9)
+        near = workspace.near(self.start, self.clearance + 1e-9)
         kept = np.maximum(near.distance, 0.0)
         resting = near.distance >= -1e-6
         asked[near.number[resting]] = np.minimum(asked[near.number[resting]], kept[resting])
@@ -219,6 +248,20 @@ class Solution:
         return self.status == "solved"
 
 
+def _check_goals(goals: Mapping[int, Goal] | Sequence[Goal], state: State) -> None:
+    """Evaluate goals, by number, at the start."""
+    for number, goal in goals.items() if isinstance(goals, Mapping) else enumerate(goals):
+        check_rows(f"goals[{number}]", goal, goal.error(state), goal.jacobian(state), state)
+
+
+@cache
+def built_in_goals() -> frozenset[type]:
+    """Goals whose constructors leave nothing for an evaluation to find."""
+    from wholebody import tasks
+
+    return frozenset(kind for name in tasks.__all__ if issubclass(kind := getattr(tasks, name), Goal))
+
+
 def _start(scene: Scene, start: Array | str | None) -> Array:
     figure = scene.figure
     if start is None:
@@ -229,7 +272,7 @@ def _start(scene: Scene, start: Array | str | None) -> Array:
     if np.abs(q).max(initial=0.0) > FARTHEST:
         raise InputError(f"start has a value of {np.abs(q).max():.3g}; give metres and radians")
     normal = pin.normalize(scene.model, q)
-    if np.abs(normal - q).max() > UNIT_TOLERANCE:
+    if np.abs(normal - q).max(initial=0.0) > UNIT_TOLERANCE:
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(normal)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
+from threading import RLock
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -14,17 +16,17 @@ from numpy.typing import NDArray
 from wholebody import checks
 from wholebody.errors import InputError
 from wholebody.figures.state import State
-from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.placement import placement as to_placement
-from wholebody.geometry.proximity import Contacts, Proximity
+from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.geometry.shapes import Shape
 from wholebody.scene_geometry import SceneGeometry, SceneObject, assemble
+from wholebody.workspace import Workspace, lent
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.geometry.penetration import ObjectPenetration
-    from wholebody.geometry.sweep import FirstContact, Sweep
+    from wholebody.geometry.sweep import FirstContact
     from wholebody.problem import Problem
     from wholebody.simplification.simplified import Simplified
 
@@ -35,6 +37,11 @@ class Scene:
     """A figure among things.
 
     The geometry model is built when it is first needed and again after objects come or go. Moving an object keeps it.
+
+    Threads may share a scene: every question and every solve works on room of its own, and sees things where they were
+    when it began. A solve during which objects come or go ends with an `InputError`.
+
+    A scene can be pickled. A copy of it, `copy.copy` or `copy.deepcopy`, has things of its own.
     """
 
     def __init__(self, figure: Figure) -> None:
@@ -49,7 +56,7 @@ class Scene:
         self._objects: dict[str, SceneObject] = {}
         self._excluded: dict[tuple[str, str], str] = {}
         self._built: SceneGeometry | None = None
-        self._state: State | None = None
+        self._lock = RLock()  # while things come, go or move, and while the geometry model is built
         self.revision = 0
 
     @classmethod
@@ -94,24 +101,22 @@ class Scene:
         return MappingProxyType(self._excluded)
 
     @property
-    def proximity(self) -> Proximity:
-        """The distances of this scene's pairs, re-used from posture to posture."""
-        return self._build().proximity
+    def pair_table(self) -> PairTable:
+        """Pieces and pairs as arrays; ``pair_table.pairs`` has the two pieces of each collision pair."""
+        return self._build().table
 
     @property
-    def row_builder(self) -> ContactRowBuilder:
-        """The contact rows of this scene's pairs."""
-        return self._build().rows
+    def built(self) -> SceneGeometry:
+        """What is made from the things that are there now."""
+        return self._build()
 
-    @property
-    def sweeper(self) -> Sweep:
-        """The continuous collision detection of this scene, re-used from motion to motion."""
-        built = self._build()
-        if built.sweep is None:
-            from wholebody.geometry.sweep import Sweep
+    def lend(self) -> AbstractContextManager[Workspace]:
+        """Room for one run: ``with scene.lend() as workspace``. Nothing of it may be kept when the context ends."""
+        return lent(self._build())
 
-            built.sweep = Sweep(self.model, built.geometry)
-        return built.sweep
+    def workspace(self) -> Workspace:
+        """Room for something that lives on, such as what follows goals from step to step; nobody else uses it."""
+        return Workspace(self._build())
 
     def frame_id(self, name: str) -> int:
         """Index of a frame of the figure.
@@ -189,15 +194,14 @@ class Scene:
             UnknownNameError: there is no such object.
             InputError: the placement cannot be read.
         """
-        old = self._object(name)
-        moved = replace(old, placement=to_placement(at, f"{name!r}: at"))
-        self._objects[name] = moved
-        if self._built is not None:
-            base = moved.placement
-            if moved.segment is not None:
-                base = self.model.frames[self.frame_id(moved.segment)].placement * base
-            for index, local in self._built.pieces_of[name]:
-                self._built.geometry.geometryObjects[index].placement = base * local
+        place = to_placement(at, f"{checks.shown(name)}: at")
+        with self._lock:
+            moved = self._objects[name] = replace(self._object(name), placement=place)
+            if self._built is not None:
+                base = moved.placement
+                if moved.segment is not None:
+                    base = self.model.frames[self.frame_id(moved.segment)].placement * base
+                self._built.place(name, base)
         return self
 
     def remove(self, name: str) -> Scene:
@@ -206,19 +210,22 @@ class Scene:
         Raises:
             UnknownNameError: there is no such object.
         """
-        self._object(name)
-        del self._objects[name]
-        self._changed()
+        with self._lock:
+            self._object(name)
+            del self._objects[name]
+            self._changed()
         return self
 
     def _put(
         self, name: str, shape: Shape, at: Any, color: Any, to: str | None = None, rests_on: tuple[str, ...] = ()
     ) -> Scene:
+        checks.text(name, "the name of an object")
         checks.instance(shape, Shape, repr(name), "give wb.Box, wb.Sphere, wb.Mesh or another")
         place = to_placement(at, f"{name!r}: at")
         painted = None if color is None else checks.color(color, f"{name!r}: color")
-        self._objects[name] = SceneObject(name, shape, place, to, painted, rests_on)
-        self._changed()
+        with self._lock:
+            self._objects[self._new_name(name)] = SceneObject(name, shape, place, to, painted, rests_on)
+            self._changed()
         return self
 
     def _changed(self) -> None:
@@ -239,12 +246,12 @@ class Scene:
     # ---- asking it
 
     def state(self, q: Array) -> State:
-        """One kinematic pass at q, shape (nq,); the pieces are moved there too. Re-used by the next call."""
-        if self._state is None:
-            self._state = State(self.model)
-        self._state.update(q)
-        self.proximity.place(self._state.data)
-        return self._state
+        """One kinematic pass at q, shape (nq,); the caller's own, and far cheaper to move on with `State.update`.
+
+        Raises:
+            InputError: q has the wrong shape or is not finite.
+        """
+        return State(self.model).update(q)
 
     def contacts(self, q: Array, within: float = 0.05) -> Contacts:
         """Every pair nearer than `within` metres at the posture q, shape (nq,), nearest first.
@@ -253,12 +260,8 @@ class Scene:
             InputError: q has the wrong shape or is not finite, or `within` is not a finite number.
         """
         within = checks.number(within, "within", -FARTHEST, FARTHEST, "m")
-        near = self.proximity.near(self.state(q).data, within)
-        order = np.argsort(near.distance, kind="stable")
-        return Contacts(
-            near.pair[order], near.distance[order], near.normal[order], near.point_a[order], near.point_b[order],
-            near.number[order],
-        )  # fmt: skip
+        with self.lend() as workspace:
+            return workspace.near(q, within).nearest_first()
 
     def penetration(self, q: Array) -> list[ObjectPenetration]:
         """How deep owners (segments, objects) are in each other at q: PD_g and the least separating translation.
@@ -267,20 +270,29 @@ class Scene:
         """
         from wholebody.geometry.penetration import object_penetrations
 
-        contacts = self.contacts(q, within=0.0)
-        built = self._build()
-        return object_penetrations(self.geometry, built.proximity.results, built.owners, contacts.pair)
+        with self.lend() as workspace:
+            pairs = workspace.near(q, 0.0).nearest_first().pair
+            return object_penetrations(workspace.geometry, workspace.proximity.results, workspace.owners, pairs)
 
-    def sweep(self, q0: Array, q1: Array) -> FirstContact | None:
+    def sweep(self, q0: Array, q1: Array, tolerance: float = 1e-4) -> FirstContact | None:
         """First contact on the way from q0 to q1, both (nq,), along pin.interpolate; None where there is none.
 
         Continuous: no object is too thin to be seen. See `wholebody.geometry.sweep`.
 
+        Args:
+            q0: where the motion starts.
+            q1: where it ends.
+            tolerance: depth that is not yet a contact, metres.
+
         Raises:
-            InputError: a posture has the wrong shape, is not finite, or its quaternion is not of unit length.
+            InputError: postures of the wrong shape, not finite or with a quaternion that is not of unit length; a
+                tolerance below 1e-5 m.
         """
         nq = self.model.nq
-        return self.sweeper.first_contact(checks.posture(q0, nq, "q0"), checks.posture(q1, nq, "q1"))
+        begin, end = checks.posture(q0, nq, "q0"), checks.posture(q1, nq, "q1")
+        tolerance = checks.number(tolerance, "tolerance", 1e-5, FARTHEST, "m")
+        with self.lend() as workspace:
+            return workspace.sweep.first_contact(begin, end, tolerance=tolerance)
 
     def simplified(self, problem: Problem, *, lock: bool = True) -> Simplified:
         """A smaller problem whose answers are answers of this one: the joints, pairs and corners that matter.
@@ -303,7 +315,27 @@ class Scene:
         raise InputError("the problem is about another scene; call problem.scene.simplified(problem)")
 
     def _build(self) -> SceneGeometry:
-        if self._built is None:
-            self._excluded.clear()
-            self._built = assemble(self.figure, self._objects.values(), self._excluded)
-        return self._built
+        built = self._built
+        if built is None:
+            with self._lock:
+                built = self._built
+                if built is None:
+                    self._excluded = {}
+                    built = self._built = assemble(self.figure, self._objects.values(), self._excluded)
+        return built
+
+    # ---- copying it
+
+    def __copy__(self) -> Scene:
+        built = self._built
+        scene = Scene.of_parts(self.figure, self._objects.values(), built.copied()) if built else Scene(self.figure)
+        scene._objects, scene._excluded = dict(self._objects), dict(self._excluded)
+        return scene
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return everything but the lock."""
+        return {name: value for name, value in self.__dict__.items() if name != "_lock"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._lock = RLock()

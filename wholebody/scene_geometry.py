@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from threading import Lock
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -13,12 +14,14 @@ from numpy.typing import NDArray
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.moved_pairs import compiled_kernel
-from wholebody.geometry.proximity import Proximity
+from wholebody.geometry.proximity import PairTable, Proximity
+from wholebody.pool import Pool
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.geometry.shapes import Shape
-    from wholebody.geometry.sweep import Sweep
+
+T = TypeVar("T")
 
 RESTING = 1e-3  # m: equipment nearer than this to a segment at rest is taken to lean on it
 
@@ -45,7 +48,18 @@ class SceneObject:
 
 
 class SceneGeometry:
-    """What is made from the list of objects: the geometry model and the indices into it."""
+    """What is made from the list of objects: the geometry model and the indices into it.
+
+    All of it stays as it is but the placements of the pieces of things, which `place` changes. Any number of runs may
+    share it; what a run changes is its own, see `pool`.
+
+    Attributes:
+        table: pieces and pairs as arrays.
+        rows: builds contact rows.
+        owners: name of the segment or object that each piece is part of.
+        pieces_of: object to its pieces: index, and place in the object.
+        lock: held while pieces are placed, and by whoever copies more than one placement.
+    """
 
     def __init__(
         self,
@@ -54,11 +68,53 @@ class SceneGeometry:
         owners: tuple[str, ...],
         pieces_of: dict[str, list[tuple[int, pin.SE3]]],
     ) -> None:
-        self.geometry, self.owners, self.pieces_of = geometry, owners, pieces_of
-        self.proximity = Proximity(model, geometry)
-        self.rows = ContactRowBuilder(self.proximity)
+        self.model, self.geometry, self.owners, self.pieces_of = model, geometry, owners, pieces_of
+        self.table = PairTable(model, geometry)
+        self.rows = ContactRowBuilder(self.table)
         compiled_kernel()  # of `far_moved`, not in the middle of a solve
-        self.sweep: Sweep | None = None
+        self.lock = Lock()
+        self.moves = 0
+        self._moved_at = np.zeros(geometry.ngeoms, dtype=np.int64)
+        self._pools: dict[Any, Pool[Any]] = {}
+
+    def place(self, name: str, base: pin.SE3) -> None:
+        """Place the pieces of an object whose placement in its joint's frame is `base`."""
+        with self.lock:
+            self.moves += 1
+            for index, local in self.pieces_of[name]:
+                self.geometry.geometryObjects[index].placement = base * local
+                self._moved_at[index] = self.moves
+
+    def bring(self, proximity: Proximity, seen: int) -> int:
+        """Put the pieces that moved since `seen` where they are now; the `moves` that this has seen."""
+        if seen == self.moves:
+            return seen
+        with self.lock:
+            for index in np.flatnonzero(self._moved_at > seen).tolist():
+                proximity.place_piece(index, self.geometry.geometryObjects[index].placement)
+            return self.moves
+
+    def pool(self, kind: type[T], make: Callable[[], T]) -> Pool[T]:
+        """The free list of objects of a kind, made by `make`; one run uses one of them at a time."""
+        pool: Pool[T] | None = self._pools.get(kind)
+        return self._pools.setdefault(kind, Pool(make)) if pool is None else pool
+
+    def copied(self) -> SceneGeometry:
+        """The same with placements of its own."""
+        with self.lock:
+            return SceneGeometry(self.model, self.geometry.copy(), self.owners, dict(self.pieces_of))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what it is made from."""
+        return {
+            "model": self.model,
+            "geometry": self.geometry,
+            "owners": self.owners,
+            "pieces_of": self.pieces_of,
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(**state)  # type: ignore[misc]
 
 
 def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tuple[str, str], str]) -> SceneGeometry:
@@ -119,7 +175,7 @@ def _leaning(
     rest = figure.posture(figure.postures[0])
     data = figure.model.createData()
     pin.forwardKinematics(figure.model, data, rest)
-    touching = {(owners[a], owners[b]) for a, b in Proximity(figure.model, probe).near(data, RESTING).pair}
+    touching = {(owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).near(data, RESTING).pair}
 
     found: dict[tuple[str, str], str] = {}
     for name, thing in carried.items():

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.geometry.moved_pairs import compiled_kernel, far_moved, far_moved_in_arrays, snapshot
+from wholebody.geometry.moved_pairs import Placed, compiled_kernel, far_moved, far_moved_in_arrays
 
 WITHIN = 0.05
 
@@ -21,7 +21,8 @@ def scene() -> wb.Scene:
 
 
 def placed(scene, q):
-    return snapshot(scene.proximity, scene.proximity.near(scene.state(q).data, WITHIN), WITHIN)
+    with scene.lend() as workspace:
+        return Placed(workspace.near(q, WITHIN), WITHIN)
 
 
 def ways(scene, rng, count):
@@ -41,8 +42,8 @@ def test_compiled_loops_find_the_pairs_that_array_code_finds(scene):
     found, kinds = 0, len(compiled_kernel().far_moved.signatures)
     for q0, q1 in ways(scene, np.random.default_rng(3), 60):
         before, after = placed(scene, q0), placed(scene, q1)
-        mine = far_moved(scene.proximity, before, after)
-        assert np.array_equal(mine, far_moved_in_arrays(scene.proximity, before, after))
+        mine = far_moved(scene.pair_table, before, after)
+        assert np.array_equal(mine, far_moved_in_arrays(scene.pair_table, before, after))
         found += len(mine)
     assert found > 20
     assert len(compiled_kernel().far_moved.signatures) == kinds  # nothing was compiled in the middle
@@ -50,14 +51,14 @@ def test_compiled_loops_find_the_pairs_that_array_code_finds(scene):
 
 def test_a_pair_that_is_left_out_had_more_room_than_its_points_moved(scene):
     """Corners of the pieces, followed in the world and seen from the other piece; distances from Pinocchio's loop."""
-    proximity = scene.proximity
-    points = [core.points for core in proximity.cores]
+    table = scene.pair_table
+    points = [core.points for core in table.cores]
     left_out = 0
     for q0, q1 in ways(scene, np.random.default_rng(5), 10):
         before, after = placed(scene, q0), placed(scene, q1)
-        doubted = set(far_moved(proximity, before, after).tolist())
-        room = proximity.widths + distances(scene, q0) + distances(scene, q1)
-        for number, (first, second) in enumerate(proximity.pairs):
+        doubted = set(far_moved(table, before, after).tolist())
+        room = table.widths + distances(scene, q0) + distances(scene, q1)
+        for number, (first, second) in enumerate(table.pairs):
             if number in doubted or not len(points[first]) or not len(points[second]):
                 continue
             ends = before.placements, after.placements

@@ -9,7 +9,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.geometry import proximity as module
-from wholebody.geometry.proximity import Proximity
+from wholebody.geometry.proximity import PairTable, Proximity
 
 SHAPES = {
     "sphere": wb.Sphere(0.12),
@@ -64,11 +64,12 @@ def test_agrees_with_coal_asked_pair_by_pair(detail):
     scene = among_things(detail, rng)
     assert len(scene.geometry.collisionPairs) > 600
     seen = {"near": 0, "inside": 0}
+    used = scene.workspace().proximity
     for _ in range(5):
         q = random_posture(scene.figure, rng)
         expected = asked_one_by_one(scene, q)
         for k, within in enumerate((5.0, 0.02, 0.5, -0.01, 0.0, 0.1, 5.0)):
-            proximity = Proximity(scene.model, scene.geometry) if k == 0 else scene.proximity
+            proximity = Proximity(scene.pair_table) if k == 0 else used
             found = proximity.near(scene.state(q).data, within)
             check(scene, found, expected, within, 1e-9 if k == 0 else 3e-6)
             seen["near"] += len(found.pair)
@@ -208,9 +209,9 @@ def test_moved_objects_are_seen(free_bodies):
     scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.2), name="ball", at=(1.0, 0.0, 0.0))
     q = scene.figure.neutral
     assert scene.contacts(q, 5.0).distance == pytest.approx([0.7])
-    proximity = scene.proximity
+    built = scene.built
     scene.move("ball", at=(0.0, 3.0, 0.0))
-    assert scene.proximity is proximity
+    assert scene.built is built
     assert scene.contacts(q, 5.0).distance == pytest.approx([2.7])
     assert len(scene.contacts(q, 2.6).distance) == 0
     scene.move("ball", at=(0.0, 0.0, 0.25))
@@ -240,12 +241,12 @@ def test_official_getters_stand_in_for_views(monkeypatch, lost):
     expected = [scene.contacts(q, within) for q, within in queries]
     for name in lost:
         monkeypatch.setattr(module, name, lambda results: None)
-    slow = Proximity(scene.model, scene.geometry)
+    slow = Proximity(scene.pair_table)
     for (q, within), wanted in zip(queries, expected, strict=True):
         found = slow.near(scene.state(q).data, within)
-        order = np.argsort(found.distance, kind="stable")
-        for part, want in zip(found, wanted, strict=True):
-            assert np.array_equal(part[order], want)
+        slow.forget()
+        for part, want in zip(found.nearest_first(), wanted, strict=True):
+            assert np.array_equal(part, want)
 
 
 def test_views_notice_another_layout():
@@ -259,14 +260,14 @@ def test_views_notice_another_layout():
 
 def test_nothing_to_measure(free_bodies):
     scene = wb.Scene(free_bodies(wb.Sphere(0.1)))
-    assert all(len(part) == 0 for part in scene.contacts(scene.figure.neutral, 1.0))
+    assert all(len(part) == 0 for part in scene.contacts(scene.figure.neutral, 1.0)[:-1])
 
 
 def test_shapes_without_exact_distance_are_refused():
     model, geometry = pin.Model(), pin.GeometryModel()
     geometry.addGeometryObject(pin.GeometryObject("drum", 0, pin.SE3.Identity(), coal.Cylinder(0.1, 0.2)))
     with pytest.raises(wb.InputError, match="Cylinder is not a convex piece"):
-        Proximity(model, geometry)
+        PairTable(model, geometry)
 
 
 def test_boxes_of_long_walls_hide_nothing(free_bodies, monkeypatch):

@@ -196,13 +196,13 @@ def test_driven_objects_come_first(hand: wb.Figure, scene: wb.Scene) -> None:
             return remover.remove(shown, tracked)
 
     remover, loop._remover = loop._remover, Spy()
-    first_contact = scene.sweeper.first_contact
+    whole_sweep = scene.sweep
 
     def sweep(*ways: Any, **options: Any) -> Any:
         order.append("sweep")
-        return first_contact(*ways, **options)
+        return whole_sweep(*ways, **options)
 
-    scene.sweeper.first_contact = sweep  # type: ignore[method-assign]
+    scene.sweep = sweep  # type: ignore[method-assign]
     done: list[int] = []
     follow_track = [at(hand, 0.0, 0.3 - 0.02 * k) for k in range(3)]
     for tracked in follow_track:

@@ -55,7 +55,7 @@ def test_a_hand_is_not_dragged_through_a_plate(method: str) -> None:
     postures.append(drag.finish().q)
     for before, after in itertools.pairwise(postures):
         assert wb.assess(problem, after).penetration < 3e-4
-        hit = scene.sweeper.first_contact(before, after, tolerance=1e-3)
+        hit = scene.sweep(before, after, 1e-3)
         assert hit is None
     tip = scene.state(postures[-1]).data
     frame = scene.model.frames[scene.frame_id("right_index_tip")]
@@ -92,11 +92,12 @@ def test_a_frame_by_quadratic_programs_is_as_near_as_it_is_asked_for(scene: wb.S
     """A finer tolerance is kept, takes more programs, and leaves the measures as good."""
     spent, measures = [], []
     for tolerance in (1e-3, 1e-5, 1e-7):
-        problem, method = _problem(scene), wb.QP()
+        problem = _problem(scene)
+        tracker = wb.QP().tracker(problem, 1.0 / 60.0)
         q, programs = problem.start, 0
         for frame in range(70):
             problem.retarget([wb.Point("right_index_tip", _circle(0.2 * max(frame - 40, 0)))])
-            q, count = qp_frame(method, problem, q, 1.0 / 60.0, tolerance)
+            q, count = qp_frame(tracker, q, tolerance)
             programs += count if frame > 40 else 0
             if frame > 40:
                 assert wb.assess(problem, q).goal_error < tolerance
@@ -121,7 +122,7 @@ def test_an_arm_gives_way_to_what_comes_into_it_and_comes_back(planar_arm, metho
         scene.move("ball", at=(0.7, float(y), 0.0))
         errors.append(drag.to(tip).error)
         assert wb.assess(problem, drag.q).penetration < 1e-3
-        assert scene.sweeper.first_contact(before, drag.q, tolerance=1e-3) is None
+        assert scene.sweep(before, drag.q, 1e-3) is None
         assert scene.figure.within_limits(drag.q)
         before = drag.q
     assert max(errors) > 0.05  # it had to give way

@@ -7,24 +7,25 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.geometry.moved_pairs import snapshot
+from wholebody.geometry.moved_pairs import Placed
 from wholebody.methods.passage import doubtful_pairs, jumps
 
 WITHIN = 0.05
 
 
 def placed(scene, q):
-    proximity = scene.proximity
-    return snapshot(proximity, proximity.near(scene.state(q).data, WITHIN), WITHIN)
+    with scene.lend() as workspace:
+        return Placed(workspace.near(q, WITHIN), WITHIN)
 
 
 def doubted(scene, q0, q1):
-    return doubtful_pairs(scene.proximity, placed(scene, q0), placed(scene, q1))
+    return doubtful_pairs(scene.pair_table, placed(scene, q0), placed(scene, q1))
 
 
 def jumped(scene, q0, q1):
     before, after = placed(scene, q0), placed(scene, q1)
-    return jumps(scene, before, after, q0, q1)
+    with scene.lend() as workspace:
+        return jumps(workspace, before, after, q0, q1)
 
 
 def depth_on_the_way(scene, q0, q1, count=400):

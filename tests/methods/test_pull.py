@@ -41,7 +41,7 @@ def test_a_pull_stops_before_a_plate(method: str) -> None:
     for solution in solutions:
         assert solution.assessment.penetration < 1e-4
     for before, after in itertools.pairwise(solutions):
-        assert scene.sweeper.first_contact(before.q, after.q, tolerance=2e-3) is None
+        assert scene.sweep(before.q, after.q, 2e-3) is None
 
 
 def test_what_is_no_path_is_named(scene: wb.Scene) -> None:

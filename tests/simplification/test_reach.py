@@ -103,9 +103,9 @@ def left_out(problem: wb.Problem) -> np.ndarray:
     """Numbers of the pairs that are left out because they cannot come near."""
     small = simplify(problem, Parts(joints=False, growth=0.0)).problem.scene
     names, kept = problem.scene.piece_names, set()
-    for a, b in small.proximity.pairs:
+    for a, b in small.pair_table.pairs:
         kept.add((small.piece_names[a], small.piece_names[b]))
-    every = [(names[a], names[b]) for a, b in problem.scene.proximity.pairs]
+    every = [(names[a], names[b]) for a, b in problem.scene.pair_table.pairs]
     return np.flatnonzero([pair not in kept for pair in every])
 
 
@@ -113,7 +113,7 @@ def test_pairs_left_out_of_an_arms_scene_never_come_near(arm: Figure, cluttered:
     scene = cluttered(arm, seed=4, count=40, within=1.3)
     problem = wb.Problem(scene, goals=[wb.Point(arm.segments[-1], (0.3, 0.1, 0.4))], clearance=0.01)
     numbers = left_out(problem)
-    assert 0.2 < len(numbers) / len(scene.proximity.pairs) < 1.0
+    assert 0.2 < len(numbers) / len(scene.pair_table.pairs) < 1.0
     least = least_distances(scene, numbers[:: max(1, len(numbers) // 25)], random_postures(arm.model, POSTURES, 1))
     assert least.min() > problem.clearance
 
@@ -131,7 +131,7 @@ def test_pairs_left_out_of_a_standing_persons_scene_never_come_near(
     )
     numbers = left_out(problem)
     names = scene.piece_owner
-    pairs = [frozenset(names[k] for k in scene.proximity.pairs[number]) for number in numbers]
+    pairs = [frozenset(names[k] for k in scene.pair_table.pairs[number]) for number in numbers]
     assert frozenset(("left_foot", "floor")) in pairs  # held above it
     assert len(numbers) > 30
     all_of_them = random_postures(human.model, POSTURES, 2)

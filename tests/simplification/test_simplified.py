@@ -136,8 +136,8 @@ def test_the_smaller_figure_stands_where_the_whole_one_does(human: Figure) -> No
 
 
 def _piece_places(scene: wb.Scene, q: np.ndarray) -> np.ndarray:
-    scene.state(q)
-    return np.array(scene.proximity.placements)
+    with scene.lend() as workspace:
+        return workspace.near(q, 0.0).placements
 
 
 class Lean(Constraint):
@@ -259,7 +259,7 @@ def test_answers_of_random_problems_hold_in_the_whole_one(
     assert judged.penetration < 1e-6
     assert judged.holds(1e-4)
     assert answer.status == "solved"
-    assert len(part.problem.scene.proximity.pairs) < len(scene.proximity.pairs)
+    assert len(part.problem.scene.pair_table.pairs) < len(scene.pair_table.pairs)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -346,9 +346,9 @@ def test_a_thing_can_be_moved_in_the_smaller_scene(human: Figure) -> None:
 
 def test_the_whole_problem_is_left_as_it_was(human: Figure) -> None:
     problem = standing(human)
-    before = (problem.scene.revision, problem.goals, len(problem.scene.proximity.pairs), problem.start.tolist())
+    before = (problem.scene.revision, problem.goals, len(problem.scene.pair_table.pairs), problem.start.tolist())
     problem.scene.simplified(problem)
-    after = (problem.scene.revision, problem.goals, len(problem.scene.proximity.pairs), problem.start.tolist())
+    after = (problem.scene.revision, problem.goals, len(problem.scene.pair_table.pairs), problem.start.tolist())
     assert before == after
     assert participation(problem).moving.any()
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import wholebody as wb
+from wholebody.methods.newton.tracking import NewtonTracker
 
 TABLE_TOP = 0.74  # m
 TOUCHING = 1e-4  # m: nearer than this counts as contact
@@ -49,14 +50,13 @@ def drag_row(frames: int, contacts: bool) -> DragRow:
     start = np.array((0.45, -0.25, 0.9))
     holds = [wb.Hold("left_foot"), wb.Hold("right_foot")]
     problem = wb.Problem(scene, "standing", goals=[wb.Point("right_index_tip", start)], constraints=holds)
-    method = wb.Newton()
-    drag = wb.Drag(problem, method)
+    drag = wb.Drag(problem, wb.Newton())
     for _ in range(20):  # to the circle, which is not measured
         drag.to(start)
     low = TABLE_TOP - 0.02 if contacts else 0.8
     owners = scene.piece_owner
-    table = np.array(["table" in (owners[a], owners[b]) for a, b in scene.proximity.pairs], dtype=bool)
-    times, iterations, drift, least = [], [], 0.0, []
+    table = np.array(["table" in (owners[a], owners[b]) for a, b in scene.pair_table.pairs], dtype=bool)
+    times, iterations, drift, least, workspace = [], [], 0.0, [], scene.workspace()
     for k in range(frames):
         angle = 0.05 * k
         place = (0.45, -0.25 + 0.1 * np.sin(angle), low + 0.1 * (1.0 + np.cos(angle)))
@@ -64,15 +64,16 @@ def drag_row(frames: int, contacts: bool) -> DragRow:
         frame = drag.to(place)
         times.append(1e3 * (time.process_time() - began))
         iterations.append(frame.iterations)
-        state = scene.state(frame.q)
+        near = workspace.near(frame.q, 0.01)
+        state = workspace.state
         for term in problem.constraints:
             drift = max(
                 drift, float(np.abs(term.value(state) - np.clip(term.value(state), term.lower, term.upper)).max())
             )
-        near = scene.proximity.near(state.data, 0.01)
         least.append(float(near.distance[table[near.number]].min(initial=np.inf)))
     distance = np.array(least)
-    structures, seconds = method.laid_out()
+    assert isinstance(drag.tracker, NewtonTracker)
+    structures, seconds = drag.tracker.laid_out
     return DragRow(
         case="with a table under the lower part of the circle" if contacts else "free",
         frames=frames,

@@ -125,7 +125,7 @@ def figure_row(case: str, problem: wb.Problem, repeats: int) -> SolveRow:
     """A reach of a figure, without polishing of the measures."""
     from wholebody.methods.newton.figure_course import FigureCourse
 
-    course = FigureCourse(problem, "auto")
+    course = FigureCourse(problem, problem.workspace(), "auto")
     few = max(3, repeats // 10)
 
     def once() -> Any:

@@ -17,7 +17,7 @@ def linearise_us(track: Track, solver: str) -> tuple[float, float]:
     tool = WholebodyTool(track, solver)
     tool.step(track.targets[0])
     tool.reset(track.start)
-    lineariser = tool.problem.lineariser(DT)
+    lineariser = tool.problem.lineariser(tool.problem.workspace(), DT)
     lineariser.at(track.start, WITHIN_STEP)
     whole, part = [], []
     for target in track.targets:

@@ -64,6 +64,8 @@ def check_model(model: pin.Model, name: str) -> None:
 class Figure:
     """An articulated body: Pinocchio's model and geometry, and names for everything one asks of them.
 
+    Nothing of it changes, so any number of scenes and threads may share one. It can be pickled and copied.
+
     Attributes:
         name: such as "human".
         model: Pinocchio's model; `model.nq` numbers make a posture, `model.nv` a displacement.
@@ -129,6 +131,15 @@ class Figure:
             f"nq={self.model.nq}, nv={self.model.nv}, "
             f"pieces={self.geometry.ngeoms}, pairs={len(self.geometry.collisionPairs)})"
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what it is made from; mappings that cannot be changed cannot be pickled."""
+        known: dict[str, Any] = {
+            name: dict(part) if isinstance(part, Mapping) else part
+            for name, part in self._description._asdict().items()
+        }
+        visual = None if self.visual is self.geometry else self.visual
+        return Figure, (self.name, self.model, self.geometry, self.detail, Description(**known), visual)
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -49,6 +49,7 @@ class State:
         self.jacobian: Array = np.zeros((6, model.nv), order="F")
         self._frames: dict[int, pin.SE3] = {}
         self._center_of_mass: Array | None = None
+        self._companions: dict[object, State] = {}
         self.update(self.q)
 
     def update(self, q: Array) -> State:
@@ -68,6 +69,17 @@ class State:
         self._frames.clear()
         self._center_of_mass = None
         return self
+
+    def companion(self, key: object, model: pin.Model) -> State:
+        """A state of another model that goes along with this one: the same for the same key, and of this run alone."""
+        other = self._companions.get(key)
+        if other is None:
+            other = self._companions[key] = State(model)
+        return other
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return model and posture; Pinocchio's data are computed anew."""
+        return _restored, (self.model, self.q)
 
     def frame(self, index: int) -> pin.SE3:
         """Placement in the world of the frame with this index."""
@@ -116,6 +128,10 @@ class State:
         if not hasattr(self, "_spare_data"):
             self._spare_data = self.model.createData()
         return self._spare_data
+
+
+def _restored(model: pin.Model, q: Array) -> State:
+    return State(model).update(q)
 
 
 def joint_support(model: pin.Model) -> Array:

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.compiled import compiled_module
-from wholebody.geometry.proximity import Contacts, Proximity
+from wholebody.errors import InputError
+from wholebody.geometry.proximity import Contacts, PairTable
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -31,6 +32,7 @@ LEVER_DISTANCE = 0.025  # m: pairs that are this much farther apart than they mu
 INSET = 5e-4  # m: how far below the plane a point must find the other piece; larger = larger patches on round pieces
 SAME_NORMAL = 1.0 - 5e-5  # cosine of 0.01 rad: nearer to a face's normal than this, coal's may be meant to be it
 COAL_ACCURACY = 2e-6  # m: of coal's distances, with some room
+MOST_ENDS = 8  # rows of one contact beside the witness row: a round face has dozens of corners; fewer rows rock more
 SHORTEST_LEVER = 8e-3  # m: rows nearer to the witness point than this say what the witness row says
 
 
@@ -53,12 +55,12 @@ class ContactRows(NamedTuple):
 
 
 class ContactRowBuilder:
-    """Builds contact rows for all near pairs at once."""
+    """Builds contact rows for all near pairs at once. It remembers no posture, so any number of runs may share one."""
 
-    def __init__(self, proximity: Proximity) -> None:
+    def __init__(self, table: PairTable) -> None:
         """Lay the core points and faces of all pieces in flat tables."""
-        self.proximity = proximity
-        cores = proximity.cores
+        self.table = table
+        cores = table.cores
         self._points = np.vstack([core.points for core in cores] or [np.zeros((0, 3))])
         self._point_count = np.array([len(core.points) for core in cores], dtype=np.intp)
         self._point_start = np.concatenate([[0], np.cumsum(self._point_count)])[:-1].astype(np.intp)
@@ -68,19 +70,27 @@ class ContactRowBuilder:
         self._radius = np.array([core.radius for core in cores])
         self._axis = np.array([core.axis for core in cores]).reshape(-1, 3)
         self._is_capsule: NDArray[np.bool_] = np.asarray(self._axis.any(axis=1))
-        flat = (self._point_count >= 2) | np.isinf(proximity.reach)
-        self._extended = flat[proximity.pairs].all(axis=1)
+        flat = (self._point_count >= 2) | np.isinf(table.reach)
+        self._extended = flat[table.pairs].all(axis=1)
         self._kernel = compiled_kernel()
 
     def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
-        """Rows of all contacts, at the placements of the last query.
+        """Rows of all contacts, at the placements they were found at.
 
         Args:
-            contacts: the near pairs.
+            contacts: the near pairs of the same pieces.
             clearance: distance asked of each contact, (k,) or one for all, metres.
+
+        Raises:
+            InputError: contacts of other pieces, or clearances of other contacts.
         """
         k = len(contacts.distance)
-        joint = self.proximity.joint
+        joint = self.table.joint
+        if len(contacts.placements) != len(joint) or np.shape(clearance) not in ((), (k,)):
+            raise InputError(
+                f"{k} contacts of {len(contacts.placements)} pieces with clearances of shape {np.shape(clearance)} do "
+                f"not belong to these {len(joint)} pieces; ask the scene that the contacts come from"
+            )
         wide = np.flatnonzero(self._extended[contacts.number] & (contacts.distance < clearance + LEVER_DISTANCE))
         if len(wide):
             self._snap(contacts, wide)
@@ -108,12 +118,12 @@ class ContactRowBuilder:
         """
         if self._kernel is not None:
             self._kernel.snap_normals(
-                wide, contacts.pair, contacts.distance, contacts.normal, self.proximity.placements, self._points,
+                wide, contacts.pair, contacts.distance, contacts.normal, contacts.placements, self._points,
                 self._point_start, self._point_count, self._faces, self._face_start, self._face_count, self._radius,
                 SAME_NORMAL, COAL_ACCURACY,
             )  # fmt: skip
             return
-        placement = self.proximity.placements
+        placement = contacts.placements
         for side, sign in ((0, 1.0), (1, -1.0)):
             own, other = contacts.pair[wide, side], contacts.pair[wide, 1 - side]
             flat = np.flatnonzero((self._radius[own] == 0.0) & (self._point_count[other] > 0))
@@ -135,8 +145,9 @@ class ContactRowBuilder:
         """The same as `_patch` by a compiled loop."""
         contact, point, gap = self._kernel.patch_ends(
             wide, contacts.pair, contacts.distance, contacts.normal, contacts.point_a, contacts.point_b,
-            self.proximity.placements, self._points, self._point_start, self._point_count, self._faces,
+            contacts.placements, self._points, self._point_start, self._point_count, self._faces,
             self._face_start, self._face_count, self._radius, self._axis, self._is_capsule, BAND, INSET, SHORTEST_LEVER,
+            MOST_ENDS,
         )  # fmt: skip
         return contact, point, gap
 
@@ -152,7 +163,7 @@ class ContactRowBuilder:
         facing = np.concatenate([witness[count:], witness[:count]])
         distance = np.concatenate([contacts.distance[wide]] * 2)
 
-        placement = self.proximity.placements
+        placement = contacts.placements
         side, local = _expand(self._point_start, self._point_count, own)
         placed = placement[own[side]]
         lever = np.einsum("ij,ijk->ik", self._points[local], placed[:, :3]) + placed[:, 3] - witness[side]
@@ -161,7 +172,7 @@ class ContactRowBuilder:
         near = np.flatnonzero(drop < BAND)
         side, drop = side[near], np.maximum(drop[near], 0.0)
         lever = lever[near] - height[near, None] * towards[side]
-        reach, sag = self._over_other(other[side], facing[side], towards[side], lever)
+        reach, sag = self._over_other(placement, other[side], facing[side], towards[side], lever)
 
         # a side whose points all lie over the other piece is the patch: the other side's points add nothing
         over = np.ones(2 * count, dtype=bool)
@@ -178,11 +189,16 @@ class ContactRowBuilder:
         point = witness[side] + reach[:, None] * lever[keep]
         contact = wide[side % count]
         order = np.argsort(contact, kind="stable")
+        groups = np.split(order, np.flatnonzero(np.diff(contact[order])) + 1)
+        kept = [_farthest_first(group, point, contacts.point_a[contact[group[:1]]]) for group in groups]
+        order = np.concatenate(kept)
         return contact[order], point[order], gap[order]
 
-    def _over_other(self, other: Indices, facing: Array, towards: Array, lever: Array) -> tuple[Array, Array]:
+    def _over_other(
+        self, placements: Array, other: Indices, facing: Array, towards: Array, lever: Array
+    ) -> tuple[Array, Array]:
         """How far along each lever the other piece is still below: share of the lever in [0, 1], and its sag there."""
-        placement = self.proximity.placements[other]
+        placement = placements[other]
         rotation = placement[:, :3]
         base = np.einsum("ijk,ik->ij", rotation, facing + INSET * towards - placement[:, 3])
         along = np.einsum("ijk,ik->ij", rotation, lever)
@@ -229,8 +245,22 @@ def compiled_kernel() -> Any:
     patch_kernel.patch_ends(
         none, pair, table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], placement, points, none, none, faces,
         none, none, np.zeros(0), points, np.zeros(0, dtype=bool), BAND, INSET, SHORTEST_LEVER,
+        MOST_ENDS,
     )  # fmt: skip
     return patch_kernel
+
+
+def _farthest_first(group: Indices, point: Array, witness: Array) -> Indices:
+    """Which MOST_ENDS rows of one contact to keep: the farthest from the witness point, then from those before."""
+    if len(group) <= MOST_ENDS:
+        return group
+    away = ((point[group] - witness) ** 2).sum(axis=1)
+    chosen = [int(np.argmax(away))]
+    away = np.full(len(group), np.inf)
+    while len(chosen) < MOST_ENDS:
+        away = np.minimum(away, ((point[group] - point[group[chosen[-1]]]) ** 2).sum(axis=1))
+        chosen.append(int(np.argmax(away)))
+    return group[chosen]
 
 
 def _expand(start: Indices, count: Indices, item: Indices) -> tuple[Indices, Indices]:

@@ -8,32 +8,41 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.compiled import compiled_module
-from wholebody.geometry.proximity import Array, Contacts, Indices, Proximity
+from wholebody.errors import InputError
+from wholebody.geometry.proximity import Array, Contacts, Indices, PairTable
 
 ARC = 1.1  # length of an arc over its chord, at the most, for the turns that one step makes
 ENDLESS = 1e9  # m: what counts for the reach of a half-space
 
 
 class Placed(NamedTuple):
-    """Where the pieces are at a posture, and which pairs are near: what a passage is judged by."""
+    """Which pairs are near at a posture, nearer than what: what a passage is judged by."""
 
-    placements: Array
     contacts: Contacts
     within: float
 
+    @property
+    def placements(self) -> Array:
+        """(n, 4, 3) where the pieces are."""
+        return self.contacts.placements
 
-def snapshot(proximity: Proximity, contacts: Contacts, within: float) -> Placed:
-    """Remember the pieces' placements of the last query."""
-    return Placed(proximity.placements.copy(), contacts, within)
 
+def far_moved(table: PairTable, before: Placed, after: Placed) -> Indices:
+    """Pairs that moved against each other by more than lay between them.
 
-def far_moved(proximity: Proximity, before: Placed, after: Placed) -> Indices:
-    """Pairs that moved against each other by more than lay between them."""
+    Raises:
+        InputError: the placements are of other pieces.
+    """
+    count = len(table.joint)
+    if len(before.placements) != count or len(after.placements) != count:
+        raise InputError(
+            f"placements of {len(before.placements)} and {len(after.placements)} pieces; give {count} each"
+        )
     kernel = compiled_kernel()
     if kernel is None:
-        return far_moved_in_arrays(proximity, before, after)
+        return far_moved_in_arrays(table, before, after)
     found: Indices = kernel.far_moved(
-        before.placements, after.placements, proximity.pairs, proximity.widths, proximity.reach,
+        before.placements, after.placements, table.pairs, table.widths, table.reach,
         before.contacts.number, np.ascontiguousarray(before.contacts.distance), float(before.within),
         after.contacts.number, np.ascontiguousarray(after.contacts.distance), float(after.within), ARC, ENDLESS,
     )  # fmt: skip
@@ -55,25 +64,25 @@ def compiled_kernel() -> Any:
     return moved_pairs_kernel
 
 
-def far_moved_in_arrays(proximity: Proximity, before: Placed, after: Placed) -> Indices:
+def far_moved_in_arrays(table: PairTable, before: Placed, after: Placed) -> Indices:
     """`far_moved` in array code, which takes ten times as long: for machines without numba."""
-    motion = _motion(proximity, before.placements, after.placements)
-    pairs = proximity.pairs
+    motion = _motion(table, before.placements, after.placements)
+    pairs = table.pairs
     way = motion[pairs[:, 0]] + motion[pairs[:, 1]]
-    room = proximity.widths + _apart(before, len(pairs)) + _apart(after, len(pairs))
+    room = table.widths + _apart(before, len(pairs)) + _apart(after, len(pairs))
     doubtful = np.flatnonzero(way > room)
     if not len(doubtful):
         return doubtful
     # pairs that were not measured are at least as far apart as their bounding spheres
-    spheres = _spheres_apart(proximity, before, doubtful) + _spheres_apart(proximity, after, doubtful)
-    beyond = way[doubtful] > proximity.widths[doubtful] + spheres
+    spheres = _spheres_apart(table, before, doubtful) + _spheres_apart(table, after, doubtful)
+    beyond = way[doubtful] > table.widths[doubtful] + spheres
     doubtful, spheres = doubtful[beyond], spheres[beyond]
     # neighbouring segments move far together: what counts is the way of one seen from the other
     seen = np.minimum(
-        _relative_motion(proximity, before.placements, after.placements, pairs[doubtful, 0], pairs[doubtful, 1]),
-        _relative_motion(proximity, before.placements, after.placements, pairs[doubtful, 1], pairs[doubtful, 0]),
+        _relative_motion(table, before.placements, after.placements, pairs[doubtful, 0], pairs[doubtful, 1]),
+        _relative_motion(table, before.placements, after.placements, pairs[doubtful, 1], pairs[doubtful, 0]),
     )
-    moved: Indices = doubtful[seen > proximity.widths[doubtful] + spheres]
+    moved: Indices = doubtful[seen > table.widths[doubtful] + spheres]
     return moved
 
 
@@ -90,16 +99,16 @@ def _apart(placed: Placed, count: int) -> Array:
     return apart
 
 
-def _spheres_apart(proximity: Proximity, placed: Placed, pairs: Indices) -> Array:
+def _spheres_apart(table: PairTable, placed: Placed, pairs: Indices) -> Array:
     """Distance of the bounding spheres of these pairs, or the distance above where it is larger."""
-    first, second = proximity.pairs[pairs, 0], proximity.pairs[pairs, 1]
+    first, second = table.pairs[pairs, 0], table.pairs[pairs, 1]
     between = placed.placements[first, 3] - placed.placements[second, 3]
-    gap = np.sqrt(np.einsum("ij,ij->i", between, between)) - proximity.reach[first] - proximity.reach[second]
-    apart: Array = np.maximum(gap, _apart(placed, len(proximity.pairs))[pairs])
+    gap = np.sqrt(np.einsum("ij,ij->i", between, between)) - table.reach[first] - table.reach[second]
+    apart: Array = np.maximum(gap, _apart(placed, len(table.pairs))[pairs])
     return apart
 
 
-def _relative_motion(proximity: Proximity, before: Array, after: Array, carrier: Indices, other: Indices) -> Array:
+def _relative_motion(table: PairTable, before: Array, after: Array, carrier: Indices, other: Indices) -> Array:
     """Longest way (k,) that any point of the other pieces made in the axes of their carriers, metres."""
     shift, turn = np.zeros((len(other), 3)), np.zeros((len(other), 3, 3))
     for sign, placements in ((1.0, after), (-1.0, before)):
@@ -107,7 +116,7 @@ def _relative_motion(proximity: Proximity, before: Array, after: Array, carrier:
         shift += sign * np.einsum("ij,ijk->ik", placements[other, 3] - placements[carrier, 3], axes)
         turn += sign * (placements[other, :3] @ axes)
     angle = np.sqrt(0.5 * np.einsum("ijk,ijk->i", turn, turn))
-    reach = proximity.reach[other]
+    reach = table.reach[other]
     motion: Array = ARC * (
         np.sqrt(np.einsum("ij,ij->i", shift, shift))
         + np.where(angle > 1e-12, angle, 0.0) * np.where(np.isfinite(reach), reach, ENDLESS)
@@ -115,12 +124,12 @@ def _relative_motion(proximity: Proximity, before: Array, after: Array, carrier:
     return motion
 
 
-def _motion(proximity: Proximity, before: Array, after: Array) -> Array:
+def _motion(table: PairTable, before: Array, after: Array) -> Array:
     """Longest way that any point of each piece made, metres."""
     shift = after - before
     center = np.sqrt(np.einsum("ij,ij->i", shift[:, 3], shift[:, 3]))
     # |R1 - R0| in the Frobenius norm is 2 sqrt(2) sin(angle / 2): no point moves more than 1/sqrt(2) of it times reach
     turn = np.sqrt(0.5 * np.einsum("ijk,ijk->i", shift[:, :3], shift[:, :3]))
-    reach = np.where(np.isfinite(proximity.reach), proximity.reach, 0.0)
+    reach = np.where(np.isfinite(table.reach), table.reach, 0.0)
     motion: Array = ARC * (center + turn * reach)
     return motion

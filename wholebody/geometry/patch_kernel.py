@@ -93,8 +93,9 @@ def patch_ends(
     band: float,
     inset: float,
     shortest: float,
+    most_ends: int,
 ) -> tuple[Indices, Array, Array]:
-    """Ends of the patches of the contacts `wide`; arguments as in `ContactRowBuilder`.
+    """Ends of the patches of the contacts `wide`, at most `most_ends` each; arguments as in `ContactRowBuilder`.
 
     Returns:
         Contact (m,), point (m, 3) and gap (m,) of each row.
@@ -108,6 +109,7 @@ def patch_ends(
     filled = 0
     base, along, lever = np.empty(3), np.empty(3), np.empty(3)
     for c in wide:
+        first_begun, first_whole = filled, False
         for side in range(2):
             own, other = pair[c, side], pair[c, 1 - side]
             sign = 1.0 if side == 0 else -1.0
@@ -174,7 +176,7 @@ def patch_ends(
                     gap[filled] = distance[c] + reach * drop + sag
                     filled += 1
             if side == 0:
-                first_begun, first_whole = begun, whole and seen
+                first_whole = whole and seen
                 if first_whole:
                     break  # this side is the patch: the other side's points add nothing
             elif whole and seen:
@@ -184,4 +186,35 @@ def patch_ends(
                     place[first_begun + row] = place[begun + row]
                     gap[first_begun + row] = gap[begun + row]
                 filled = first_begun + count
+        if filled - first_begun > most_ends:
+            _farthest_first(place[first_begun:filled], gap[first_begun:filled], point_a[c], most_ends)
+            filled = first_begun + most_ends
     return contact[:filled], place[:filled], gap[:filled]
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _farthest_first(place: Array, gap: Array, witness: Array, count: int) -> None:
+    """Move `count` places of a contact to the front, with their gaps: each the farthest from those before it.
+
+    The first is the farthest from the witness point. `place` (m, 3) and `gap` (m,) are changed in place.
+    """
+    total = len(gap)
+    away = np.empty(total)
+    for row in range(total):
+        away[row] = 0.0
+        for k in range(3):
+            away[row] += (place[row, k] - witness[k]) ** 2
+    for chosen in range(count):
+        best = chosen
+        for row in range(chosen + 1, total):
+            if away[row] > away[best]:
+                best = row
+        for k in range(3):
+            place[chosen, k], place[best, k] = place[best, k], place[chosen, k]
+        gap[chosen], gap[best] = gap[best], gap[chosen]
+        away[chosen], away[best] = away[best], away[chosen]
+        for row in range(chosen + 1, total):
+            square = 0.0
+            for k in range(3):
+                square += (place[row, k] - place[chosen, k]) ** 2
+            away[row] = square if chosen == 0 else min(away[row], square)

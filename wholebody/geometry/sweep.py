@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from wholebody.errors import InputError
 from wholebody.geometry.cores import core_of
+from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, read_result
 from wholebody.geometry.motion_bounds import MotionBounds
 from wholebody.geometry.pieces import Array
@@ -84,6 +85,7 @@ class Sweep:
         self._place(pin.neutral(model), np.zeros(model.nv))
         pin.computeDistances(geometry, self._results)
         self._view = distance_view(self._results.distanceResults)
+        self._guesses = Guesses(self._results)
 
     def first_contact(
         self, q0: Array, q1: Array, pairs: Indices | None = None, tolerance: float = TOLERANCE
@@ -114,6 +116,7 @@ class Sweep:
         index = np.arange(len(self._pairs)) if pairs is None else self._indices(pairs)
         if not len(index):
             return None
+        self._guesses.forget()  # the same motion has the same answer, whatever was swept before
         velocity = np.asarray(pin.difference(self.model, q0, q1))
         self._place(q0, velocity)
         centers = np.array([place.translation for place in self._results.oMg])

@@ -47,7 +47,7 @@ class AsAWhole:
         """
         if scene.figure.root != "free":
             raise InputError(f"{scene.figure.name} is fixed to the world and cannot be displaced; leave rigid out")
-        self.scene, self.model = scene, scene.model
+        self.scene, self.model, self._workspace = scene, scene.model, scene.workspace()
         segments = set(scene.figure.segments) | {n for n, thing in scene.objects.items() if thing.segment is not None}
         self._mine = np.array([owner in segments for owner in scene.piece_owner])
         owners = list(dict.fromkeys(scene.piece_owner))
@@ -55,7 +55,8 @@ class AsAWhole:
 
     def remove(self, shown: Array, tracked: Array) -> Removal:
         """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""
-        began, queried = time.perf_counter(), self.scene.proximity.seconds
+        self._workspace.refresh()
+        began, queried = time.perf_counter(), self._workspace.proximity.seconds
         self._displacements, self._pairs = 0, 0
         self._out: list[Array] = []
         note, q = "", self._with_glove(shown, tracked)
@@ -66,7 +67,7 @@ class AsAWhole:
             if self._left(following, tracked) > self._left(q, tracked) - GAIN:
                 break
             q = following
-        queried = self.scene.proximity.seconds - queried
+        queried = self._workspace.proximity.seconds - queried
         spent = time.perf_counter() - began - queried
         return Removal((q,), queried, spent, self._displacements, 6 * bool(self._displacements), self._pairs, note)
 
@@ -124,7 +125,7 @@ class AsAWhole:
 
     def _overlaps(self, q: Array) -> tuple[Array, Array, NDArray[np.intp]]:
         """Depths (k,), normals (k, 3) out of the obstacle, and the obstacles (k,), -1 for pieces of its own."""
-        contacts = self.scene.contacts(q, within=0.0)
+        contacts = self._workspace.near(q, 0.0).nearest_first()
         first, second = contacts.pair[:, 0], contacts.pair[:, 1]
         mine = self._mine[first]
         normals = np.where(mine[:, None], -contacts.normal, contacts.normal)

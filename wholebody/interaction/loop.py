@@ -144,7 +144,7 @@ class FrameLoop:
         parts = (np.asarray(pin.interpolate(self.scene.model, self.shown, nearest, share)) for share in SHARES)
         note, contact = removal.note, None
         for q in itertools.chain(removal.ways, parts):
-            contact = self.scene.sweeper.first_contact(self.shown, q, tolerance=self._remover.graze)
+            contact = self.scene.sweep(self.shown, q, self._remover.graze)
             if contact is None:
                 break
         if contact is not None:

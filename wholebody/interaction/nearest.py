@@ -40,7 +40,7 @@ RIGID_WEIGHT = 100.0
 
 
 class NearestPosture:
-    """Follows tracked postures by `QP.step`."""
+    """Follows tracked postures by a tracker of `QP`."""
 
     graze = 5e-5
 
@@ -60,8 +60,8 @@ class NearestPosture:
         self.problem = Problem(
             scene, start, constraints=[self._pace, *cones], measures=[self._attraction], clearance=CLEARANCE
         )
-        self._method = QP()
-        self._into_cones = Remover(scene).into_cones if cones else np.array
+        self._tracker = QP().tracker(self.problem, dt)
+        self._into_cones = Remover(scene, scene.workspace()).into_cones if cones else np.array
 
     def remove(self, shown: Array, tracked: Array) -> Removal:
         """One frame: from the posture that is shown towards the tracked one, as near as it can be.
@@ -70,19 +70,20 @@ class NearestPosture:
             shown: (nq,) of the frame before, overlap-free.
             tracked: (nq,) what the tracker says.
         """
-        proximity = self.scene.proximity
+        workspace = self._tracker.workspace
+        proximity = workspace.proximity
         began, queried = time.perf_counter(), proximity.seconds
         self._attraction.toward(self._into_cones(tracked))
         self._pace.begin(shown)
         q = shown
         ways: list[Array] = []
         while len(ways) < STEPS:
-            step = self._method.step(self.problem, q, self.dt)
+            step = self._tracker.step(q)
             q = self._into_cones(step.q)  # rows are exact to first order only, and a corner of a cone is no edge
             ways.append(q)
             if np.abs(step.displacement).max() < SETTLED or not step.rows:
                 break
-        contacts = self.scene.contacts(q, within=1.01 * CLEARANCE)
+        contacts = workspace.near(q, 1.01 * CLEARANCE)
         pairs = int((contacts.distance < self.problem.clearances[contacts.number] + 0.01 * CLEARANCE).sum())
         queried = proximity.seconds - queried
         whole = time.perf_counter() - began

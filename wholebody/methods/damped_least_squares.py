@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
+from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.problem import Iterate, Problem, Solution, Status
 from wholebody.tasks.base import Constraint, Goal
@@ -38,7 +39,7 @@ REST = 1e-2  # share of the tolerance: a step smaller than this has come to rest
 RANK = 1e-8  # squared singular values below this share of the largest are taken for zero
 
 
-@dataclass
+@dataclass(frozen=True)
 class DampedLeastSquares:
     """Damped least squares, the textbook method: goals and equalities, limits by clamping, and no contacts at all.
 
@@ -51,11 +52,13 @@ class DampedLeastSquares:
         iterations: most steps.
         damping: damping that is left when the goals are met [m, rad]; more is steadier near singular postures, less
             converges faster.
+        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
     """
 
     tolerance: float = 1e-5
     iterations: int = 300
     damping: float = 1e-3
+    time_limit: float | None = TIME_LIMIT
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -64,23 +67,28 @@ class DampedLeastSquares:
             InputError: a setting out of range.
         """
         check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, damping=DAMPING)
+        check_time_limit(self.time_limit)
 
     @property
     def name(self) -> str:
         """Name for tables."""
         return "dls"
 
-    def solve(self, problem: Problem) -> Solution:
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture. Goals out of reach are answers, not errors; contacts are not seen.
+
+        Args:
+            problem: what is asked.
+            progress: see `wholebody.methods.control.Progress`.
 
         Raises:
             InputError: the problem has a constraint that is not an equality, or its scene changed after it was stated.
         """
         check_problem(problem, "DampedLeastSquares.solve: problem")
         began = time.perf_counter()
-        problem.check_fresh()
-        descent = _Descent(problem, self)
-        rested = descent.run()
+        with problem.lend() as workspace, Control(self.time_limit, progress) as control:
+            descent = _Descent(problem, self, workspace.state, control)
+            rested = descent.run()
         judgement = assess(problem, descent.best)
         status = _status(judgement, rested, 1.05 * self.tolerance + 1e-6)
         return Solution(
@@ -91,14 +99,14 @@ class DampedLeastSquares:
             assessment=judgement,
             trace=tuple(descent.trace),
             method=self.name,
-            message=_message(status, judgement, descent.steps),
+            message=(control.message(judgement) or _message(status, judgement, descent.steps)) + judgement.in_the_way,
         )
 
 
 class _Descent:
     """One descent: the best posture so far, and the way there."""
 
-    def __init__(self, problem: Problem, method: DampedLeastSquares) -> None:
+    def __init__(self, problem: Problem, method: DampedLeastSquares, state: State, control: Control) -> None:
         for number, term in enumerate(problem.constraints):
             if not np.array_equal(term.lower, term.upper):
                 raise InputError(
@@ -106,7 +114,7 @@ class _Descent:
                     "it out or use method='qp'"
                 )
         self._problem, self._method = problem, method
-        self._state = State(problem.scene.model)
+        self._state, self._control = state, control
         self.best: Array = problem.scene.figure.clamp(problem.start)
         self.trace: list[Iterate] = []
         self.steps = 0
@@ -121,13 +129,14 @@ class _Descent:
             held, wanted = self._held(), self._wanted()
             violation, error = float(np.abs(held).max(initial=0.0)), self._largest_error()
             self.trace.append(Iterate(error, violation, 0.0, step))
+            self._control.tell(self.trace[-1])
             if (max(violation, enough), error) < best:
                 best, self.best = (max(violation, enough), error), q
             if max(violation, error) <= enough:
                 return True
             if self.steps and step <= REST * method.tolerance:
                 return True
-            if self.steps == method.iterations:
+            if self.steps == method.iterations or self._control.over:
                 break
             moved = problem.scene.figure.clamp(
                 np.asarray(pin.integrate(problem.scene.model, q, self._step(held, wanted)))

@@ -17,12 +17,16 @@ from numpy.typing import NDArray
 from wholebody.checks import time_step
 from wholebody.methods.ccd.method import CCD
 from wholebody.methods.moving_goals import begun_at, moving_goal, own_copy, part_way, refuse_assembly, retarget
-from wholebody.methods.nearby import for_motions, solve_nearby
+from wholebody.methods.nearby import Nearby, for_motions
 from wholebody.methods.newton.method import Newton
+from wholebody.methods.newton.tracking import NewtonTracker
 from wholebody.methods.qp.method import QP
+from wholebody.methods.qp.tracking import Tracker
 from wholebody.methods.solve import Method
+from wholebody.pool import OneAtATime
 from wholebody.problem import Problem, Solution
 from wholebody.tasks import Frame, Point, StepLimit
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -63,6 +67,7 @@ class Drag:
     Attributes:
         problem: what is asked; its goals are replaced as they move.
         q: (nq,) the present posture.
+        tracker: the method's own for these goals, where it has one.
     """
 
     def __init__(self, problem: Problem, method: str | Method = "qp", *, goal: int = 0, dt: float = FRAME) -> None:
@@ -82,6 +87,10 @@ class Drag:
         refuse_assembly(problem, "Drag")
         self.problem, self.dt = own_copy(problem), time_step(dt, "dt")
         self.method = for_motions(method)
+        own = self.method
+        self.tracker = own.tracker(self.problem, self.dt) if isinstance(own, (QP, Newton)) else None
+        self._workspace = self.tracker.workspace if self.tracker is not None else self.problem.workspace()
+        self._alone = OneAtATime("drag")
         self._rough = replace(self.method, tolerance=ON_THE_WAY) if isinstance(self.method, CCD) else self.method
         moving_goal(problem, goal)
         self._number = goal
@@ -94,18 +103,24 @@ class Drag:
             InputError: the target is not one.
         """
         began = time.perf_counter()
-        retarget(self.problem, self._number, target)
-        if isinstance(self.method, QP):
-            self.q, iterations = qp_frame(self.method, self.problem, self.q, self.dt, OF_A_FRAME)
-        else:
-            iterations = self._followed()
-        return DragFrame(self.q, _error(self.problem, self.q), iterations, time.perf_counter() - began)
+        with self._alone:
+            retarget(self.problem, self._number, target)
+            self._workspace.refresh()
+            if isinstance(self.tracker, Tracker):
+                self.q, iterations = qp_frame(self.tracker, self.q, OF_A_FRAME)
+            else:
+                iterations = self._followed()
+            return DragFrame(
+                self.q, _error(self.problem, self._workspace, self.q), iterations, time.perf_counter() - began
+            )
 
     def finish(self) -> Solution:
         """Meet the goal where it is now with the method's full accuracy, and judge the posture."""
-        solution = solve_nearby(self.problem, self.q, self.method)
-        self.q = solution.q
-        return solution
+        with self._alone:
+            tracker = self.tracker if isinstance(self.tracker, NewtonTracker) else None
+            solution = Nearby(self.problem, self.method, tracker).solve(self.q)
+            self.q = solution.q
+            return solution
 
     def _followed(self) -> int:
         """Move to a posture whose way is free, nearer to the goal by as long a leg as goes; the iterations it took.
@@ -120,16 +135,16 @@ class Drag:
 
     def _follow(self, goal: Point | Frame, deep: float) -> int:
         spent, tried = 0, list[Array]()
-        left = goal.error(self.problem.scene.state(self.q))
+        left = goal.error(self._workspace.state.update(self.q))
         error = max(float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:])))
         for leg in LEGS:
             if leg < error:
-                retarget(self.problem, self._number, part_way(self.problem, goal, self.q, leg / error))
+                retarget(self.problem, self._number, part_way(goal, left, leg / error))
             elif np.isfinite(leg):
                 continue  # the goal is no farther than that, and was asked for already
             q, iterations, short = self._attempt()
             spent, q = spent + iterations, self._bounded(q)
-            if _free(self.problem, self.q, q, short) and (not deep or _depth(self.problem, q) <= GRAZE):
+            if _free(self._workspace, self.q, q, short) and (not deep or _depth(self._workspace, q) <= GRAZE):
                 self.q = q
                 break
             tried.append(q)
@@ -140,8 +155,8 @@ class Drag:
 
     def _attempt(self) -> tuple[Array, int, float]:
         """A posture for the present goals, the iterations, and how long a way the method itself looks after."""
-        if isinstance(self.method, Newton):
-            step = self.method.step(self.problem, self.q, dt=self.dt)
+        if isinstance(self.tracker, NewtonTracker):
+            step = self.tracker.step(self.q)
             return step.q, step.iterations, SHORT
         solution = self._rough.solve(begun_at(self.problem, self.q))
         return solution.q, solution.iterations, 0.0
@@ -151,17 +166,17 @@ class Drag:
         limits = [bound for bound in self.problem.bounds if isinstance(bound, StepLimit)]
         if not limits:
             return q
-        scene = self.problem.scene
-        state, way = scene.state(self.q), pin.difference(scene.model, self.q, q)
+        model, state = self._workspace.model, self._workspace.state.update(self.q)
+        way = pin.difference(model, self.q, q)
         most = np.min(
             [np.where(way > 0.0, high, -low) for low, high in (b.bounds(state, self.dt) for b in limits)], axis=0
         )
         share = float(np.min(np.where(np.abs(way) > most, most / np.maximum(np.abs(way), 1e-12), 1.0)))
-        return q if share >= 1.0 else np.asarray(pin.integrate(scene.model, self.q, share * way))
+        return q if share >= 1.0 else np.asarray(pin.integrate(model, self.q, share * way))
 
     def _came_in(self) -> float:
         """How deep something is in the figure, metres; 0 for little, and for newton, which sees to that by itself."""
-        deep = 0.0 if isinstance(self.method, Newton) else _depth(self.problem, self.q)
+        deep = 0.0 if isinstance(self.method, Newton) else _depth(self._workspace, self.q)
         return deep if deep > GRAZE else 0.0
 
     def _leave(self, tried: list[Array], deep: float) -> None:
@@ -171,52 +186,51 @@ class Drag:
         one that gets deeper first, and then the less deep end.
         """
         pushed = [self._bounded(self.method.pushed_out(self.problem, self.q))] if isinstance(self.method, CCD) else []
-        ends = ((_depth(self.problem, q), q) for q in (*pushed, *tried))
-        out = [(not _free(self.problem, self.q, q, 0.0), depth, k) for k, (depth, q) in enumerate(ends) if depth < deep]
+        ends = ((_depth(self._workspace, q), q) for q in (*pushed, *tried))
+        out = [
+            (not _free(self._workspace, self.q, q, 0.0), depth, k) for k, (depth, q) in enumerate(ends) if depth < deep
+        ]
         if out:
             self.q = [*pushed, *tried][min(out)[2]]
 
 
-def qp_frame(method: QP, problem: Problem, q: Array, dt: float, tolerance: float) -> tuple[Array, int]:
+def qp_frame(tracker: Tracker, q: Array, tolerance: float) -> tuple[Array, int]:
     """One frame of dragging by quadratic programs: until the goals are met as a frame should, or another brings little.
 
     Args:
-        method: whose programs they are.
-        problem: with the goals of this frame.
+        tracker: of the problem with the goals of this frame.
         q: (nq,) posture of the frame before.
-        dt: seconds a frame.
         tolerance: to which the goals of a frame are met, metres and radians.
 
     Returns:
         The posture (nq,), and how many programs it took.
     """
+    problem, workspace = tracker.problem, tracker.workspace
     bounded = any(isinstance(bound, StepLimit) for bound in problem.bounds)  # of the way of a whole frame
-    here, error = method.step(problem, q, dt).q, np.inf
+    here, error = tracker.step(q).q, np.inf
     for spent in range(1, 1 if bounded else PROGRAMS):
-        before, error = error, _error(problem, here)
+        before, error = error, _error(problem, workspace, here)
         if error <= tolerance or error > WORTH * before:
             return here, spent
-        there = method.step(problem, here, dt, measures=False).q
-        if not _free(problem, q, there, SHORT):
+        there = tracker.step(here, measures=False).q
+        if not _free(workspace, q, there, SHORT):
             return here, spent + 1
         here = there
     return here, 1 if bounded else PROGRAMS
 
 
-def _free(problem: Problem, before: Array, after: Array, short: float) -> bool:
+def _free(workspace: Workspace, before: Array, after: Array, short: float) -> bool:
     """Whether the way between postures (nq,) goes into nothing; ways up to `short` are taken as they are."""
-    scene = problem.scene
-    if np.abs(pin.difference(scene.model, before, after)).max() <= short:
+    if np.abs(pin.difference(workspace.model, before, after)).max(initial=0.0) <= short:
         return True
-    return scene.sweeper.first_contact(before, after, tolerance=GRAZE) is None
+    return workspace.sweep.first_contact(before, after, tolerance=GRAZE) is None
 
 
-def _depth(problem: Problem, q: Array) -> float:
+def _depth(workspace: Workspace, q: Array) -> float:
     """Depth of the deepest overlap at a posture (nq,), metres."""
-    scene = problem.scene
-    return float(-scene.proximity.near(scene.state(q).data, 0.0).distance.min(initial=0.0))
+    return float(-workspace.near(q, 0.0).distance.min(initial=0.0))
 
 
-def _error(problem: Problem, q: Array) -> float:
-    state = problem.scene.state(q)
+def _error(problem: Problem, workspace: Workspace, q: Array) -> float:
+    state = workspace.state.update(q)
     return max((float(np.linalg.norm(goal.error(state))) for goal in problem.goals), default=0.0)

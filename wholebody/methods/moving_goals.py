@@ -86,9 +86,8 @@ def retarget(problem: Problem, number: int, target: Any) -> None:
     problem.retarget(goals)
 
 
-def part_way(problem: Problem, goal: Point | Frame, q: Array, share: float) -> Any:
-    """A target on the way of a goal's frame from where it is at the posture q (nq,): a share of what is left."""
-    error = goal.error(problem.scene.state(q))
+def part_way(goal: Point | Frame, error: Array, share: float) -> Any:
+    """A target on the way of a goal's frame from where it has this error: a share of what is left."""
     if isinstance(goal, Point):
         return goal._target + (1.0 - share) * error
     target = goal._target

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.assessment import assess
-from wholebody.geometry.moved_pairs import snapshot
+from wholebody.geometry.moved_pairs import Placed
 from wholebody.methods.ccd.method import CCD
 from wholebody.methods.moving_goals import begun_at
 from wholebody.methods.newton.method import Newton
+from wholebody.methods.newton.tracking import NewtonTracker
 from wholebody.methods.passage import jumps
 from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import Method, as_method
@@ -41,36 +42,47 @@ def for_motions(method: str | Method) -> Method:
     return chosen
 
 
-def solve_freely(problem: Problem, q: Array, method: Method) -> Solution:
-    """Solve from the posture q (nq,), wherever the answer lies."""
-    return method.follow(problem, q) if isinstance(method, Newton) else method.solve(begun_at(problem, q))
+class Nearby:
+    """Solutions of one problem by one method, each from the posture at hand; the problem's goals may move."""
 
+    def __init__(self, problem: Problem, method: Method, tracker: NewtonTracker | None = None) -> None:
+        """Set up.
 
-def solve_nearby(problem: Problem, q: Array, method: Method) -> Solution:
-    """Solve from the posture q (nq,); it is kept where the way from it jumps over something.
+        Args:
+            problem: what is asked.
+            method: a configured method.
+            tracker: the method's own for this problem, where there is one already.
+        """
+        self._problem, self._method = problem, method
+        self._tracker = method.tracker(problem) if tracker is None and isinstance(method, Newton) else tracker
 
-    Where the way to the best answer goes into something, the nearest answer is preferred; where the goal is not met
-    either way, the posture is kept too.
-    """
-    solution = solve_freely(problem, q, method)
-    sweeper = problem.scene.sweeper
-    if sweeper.first_contact(q, solution.q, tolerance=PASSING) is None:
-        return solution
-    nearest = replace(method, measures=True) if isinstance(method, QP) else method  # the measures say what is near
-    near = nearest.solve(begun_at(problem, q, nearest=True))
-    if (near.solved or not solution.solved) and sweeper.first_contact(q, near.q, tolerance=PASSING) is None:
-        return replace(near, assessment=assess(problem, near.q))
-    if solution.solved and not _jumps(problem, q, solution.q):
-        return solution
-    judgement = assess(begun_at(problem, q), q)
-    message = "the posture that was found lies beyond something in the way; the figure stays"
-    return replace(solution, q=q, status="unreachable", assessment=judgement, message=message)
+    def solve_freely(self, q: Array) -> Solution:
+        """Solve from the posture q (nq,), wherever the answer lies."""
+        return self._tracker.solve(q) if self._tracker is not None else self._method.solve(begun_at(self._problem, q))
+
+    def solve(self, q: Array) -> Solution:
+        """Solve from the posture q (nq,); it is kept where the way from it jumps over something.
+
+        Where the way to the best answer goes into something, the nearest answer is preferred; where the goal is not met
+        either way, the posture is kept too.
+        """
+        problem, method = self._problem, self._method
+        solution = self.solve_freely(q)
+        if problem.scene.sweep(q, solution.q, PASSING) is None:
+            return solution
+        nearest = replace(method, measures=True) if isinstance(method, QP) else method  # the measures say what is near
+        near = nearest.solve(begun_at(problem, q, nearest=True))
+        if (near.solved or not solution.solved) and problem.scene.sweep(q, near.q, PASSING) is None:
+            return replace(near, assessment=assess(problem, near.q))
+        if solution.solved and not _jumps(problem, q, solution.q):
+            return solution
+        judgement = assess(begun_at(problem, q), q)
+        message = "the posture that was found lies beyond something in the way; the figure stays"
+        return replace(solution, q=q, status="unreachable", assessment=judgement, message=message)
 
 
 def _jumps(problem: Problem, before: Array, after: Array) -> bool:
     """Whether something is jumped over on the way between two postures (nq,)."""
-    scene = problem.scene
-    first, last = (
-        snapshot(scene.proximity, scene.proximity.near(scene.state(q).data, WITHIN), WITHIN) for q in (before, after)
-    )
-    return jumps(scene, first, last, before, after)
+    with problem.lend() as workspace:
+        first, last = (Placed(workspace.near(q, WITHIN), WITHIN) for q in (before, after))
+        return jumps(workspace, first, last, before, after)

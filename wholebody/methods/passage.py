@@ -12,9 +12,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.geometry.moved_pairs import Placed, distances, far_moved, snapshot
-from wholebody.geometry.proximity import Indices, Proximity
-from wholebody.scene import Scene
+from wholebody.geometry.moved_pairs import Placed, distances, far_moved
+from wholebody.geometry.proximity import Indices, PairTable
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ OVERLAP = 2e-4  # m: overlap on the way that does not count; finer than any piec
 HALVINGS = 3  # of a way before what is still in doubt is swept
 
 
-def jumps(scene: Scene, before: Placed, after: Placed, q0: Array, q1: Array) -> bool:
+def jumps(workspace: Workspace, before: Placed, after: Placed, q0: Array, q1: Array) -> bool:
     """Whether some pair is on other sides of each other after a step than before it.
 
     A pair that touches on the way and still does at the end was bumped into, which its distance tells; one that is
@@ -31,41 +31,44 @@ def jumps(scene: Scene, before: Placed, after: Placed, q0: Array, q1: Array) -> 
     cost of a sweep; what remains is swept.
 
     Args:
-        scene: figure and things.
+        workspace: of the run that makes the step; its state is moved.
         before: where the pieces are before the step.
         after: where they are after it.
         q0: (nq,) posture before the step.
         q1: (nq,) posture after it.
     """
-    moved = far_moved(scene.proximity, before, after)
+    table = workspace.table
+    moved = far_moved(table, before, after)
     if not len(moved):
         return False
-    moved = moved[~_passing_by(scene, before, after, q0, q1, moved)]
-    doubtful = _not_parted(scene.proximity, before, after, moved)
-    return bool(len(doubtful)) and _jumps(scene, before, after, q0, q1, doubtful, HALVINGS)
+    moved = moved[~_passing_by(workspace, before, after, q0, q1, moved)]
+    doubtful = _not_parted(table, before, after, moved)
+    return bool(len(doubtful)) and _jumps(workspace, before, after, q0, q1, doubtful, HALVINGS)
 
 
-def _jumps(scene: Scene, before: Placed, after: Placed, q0: Array, q1: Array, doubtful: Indices, halvings: int) -> bool:
-    proximity = scene.proximity
-    end = distances(after, len(proximity.pairs))
+def _jumps(
+    workspace: Workspace, before: Placed, after: Placed, q0: Array, q1: Array, doubtful: Indices, halvings: int
+) -> bool:
+    table = workspace.table
+    end = distances(after, len(table.pairs))
     if not halvings:
-        return _sweep_jumps(scene, q0, q1, doubtful, end)
-    q = pin.interpolate(scene.model, q0, q1, 0.5)
-    middle = snapshot(proximity, proximity.near(scene.state(q).data, before.within), before.within)
-    inside = distances(middle, len(proximity.pairs))[doubtful] < -OVERLAP
+        return _sweep_jumps(workspace, q0, q1, doubtful, end)
+    q = pin.interpolate(workspace.model, q0, q1, 0.5)
+    middle = Placed(workspace.near(q, before.within), before.within)
+    inside = distances(middle, len(table.pairs))[doubtful] < -OVERLAP
     if (inside & (end[doubtful] > -OVERLAP)).any():
         return True
     for first, last, start, stop in ((before, middle, q0, q), (middle, after, q, q1)):
-        still = np.intersect1d(doubtful_pairs(proximity, first, last), doubtful, assume_unique=True)
-        if len(still) and _jumps(scene, first, last, start, stop, still, halvings - 1):
+        still = np.intersect1d(doubtful_pairs(table, first, last), doubtful, assume_unique=True)
+        if len(still) and _jumps(workspace, first, last, start, stop, still, halvings - 1):
             return True
     return False
 
 
-def _sweep_jumps(scene: Scene, q0: Array, q1: Array, doubtful: Indices, end: Array) -> bool:
+def _sweep_jumps(workspace: Workspace, q0: Array, q1: Array, doubtful: Indices, end: Array) -> bool:
     """By continuous collision detection of these pairs; `end` are the distances (pairs,) after the way."""
     while len(doubtful):
-        hit = scene.sweeper.first_contact(q0, q1, scene.proximity.pairs[doubtful], OVERLAP)
+        hit = workspace.sweep.first_contact(q0, q1, workspace.table.pairs[doubtful], OVERLAP)
         if hit is None:
             return False
         if end[hit.index] > -OVERLAP:
@@ -74,27 +77,28 @@ def _sweep_jumps(scene: Scene, q0: Array, q1: Array, doubtful: Indices, end: Arr
     return False
 
 
-def doubtful_pairs(proximity: Proximity, before: Placed, after: Placed) -> Indices:
+def doubtful_pairs(table: PairTable, before: Placed, after: Placed) -> Indices:
     """Pairs (indices into the collision pairs) that may have changed sides between two postures."""
-    return _not_parted(proximity, before, after, far_moved(proximity, before, after))
+    return _not_parted(table, before, after, far_moved(table, before, after))
 
 
-def _passing_by(scene: Scene, before: Placed, after: Placed, q0: Array, q1: Array, pairs: Indices) -> NDArray[np.bool_]:
+def _passing_by(
+    workspace: Workspace, before: Placed, after: Placed, q0: Array, q1: Array, pairs: Indices
+) -> NDArray[np.bool_]:
     """Which of these pairs keep their bounding spheres apart all the way, as a look at its middle has it.
 
     The centres' way against each other is taken for the two chords that meet in the middle; what it leaves them by is
     a quarter of what the middle is off the whole chord where the way is a parabola, and taken for twice that.
     """
-    proximity = scene.proximity
-    proximity.place(scene.state(np.asarray(pin.interpolate(scene.model, q0, q1, 0.5))).data)
-    first, second = proximity.pairs[pairs, 0], proximity.pairs[pairs, 1]
+    table, state = workspace.table, workspace.state
+    halfway = workspace.proximity.placements(state.update(pin.interpolate(workspace.model, q0, q1, 0.5)).data)
+    first, second = table.pairs[pairs, 0], table.pairs[pairs, 1]
     start, middle, end = (
-        placements[first, 3] - placements[second, 3]
-        for placements in (before.placements, proximity.placements, after.placements)
+        placements[first, 3] - placements[second, 3] for placements in (before.placements, halfway, after.placements)
     )
     bow = middle - 0.5 * (start + end)
     room = np.minimum(_nearest(start, middle), _nearest(middle, end)) - 0.5 * np.sqrt(np.einsum("ij,ij->i", bow, bow))
-    apart: NDArray[np.bool_] = room > proximity.reach[first] + proximity.reach[second]
+    apart: NDArray[np.bool_] = room > table.reach[first] + table.reach[second]
     return apart
 
 
@@ -107,14 +111,14 @@ def _nearest(start: Array, end: Array) -> Array:
     return nearest
 
 
-def _not_parted(proximity: Proximity, before: Placed, after: Placed, doubtful: Indices) -> Indices:
+def _not_parted(table: PairTable, before: Placed, after: Placed, doubtful: Indices) -> Indices:
     """Those of these pairs that no plane parts before and after."""
-    listed = np.full(len(proximity.pairs), -1, dtype=np.intp)
+    listed = np.full(len(table.pairs), -1, dtype=np.intp)
     listed[before.contacts.number] = np.arange(len(before.contacts.number))
-    return np.array([k for k in doubtful if not _parted(proximity, before, after, int(listed[k]))], dtype=np.intp)
+    return np.array([k for k in doubtful if not _parted(table, before, after, int(listed[k]))], dtype=np.intp)
 
 
-def _parted(proximity: Proximity, before: Placed, after: Placed, contact: int) -> bool:
+def _parted(table: PairTable, before: Placed, after: Placed, contact: int) -> bool:
     """Whether the plane between two pieces before the step still parts them after it, carried by either."""
     if contact < 0:
         return False
@@ -124,7 +128,7 @@ def _parted(proximity: Proximity, before: Placed, after: Placed, contact: int) -
         (first, second, normal, before.contacts.point_a[contact]),
         (second, first, -normal, before.contacts.point_b[contact]),
     ):
-        core = proximity.cores[other]
+        core = table.cores[other]
         if not len(core.points):
             continue
         local_normal = before.placements[carrier, :3] @ direction

@@ -15,7 +15,7 @@ from wholebody import checks
 from wholebody.errors import InputError
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.moving_goals import moving_goal, own_copy, refuse_assembly, retarget
-from wholebody.methods.nearby import for_motions, solve_freely, solve_nearby
+from wholebody.methods.nearby import Nearby, for_motions
 from wholebody.methods.solve import Method
 from wholebody.problem import Problem, Solution
 from wholebody.tasks import Point
@@ -56,11 +56,11 @@ def pull(
     term = moving_goal(problem, goal)
     if not isinstance(term, Point):
         raise InputError(f"pull moves a Point along a path, and goals[{goal}] is a {type(term).__name__}; use Drag")
-    chosen = for_motions(method)
     own, q, found = own_copy(problem), problem.scene.figure.clamp(problem.start), []
+    near = Nearby(own, for_motions(method))
     for number, place in enumerate(places):
         retarget(own, goal, place)
-        found.append(solve_nearby(own, q, chosen) if number else solve_freely(own, q, chosen))
+        found.append(near.solve(q) if number else near.solve_freely(q))
         if not found[-1].solved:
             break
         q = found[-1].q

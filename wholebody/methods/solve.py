@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from wholebody.checks import shown
+from wholebody.checks import function, shown
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.methods import METHODS
+from wholebody.methods.control import Progress
 from wholebody.methods.inputs import check_problem
 from wholebody.problem import Problem, Solution
 
@@ -18,7 +19,7 @@ class Method(Protocol):
     def name(self) -> str:
         """Name for tables."""
 
-    def solve(self, problem: Problem) -> Solution:
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture."""
 
 
@@ -65,12 +66,17 @@ def as_method(method: object) -> Method:
     return method  # type: ignore[return-value]
 
 
-def solve(problem: Problem, method: str | Method = "qp") -> Solution:
+def solve(problem: Problem, method: str | Method = "qp", progress: Progress | None = None) -> Solution:
     """Find a posture that fits a problem.
+
+    Ctrl-C ends it with the best posture so far, whose status is then "stalled".
 
     Args:
         problem: what is asked.
-        method: "qp", "ccd", "newton", "placo", "dls", or a configured method such as `QP(solver="daqp")`.
+        method: "qp", "ccd", "newton", "placo", "dls", or a configured method such as
+            `QP(solver="daqp", time_limit=0.1)`.
+        progress: called after every iteration with its entry of the trace (see `Iterate`); the solve ends where it
+            returns True.
 
     Returns:
         The posture with its status and the independent assessment. Goals out of reach and starts in penetration are
@@ -81,4 +87,4 @@ def solve(problem: Problem, method: str | Method = "qp") -> Solution:
         InputError: the scene changed after the problem was stated, or the method cannot take some of its terms.
     """
     check_problem(problem, "solve: problem")
-    return as_method(method).solve(problem)
+    return as_method(method).solve(problem, function(progress, "progress"))

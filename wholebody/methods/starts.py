@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.figures.state import State
 from wholebody.problem import Problem
 
 Array = NDArray[np.float64]
@@ -18,22 +19,29 @@ BEND = 0.3  # rad: by which it is then moved off
 ROOT_SPREAD = 0.2  # m and rad, for joints without limits
 
 
-def bent(problem: Problem, start: Array) -> Array | None:
-    """The start, shape (nq,), with every joint that rests at a limit moved off it; None where there is none."""
+def bent(problem: Problem, state: State, start: Array) -> Array | None:
+    """The start, shape (nq,), with every joint that rests at a limit moved off it; None where there is none.
+
+    Args:
+        problem: whose bounds are kept.
+        state: of the run; it is moved.
+        start: (nq,).
+    """
     limits = problem.scene.figure.limits
     value = start[limits.idx_q]
     move = np.zeros(problem.scene.model.nv)
     move[limits.idx_v[value < limits.lower + AT_LIMIT]] = BEND
     move[limits.idx_v[value > limits.upper - AT_LIMIT]] = -BEND
-    moved = _moved(problem, start, move)
+    moved = _moved(problem, state, start, move)
     return None if np.array_equal(moved, start) else moved
 
 
-def restarts(problem: Problem, start: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:
+def restarts(problem: Problem, state: State, start: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:
     """Postures within limits, farther and farther from the start, shape (nq,).
 
     Args:
         problem: whose bounds are kept: frozen joints stay where they are.
+        state: of the run; it is moved.
         start: (nq,).
         rng: where the randomness comes from.
         count: how many.
@@ -42,14 +50,14 @@ def restarts(problem: Problem, start: Array, rng: np.random.Generator, count: in
     span = np.where(np.isfinite(upper - lower), upper - lower, ROOT_SPREAD)
     for number in range(count):
         spread = SPREADS[number % len(SPREADS)]
-        yield _moved(problem, start, rng.uniform(-0.5, 0.5, len(span)) * spread * span)
+        yield _moved(problem, state, start, rng.uniform(-0.5, 0.5, len(span)) * spread * span)
 
 
-def _moved(problem: Problem, start: Array, move: Array) -> Array:
+def _moved(problem: Problem, state: State, start: Array, move: Array) -> Array:
     """The start moved by (nv,) as far as limits and bounds allow."""
     figure = problem.scene.figure
     lower, upper = figure.tangent_bounds(start)
-    state = problem.lineariser().state.update(start)
+    state.update(start)
     for bound in problem.bounds:
         low, high = bound.bounds(state, None)
         lower, upper = np.maximum(lower, low), np.minimum(upper, high)

@@ -31,8 +31,6 @@ class Embedding:
     Attributes:
         idx_q: (small nq,) places in the whole posture.
         idx_v: (small nv,) places in the whole displacement.
-        state: the whole figure, moved by `whole`.
-        small: the smaller figure, to compare terms on.
     """
 
     def __init__(self, whole: pin.Model, small: pin.Model, start: Array) -> None:
@@ -41,7 +39,7 @@ class Embedding:
         joints = [whole.joints[index] for index in ids]
         self.idx_q = _places([(int(joint.idx_q), int(joint.nq)) for joint in joints])
         self.idx_v = _places([(int(joint.idx_v), int(joint.nv)) for joint in joints])
-        self.state, self.small = State(whole), State(small)
+        self._model = whole
         self._start: Array = np.array(start, dtype=float)
 
     def lift(self, q: Array) -> Array:
@@ -51,16 +49,14 @@ class Embedding:
         return whole
 
     def whole(self, state: State) -> State:
-        """The whole figure at the posture of the small one."""
-        q = self.lift(state.q)
-        if not np.array_equal(q, self.state.q):
-            self.state.update(q)
-        return self.state
+        """The whole figure at the posture of the small one; it belongs to whoever the small state belongs to."""
+        q, whole = self.lift(state.q), state.companion(self, self._model)
+        return whole if np.array_equal(q, whole.q) else whole.update(q)
 
-    def rows(self, part: Wrench | Array) -> Array:
-        """The columns (m, small nv) of a term's Jacobian at the last whole posture."""
-        dense = self.state.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part)
-        return np.asarray(dense[:, self.idx_v])
+    def rows(self, term: Goal | Constraint, state: State) -> Array:
+        """The columns (m, small nv) of a term's Jacobian where the small figure is."""
+        whole = self.whole(state)
+        return np.asarray(_dense(term.jacobian(whole), whole)[:, self.idx_v])
 
 
 class LiftedGoal(Goal):
@@ -85,7 +81,7 @@ class LiftedGoal(Goal):
 
     def jacobian(self, state: State) -> Array:
         """(m, small nv)."""
-        return self.embedding.rows(self.term.jacobian(self.embedding.whole(state)))
+        return self.embedding.rows(self.term, state)
 
 
 class LiftedConstraint(Constraint):
@@ -115,7 +111,7 @@ class LiftedConstraint(Constraint):
 
     def jacobian(self, state: State) -> Array:
         """(m, small nv)."""
-        return self.embedding.rows(self.term.jacobian(self.embedding.whole(state)))
+        return self.embedding.rows(self.term, state)
 
 
 class LiftedMeasure(Measure):
@@ -175,14 +171,15 @@ def on_smaller(term: _T, scene: Surroundings, start: Array, embedding: Embedding
     else:
         assert isinstance(term, Bound)
         return LiftedBound(term, embedding)
-    wanted = _said(lifted, embedding.small, start)
+    state = State(scene.model)
+    wanted = _said(lifted, state, start)
     if isinstance(lifted, Constraint):
         wanted, rows = _moving_rows(wanted)
         if not rows:
             return None
     try:
         anew = term.resolve(scene, start)
-        said = _said(anew, embedding.small, start)
+        said = _said(anew, state, start)
     except Exception:  # a term is anyone's code, and may fail in any way on a figure it was not meant for
         return lifted
     alike = len(said) == len(wanted) and all(

@@ -148,9 +148,9 @@ def _too_near(problem: Problem) -> Mask:
     """Degrees of freedom between the pieces of pairs that begin nearer than they may be."""
     scene = problem.scene
     state = scene.state(problem.start)
-    near = scene.proximity.near(state.data, problem.clearance + INSIDE)
+    near = scene.contacts(problem.start, problem.clearance + INSIDE)
     wrong = near.pair[near.distance < problem.clearances[near.number] - INSIDE]
-    joint = scene.proximity.joint
+    joint = scene.pair_table.joint
     between = state.support[joint[wrong[:, 0]]] != state.support[joint[wrong[:, 1]]]
     return np.asarray(between.any(axis=0))
 

@@ -77,7 +77,7 @@ def simplify(problem: Problem, parts: Parts | None = None) -> Simplified:
         frozen = np.flatnonzero(part.frozen).tolist() if part is not None else []
         still = [dof for j in frozen for dof in _dofs(figure, whole.model.names[j])]
         near = reachable_pairs(
-            figure, list(geometry.geometryObjects), whole.proximity.reach, whole.proximity.pairs[numbers], start,
+            figure, list(geometry.geometryObjects), whole.pair_table.reach, whole.pair_table.pairs[numbers], start,
             problem.clearances[numbers], terms[1], still,
         )  # fmt: skip
         numbers = numbers[near]
@@ -108,7 +108,7 @@ def _smaller_figure(problem: Problem, part: Participation | None) -> tuple[Figur
 def _moving_pairs(problem: Problem, geometry: pin.GeometryModel) -> tuple[Indices, int]:
     """Numbers of the pairs whose pieces still move to each other, and how many do not."""
     joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
-    pairs = problem.scene.proximity.pairs
+    pairs = problem.scene.pair_table.pairs
     moves = joint[pairs[:, 0]] != joint[pairs[:, 1]]
     return np.flatnonzero(moves), int((~moves).sum())
 
@@ -137,8 +137,8 @@ def _pieces(
     if growth <= 0.0:
         return {}, {}
     scene = problem.scene
-    pairs = scene.proximity.pairs
-    near = scene.proximity.near(scene.state(problem.start).data, problem.clearance + 2.0 * growth)
+    pairs = scene.pair_table.pairs
+    near = scene.contacts(problem.start, problem.clearance + 2.0 * growth)
     tight = near.distance < problem.clearances[near.number] + 2.0 * growth
     crowded = set(near.pair[tight].ravel().tolist())
     found, grown = {}, {}
@@ -152,7 +152,7 @@ def _pieces(
 
 def _kept_pieces(scene: Scene, numbers: Indices) -> list[int]:
     """All pieces of the figure, and those of things with a pair that is left."""
-    used = {scene.piece_owner[index] for index in np.unique(scene.proximity.pairs[numbers]).tolist()}
+    used = {scene.piece_owner[index] for index in np.unique(scene.pair_table.pairs[numbers]).tolist()}
     return [k for k, owner in enumerate(scene.piece_owner) if owner in used or owner not in scene.objects]
 
 
@@ -168,7 +168,7 @@ def _scene(
     place = {old: new for new, old in enumerate(kept)}
     chosen = [(coarse or {}).get(old, geometry.geometryObjects[old]) for old in kept]
     made = geometry_model([pin.GeometryObject(piece) for piece in chosen])
-    for first, second in whole.proximity.pairs[numbers].tolist():
+    for first, second in whole.pair_table.pairs[numbers].tolist():
         made.addCollisionPair(pin.CollisionPair(place[first], place[second]))
     owners = tuple(whole.piece_owner[old] for old in kept)
     objects = [thing for name, thing in whole.objects.items() if name in set(owners)]
@@ -210,7 +210,7 @@ def _left_out(
     names = list(whole.scene.model.names)
     frozen = tuple(names[j] for j in np.flatnonzero(part.frozen & ~part.moving)) if part is not None else ()
     locked = tuple(names[j] for j in range(1, len(names)) if not (part.moving[j] or part.frozen[j])) if part else ()
-    before = len(whole.scene.proximity.pairs)
+    before = len(whole.scene.pair_table.pairs)
     return LeftOut(
         locked=locked,
         frozen=frozen,

@@ -49,8 +49,10 @@ class Balance(Constraint):
 
         Raises:
             UnknownNameError: the figure has no such foot.
-            InputError: the feet have no pieces, stand on a line, or leave no room for the margin.
+            InputError: the feet have no pieces, stand on a line, or leave no room for the margin; or nothing that moves
+                has mass.
         """
+        inputs.check_mass(scene, "Balance")
         corners = convex_polygon(standing_points(scene, start, self.feet)[:, :2])
         if len(shrunk(corners, self.margin)) == 0:
             raise InputError(

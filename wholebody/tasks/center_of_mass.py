@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from wholebody.checks import choice
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Goal, Mask
+from wholebody.tasks.base import Array, Goal, Mask, Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +41,15 @@ class CenterOfMass(Goal):
         target = inputs.point(self.target, "CenterOfMass: target")
         object.__setattr__(self, "_target", target[: len(self.axes)])
         object.__setattr__(self, "weight", inputs.weight(self.weight, "CenterOfMass: weight"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> CenterOfMass:
+        """Return the goal itself.
+
+        Raises:
+            InputError: nothing that moves has mass.
+        """
+        inputs.check_mass(scene, "CenterOfMass")
+        return self
 
     @property
     def angular(self) -> Mask:

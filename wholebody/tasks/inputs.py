@@ -172,3 +172,13 @@ def target_rotation(value: ArrayLike, where: str) -> Any:
         matrix[:3, :3] = numbers(given, (3, 3), where)
         return target_placement(matrix, where)
     raise InputError(f"{where} takes a quaternion (x, y, z, w) or a matrix (3, 3), not shape {given.shape}")
+
+
+def check_mass(scene: Surroundings, where: str) -> None:
+    """Check that something of the figure that moves has mass: else its centre of mass is nowhere.
+
+    Raises:
+        InputError: nothing has.
+    """
+    if not any(inertia.mass > 0.0 for inertia in list(scene.model.inertias)[1:]):
+        raise InputError(f"{where}: nothing of {scene.figure.name} that moves has mass; leave it out")

@@ -84,6 +84,6 @@ class Posture(Goal):
                 raise UnknownNameError(error.kind, error.name, error.known, "Posture") from None
         q = numbers(self.target, (scene.model.nq,), "Posture: target")
         normal = np.asarray(pin.normalize(scene.model, q))
-        if np.abs(normal - q).max() > ROUNDING:
+        if np.abs(normal - q).max(initial=0.0) > ROUNDING:
             raise InputError("Posture: target holds a quaternion that is not of unit length; use pin.normalize")
         return normal

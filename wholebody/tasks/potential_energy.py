@@ -85,7 +85,8 @@ class PotentialEnergy(Measure):
 def _centres(state: State, joints: NDArray[np.intp], centres: tuple[Array, ...]) -> Array:
     """(k, 3) centres of mass in the world."""
     places = state.data.oMi
-    return np.array([places[joint].act(centre) for joint, centre in zip(joints.tolist(), centres, strict=True)])
+    found = [places[joint].act(centre) for joint, centre in zip(joints.tolist(), centres, strict=True)]
+    return np.array(found).reshape(-1, 3)
 
 
 def _lifts(centres: Array) -> Array:

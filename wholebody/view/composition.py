@@ -14,6 +14,7 @@ from wholebody.view import style
 from wholebody.view.aim import aim
 from wholebody.view.bodies import Bodies
 from wholebody.view.goals import Goals
+from wholebody.view.in_the_way import mark_blockers
 from wholebody.view.server import Command
 from wholebody.view.stage import Marker, Moment, Stage
 from wholebody.view.subject import Subject
@@ -59,8 +60,8 @@ class Composition:
         """
         return np.array(self._state.update(q).q)
 
-    def moment(self, q: Array, problem: Any) -> Moment:
-        """What is shown at a posture, with the goals of a problem if there is one."""
+    def moment(self, q: Array, problem: Any, blockers: Sequence[Any] = ()) -> Moment:
+        """What is shown at a posture, with the goals of a problem if there is one, and what stands in their way."""
         bodies, state, moment = self.bodies, self._state.update(q), Moment()
         bodies.pose(moment, state.data)
         contacts = self._scene.contacts(q, within=self._contact_distance)
@@ -69,6 +70,10 @@ class Composition:
         self._goals = Goals(self._scene, problem) if problem is not None else None
         if self._goals is not None:
             self._goals.mark(moment, state)
+        if blockers:
+            asked = float(problem.clearances.max(initial=0.0))
+            near = self._scene.contacts(q, within=asked + self._contact_distance)
+            mark_blockers(moment, self._scene, state, near, blockers)
         if self._names:
             for path, (name, top) in bodies.tops(state.data).items():
                 matrix = np.eye(4)

@@ -35,14 +35,17 @@ WITNESS = (0.10, 0.22, 0.38)
 DEPTH = (0.34, 0.00, 0.14)
 TARGET = (0.10, 0.62, 0.33)
 MISS = (0.10, 0.62, 0.33)
+BLOCKER = (0.47, 0.15, 0.64)
 AXES = ((0.85, 0.22, 0.20), (0.22, 0.65, 0.28), (0.20, 0.40, 0.85))
 LABEL = "#2b3138"
 GOAL_LABEL = "#0d6b38"
 DEPTH_LABEL = "#a30023"
+BLOCKER_LABEL = "#6a1b9a"
 
 NORMAL_LENGTH = 0.09  # m
 WIDEST_ARROW = 0.12  # m: an arrow up to this long keeps its proportions, a longer one keeps this one's width
 WITNESS_RADIUS = 0.006  # m
+BLOCKER_RADIUS = 0.014  # m
 TARGET_RADIUS = 0.016  # m
 LINE_RADIUS = 0.0025  # m
 AXES_LENGTH = 0.10  # m
@@ -52,7 +55,7 @@ LABEL_SIZE = 0.018  # of the distance it is looked at from: about 22 pixels of 7
 PLATE = (6.0, 6.0, 0.04)  # m: what is drawn of a half-space
 
 FIGURE_NODE, OBJECT_NODE, GHOST_NODE = "/figure", "/objects", "/ghosts"
-CONTACT_NODE, GOAL_NODE, NAME_NODE = "/contacts", "/goals", "/names"
+CONTACT_NODE, GOAL_NODE, NAME_NODE, BLOCKER_NODE = "/contacts", "/goals", "/names", "/in the way"
 """Folders of the page's scene tree: each can be switched off in its controls."""
 
 FIELD_OF_VIEW = 32.0  # degrees, vertical

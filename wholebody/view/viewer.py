@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wholebody import checks
+from wholebody.assessment import assess
 from wholebody.errors import InputError
 from wholebody.files import check_writable, write
 from wholebody.geometry.placement import FARTHEST
@@ -103,13 +104,15 @@ class Viewer:
 
         Args:
             q: (nq,) posture.
-            problem: a `wholebody.Problem` whose goals are drawn with what is left of them.
+            problem: a `wholebody.Problem` whose goals are drawn with what is left of them, and what stands in their
+                way.
 
         Raises:
             InputError: q has the wrong shape or is not finite.
         """
         posture = self._composition.checked(q)
-        moment = self._composition.moment(posture, problem)
+        blockers = () if problem is None else assess(problem, posture).blockers
+        moment = self._composition.moment(posture, problem, blockers)
         self._seen, self._motion = [posture], None
         if self._stage.store.camera is None:
             self._stage.do(self._aim())

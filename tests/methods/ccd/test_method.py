@@ -147,7 +147,7 @@ def test_an_arm_is_pushed_out_of_what_came_onto_it(planar_arm: Callable[..., wb.
     out = wb.CCD().pushed_out(problem, q)
     assert wb.assess(problem, out).penetration < 1e-4
     assert 1e-4 < np.abs(out - q).max() < 0.2
-    assert scene.sweeper.first_contact(q, out, tolerance=5e-4) is None
+    assert scene.sweep(q, out, 5e-4) is None
     scene.add(wb.Sphere(0.1), name="more")
     with pytest.raises(wb.InputError):
         wb.CCD().pushed_out(problem, q)

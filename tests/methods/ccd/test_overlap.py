@@ -72,7 +72,7 @@ def test_no_frame_overlaps_and_the_last_is_what_is_tracked(
         assert result.deepest == pytest.approx(deepest(scene, q), abs=5e-6)
         assert avatar.within_limits(q)
         assert outside(avatar, q) <= 1e-9
-        assert scene.sweeper.first_contact(before, q, None, 4e-3) is None
+        assert scene.sweep(before, q, 4e-3) is None
         wanted_inside = max(wanted_inside, deepest(scene, wanted))
         pushed += result.iterations > 0
     assert wanted_inside > 0.02
@@ -145,7 +145,7 @@ def test_cancelling_normals_do_not_hold_a_link_inside(
     contacts = scene.contacts(straight, within=0.0)
     assert len(contacts.distance) == 2
     assert global_depth(-contacts.distance, contacts.normal) == pytest.approx(np.zeros(3), abs=1e-6)
-    q, left = Remover(scene).separate(straight, np.random.default_rng(0))
+    q, left = Remover(scene, scene.workspace()).separate(straight, np.random.default_rng(0))
     assert not left
     assert deepest(scene, q) <= 1e-4
     assert np.abs(q).max() < 0.4

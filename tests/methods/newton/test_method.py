@@ -150,7 +150,7 @@ def test_nothing_is_jumped_over(human: wb.Figure, least_distance: Callable[..., 
     # a plate a millimetre thick between the hand and its goal; steps of the hand are up to eight centimetres
     scene = wb.Scene(human).add(wb.Box((0.001, 0.6, 0.6)), name="plate", at=(0.4, -0.25, 1.1))
     problem = _standing(scene, wb.Point("right_index_tip", (0.5, -0.25, 1.1)))
-    course = FigureCourse(problem, "auto")
+    course = FigureCourse(problem, problem.workspace(), "auto")
     visited = [problem.start]
     arrive = course.arrive
 
@@ -187,10 +187,11 @@ def test_speeds_hold_in_every_frame(human: wb.Figure) -> None:
     problem = wb.Problem(
         wb.Scene(human), "standing", goals=[goal], constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), limit]
     )
-    method, q, dt = wb.Newton(), problem.start, 0.02
+    q, dt = problem.start, 0.02
+    tracker = wb.Newton().tracker(problem, dt)
     lower, upper = problem.bounds[0].bounds(problem.scene.state(q), dt)
     for _ in range(150):
-        after = method.step(problem, q, dt=dt).q
+        after = tracker.step(q).q
         way = pin.difference(human.model, q, after)
         assert (way >= lower - 1e-9).all()
         assert (way <= upper + 1e-9).all()

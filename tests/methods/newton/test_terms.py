@@ -75,7 +75,7 @@ def test_the_objective_has_the_measures_gradient(human: wb.Figure) -> None:
     measures = [wb.Effort(0.5), wb.Displacement(), wb.Discomfort(2.0)]
     problem = wb.Problem(wb.Scene(human), "standing", measures=measures)
     bodies = FigureBodies(human)
-    objective = Objective(problem, bodies)
+    objective = Objective(problem, bodies, problem.workspace().state)
     for q in _postures(human):
         x = bodies.variables(q)
         assert objective.value(x) == pytest.approx(wb.assess(problem, q).measure)

@@ -38,7 +38,9 @@ def test_a_first_fit_asks_for_the_whole_way_and_damps_it_as_the_page_says():
     human = wb.load("human")
     goals = [wb.Point("right_index_tip", (0.5, -0.3, 1.3)), wb.Point("left_index_tip", (0.4, 0.4, 1.1))]
     problem = wb.Problem(wb.Scene(human), "standing", goals=goals)
-    subproblem, at = Subproblem(problem), problem.lineariser().at(problem.start, 0.1)
+    workspace = problem.workspace()
+    subproblem = Subproblem(problem, workspace.state)
+    at = problem.lineariser(workspace).at(problem.start, 0.1)
     rows, none = subproblem.rows(at), np.zeros(len(at.goal_error))
     piece = subproblem.program(at, rows, 0.3, 0.1, 0.0, none, False)
     whole = subproblem.program(at, rows, 0.3, None, 0.5, none, False)

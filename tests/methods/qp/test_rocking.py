@@ -29,10 +29,10 @@ def least_distance_while_pushed(free_bodies, push, solver="osqp"):
     q = scene.figure.neutral
     q[:3] = -0.05, 0.0, 0.1
     problem = wb.Problem(scene, start=q, goals=[push], clearance=CLEARANCE)
-    method = wb.QP(solver)
+    tracker = wb.QP(solver).tracker(problem, 0.01)
     least = np.inf
     for _ in range(200):
-        q = method.step(problem, q, 0.01).q
+        q = tracker.step(q).q
         least = min(least, distances(scene, q).min())
     return least
 

@@ -16,7 +16,9 @@ from wholebody.bench.compare.record import ANSWERED, Record
 from wholebody.bench.problem_sets.case import Case
 from wholebody.methods.drag import qp_frame
 from wholebody.methods.newton.method import Newton
+from wholebody.methods.newton.tracking import NewtonTracker
 from wholebody.methods.qp.method import QP
+from wholebody.methods.qp.tracking import Tracker
 from wholebody.problem import Problem
 
 Array = NDArray[np.float64]
@@ -41,10 +43,11 @@ def follow(method: Any, problem: Problem, case: Case, empty: Record) -> Record:
     """
     q = problem.scene.figure.clamp(problem.start)
     frames: list[_Frame] = []
+    tracker = method.tracker(problem, case.dt) if isinstance(method, (QP, Newton)) else None
     for goals in case.frames:
         problem.retarget(goals)
         worked, began = time.process_time(), time.perf_counter()
-        q, iterations, judging = _advance(method, problem, q, case.dt)
+        q, iterations, judging = _advance(method, tracker, problem, q)
         seconds = time.perf_counter() - began - judging
         worked = time.process_time() - worked
         if not np.isfinite(q).all():
@@ -57,13 +60,15 @@ def follow(method: Any, problem: Problem, case: Case, empty: Record) -> Record:
     return _summary(frames, case, empty)
 
 
-def _advance(method: Any, problem: Problem, q: Array, dt: float) -> tuple[Array, int, float]:
+def _advance(
+    method: Any, tracker: Tracker | NewtonTracker | None, problem: Problem, q: Array
+) -> tuple[Array, int, float]:
     """Posture, iterations, and the seconds of a judgement that was made on the way."""
-    if isinstance(method, Newton):
-        made = method.step(problem, q)
+    if isinstance(tracker, NewtonTracker):
+        made = tracker.step(q)
         return made.q, made.iterations, 0.0
-    if isinstance(method, QP):
-        return (*qp_frame(method, problem, q, dt, method.tolerance), 0.0)
+    if tracker is not None:
+        return (*qp_frame(tracker, q, method.tolerance), 0.0)
     problem.start = q
     solution = method.solve(problem)
     return np.asarray(solution.q, dtype=float), solution.iterations, solution.assessment.seconds

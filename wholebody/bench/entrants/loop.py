@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
-from wholebody.figures.state import State
 from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.methods.control import Control, Progress
 from wholebody.problem import Iterate, Problem, Solution, Status
 from wholebody.tasks import Displacement, Effort, Hold
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -119,8 +120,12 @@ class Loop(ABC):
         if self._built is None or self._built[0] is not problem:
             self._built = (problem, self.build(problem))
 
-    def solve(self, problem: Problem) -> Solution:
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture.
+
+        Args:
+            problem: what is asked.
+            progress: see `wholebody.methods.control.Progress`.
 
         Raises:
             InputError: the tool cannot express the problem, or its scene changed after it was stated.
@@ -128,8 +133,9 @@ class Loop(ABC):
         began = time.perf_counter()
         self.prepare(problem)
         assert self._built is not None
-        run = _Run(problem, self._built[1], self)
-        run.go()
+        with problem.lend() as workspace, Control(None, progress) as control:
+            run = _Run(problem, workspace, self._built[1], self, control)
+            run.go()
         judgement = assess(problem, run.q)
         status = _status(judgement, run, 1.05 * self.tolerance + 1e-6)
         return Solution(
@@ -140,7 +146,7 @@ class Loop(ABC):
             assessment=judgement,
             trace=tuple(run.trace),
             method=self.name,
-            message=_message(status, judgement, run, self.name),
+            message=(control.message(judgement) or _message(status, judgement, run, self.name)) + judgement.in_the_way,
         )
 
     def _check(self, problem: Problem) -> None:
@@ -192,9 +198,11 @@ def kept_apart(problem: Problem) -> list[tuple[int, int, float]]:
 class _Run:
     """One solve: the present posture, and how it ended."""
 
-    def __init__(self, problem: Problem, stepper: Stepper, method: Loop) -> None:
-        self._problem, self._stepper, self._method = problem, stepper, method
-        self._state = State(problem.scene.model)
+    def __init__(
+        self, problem: Problem, workspace: Workspace, stepper: Stepper, method: Loop, control: Control
+    ) -> None:
+        self._problem, self._stepper, self._method, self._control = problem, stepper, method, control
+        self._state, self._proximity = workspace.state, workspace.proximity
         self.q: Array = problem.scene.figure.clamp(problem.start)
         self.trace: list[Iterate] = []
         self.steps, self.rested, self.failure = 0, False, ""
@@ -208,6 +216,9 @@ class _Run:
         while True:
             error, violation = self._look()
             self.trace.append(Iterate(error, violation, 0.0, length))
+            self._control.tell(self.trace[-1])
+            if self._control.over:
+                return
             if max(error, violation) <= enough and self._apart(enough):
                 return
             if self.steps and length <= REST * self._method.tolerance:
@@ -252,7 +263,7 @@ class _Run:
     def _apart(self, tolerance: float) -> bool:
         """Whether all pairs keep their clearance."""
         clearances = self._problem.clearances
-        near = self._problem.scene.proximity.near(self._state.data, float(clearances.max(initial=0.0)))
+        near = self._proximity.near(self._state.data, float(clearances.max(initial=0.0)))
         return bool((near.distance >= clearances[near.number] - tolerance - COAL_ACCURACY).all())
 
 

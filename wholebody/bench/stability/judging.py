@@ -118,7 +118,7 @@ def _dip(problem: Problem, before: Array, q: Array) -> tuple[float, str]:
     The sweep sees whether it does, however thin the thing; the depth is that of parts of the way.
     """
     scene = problem.scene
-    contact = scene.sweeper.first_contact(before, q, tolerance=DIP)
+    contact = scene.sweep(before, q, DIP)
     if contact is None or not contact.certain:
         return 0.0, ""
     depth = DIP

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from wholebody.methods.qp.active_set import guess_active_set
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import approximate
+from wholebody.methods.qp.solvers.base import GUESS_TOLERANCE
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver, _Workspace
 
 LIMIT = 5  # iterations: OSQP takes 25 to some hundreds for programs of a reach
@@ -24,4 +25,5 @@ class Unfinished(OSQPSolver):
             self._workspace = _Workspace(program, self._workspace)
         self._workspace.load(program)
         x, used = self._workspace.run(LIMIT, 1e-3)
-        return approximate(program, x, used, self.name)
+        x = x.clip(program.lower, program.upper)
+        return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, used, self.name)

@@ -1,4 +1,4 @@
-"""Our own step: `QP.step` with one of its QP solvers."""
+"""Our own step: that of a tracker of `QP` with one of its QP solvers."""
 
 from __future__ import annotations
 
@@ -42,7 +42,6 @@ class WholebodyTool(Tool):
         """State the problem; the target is moved afterwards."""
         self.name = f"wholebody/{solver}"
         self._target = np.array(track.targets[0])
-        self._method = wb.QP(solver=solver)
         self.problem = wb.Problem(
             track.scene,
             track.start,
@@ -54,6 +53,7 @@ class WholebodyTool(Tool):
             measures=[wb.Displacement()],
             clearance=CLEARANCE,
         )
+        self._tracker = wb.QP(solver=solver).tracker(self.problem, DT)
         self._q = np.array(track.start)
         self._told: list[tuple[int, bool, int]] = []
 
@@ -65,7 +65,7 @@ class WholebodyTool(Tool):
     def step(self, target: Array) -> None:
         """Move one step."""
         self._target[:] = target
-        step = self._method.step(self.problem, self._q, DT)
+        step = self._tracker.step(self._q)
         self._q = step.q
         self._told.append((step.rows, step.exact, step.iterations))
 

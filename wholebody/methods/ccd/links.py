@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wholebody.geometry.penetration import global_depth
 from wholebody.geometry.separation import least_separation
 from wholebody.methods.ccd.limbs import Limbs
-from wholebody.scene import Scene
+from wholebody.workspace import Workspace
 
 Vector = tuple[float, float, float]
 
@@ -58,21 +58,21 @@ class Link(NamedTuple):
 class LinkFinder:
     """Finds the overlapping link of one chain."""
 
-    def __init__(self, scene: Scene, limbs: Limbs, foreign: frozenset[int], exact: bool = True) -> None:
+    def __init__(self, workspace: Workspace, limbs: Limbs, foreign: frozenset[int], exact: bool = True) -> None:
         """Say which joints belong to the chain.
 
         Args:
-            scene: figure and things.
+            workspace: of the run.
             limbs: the joints of the chain.
             foreign: joints of other chains: what they carry is no link of this one, although it may move it.
             exact: where PD_g cancels, look for the least translation that separates.
         """
         self._exact = exact
-        self._scene, self._limbs = scene, limbs
-        self._carrier = [limbs.carrier(joint) for joint in range(scene.model.njoints)]
+        self._workspace, self._limbs = workspace, limbs
+        self._carrier = [limbs.carrier(joint) for joint in range(workspace.model.njoints)]
         self._own = list(self._carrier)
-        for joint in range(1, scene.model.njoints):
-            if joint not in limbs.node_of and (joint in foreign or self._own[int(scene.model.parents[joint])] < 0):
+        for joint in range(1, workspace.model.njoints):
+            if joint not in limbs.node_of and (joint in foreign or self._own[int(workspace.model.parents[joint])] < 0):
                 self._own[joint] = -1
         self._paths = [frozenset(path) for path in limbs.paths]
         self._masks: dict[tuple[tuple[int, ...], str], tuple[list[int], NDArray[np.bool_]]] = {}
@@ -108,7 +108,7 @@ class LinkFinder:
 
     def _push(self, overlaps: Sequence[tuple[Overlap, bool]]) -> Vector:
         """The translation that leaves every obstacle by its PD_g."""
-        owners = self._scene.piece_owner
+        owners = self._workspace.owners
         by_owner: dict[str, list[tuple[Overlap, bool]]] = {}
         for overlap, is_a in overlaps:
             by_owner.setdefault(owners[overlap.b if is_a else overlap.a], []).append((overlap, is_a))
@@ -138,15 +138,15 @@ class LinkFinder:
 
     def _separation(self, owner: str, group: Sequence[tuple[Overlap, bool]]) -> Vector | None:
         """Least translation of the link's pieces out of all pieces of the obstacle; None where there is none."""
-        scene = self._scene
+        workspace = self._workspace
         mine = tuple(sorted({overlap.a if is_a else overlap.b for overlap, is_a in group}))
         if (mine, owner) not in self._masks:
-            theirs = [k for k, name in enumerate(scene.piece_owner) if name == owner]
-            tested = {frozenset(pair) for pair in scene.proximity.pairs.tolist()}
+            theirs = [k for k, name in enumerate(workspace.owners) if name == owner]
+            tested = {frozenset(pair) for pair in workspace.table.pairs.tolist()}
             mask = np.array([[frozenset((i, j)) in tested for j in theirs] for i in mine])
             self._masks[mine, owner] = theirs, mask
         theirs, mask = self._masks[mine, owner]
-        placed, pieces = scene.proximity.results.oMg, scene.geometry.geometryObjects
+        placed, pieces = workspace.proximity.results.oMg, workspace.geometry.geometryObjects
         way = least_separation(
             [(pieces[k].geometry, placed[k]) for k in mine], [(pieces[k].geometry, placed[k]) for k in theirs], mask
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -16,8 +16,10 @@ from wholebody.methods.ccd.overlap import SHAKES
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.remover import TOUCH, Remover
 from wholebody.methods.ccd.terms import read
+from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, check_problem, check_settings
 from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -42,7 +44,7 @@ class _Trial:
         return (mine, self.error) < (theirs, other.error)
 
 
-@dataclass
+@dataclass(frozen=True)
 class CCD:
     """Cyclic coordinate descent: one joint at a time, each to its best, from the tip inwards.
 
@@ -61,12 +63,14 @@ class CCD:
         iterations: most sweeps from one start.
         restarts: most further starts, first near the posture at hand, then anywhere within the limits.
         seed: of the restarts and of the order in which chains leave overlap.
+        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
     """
 
     tolerance: float = 1e-4
     iterations: int = 400
     restarts: int = 12
     seed: int = 0
+    time_limit: float | None = TIME_LIMIT
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -75,16 +79,21 @@ class CCD:
             InputError: a setting out of range.
         """
         check_settings(self, tolerance=CCD_TOLERANCE, iterations=ITERATIONS, restarts=RESTARTS, seed=SEED)
+        check_time_limit(self.time_limit)
 
     @property
     def name(self) -> str:
         """Name for tables."""
         return "ccd"
 
-    def solve(self, problem: Problem) -> Solution:
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture.
 
         Goals out of reach and starts in penetration are answers, not errors.
+
+        Args:
+            problem: what is asked.
+            progress: see `wholebody.methods.control.Progress`.
 
         Raises:
             UnsupportedTermError: the problem has terms that this method cannot take.
@@ -92,9 +101,9 @@ class CCD:
         """
         check_problem(problem, "CCD.solve: problem")
         began = time.perf_counter()
-        problem.check_fresh()
-        search = _Search(self, problem)
-        best = search.run()
+        with problem.lend() as workspace, Control(self.time_limit, progress) as control:
+            search = _Search(self, problem, workspace, control)
+            best = search.run()
         judgement = assess(problem, best.q)
         status = self._status(best, judgement)
         return Solution(
@@ -105,7 +114,8 @@ class CCD:
             assessment=judgement,
             trace=tuple(search.trace),
             method=self.name,
-            message=_message(status, judgement, len(search.trace)),
+            message=(control.message(judgement) or _message(status, judgement, len(search.trace)))
+            + judgement.in_the_way,
         )
 
     def pushed_out(self, problem: Problem, q: Array) -> Array:
@@ -118,9 +128,9 @@ class CCD:
             InputError: the scene changed after the problem was stated.
         """
         check_problem(problem, "CCD.pushed_out: problem")
-        problem.check_fresh()
         q = posture(q, problem.scene.model.nq)
-        return _Search(self, problem).pushed_out(q)
+        with problem.lend() as workspace:
+            return _Search(self, problem, workspace, Control()).pushed_out(q)
 
     def _status(self, best: _Trial, judgement: Assessment) -> Status:
         slack = 1.05 * self.tolerance + 1e-6
@@ -134,13 +144,19 @@ class CCD:
 class _Search:
     """One solve: starts, and from each of them reaching and leaving overlap by turns."""
 
-    def __init__(self, method: CCD, problem: Problem) -> None:
-        self._method, self._problem = method, problem
+    def __init__(self, method: CCD, problem: Problem, workspace: Workspace, control: Control) -> None:
+        self._method, self._problem, self._control = method, problem, control
         request = read(problem)
-        self._reach = Reach(problem.scene.figure, request)
+        self._reach = Reach(problem.scene.figure, request, control)
         self._touch = min(TOUCH, SHARE * method.tolerance)
         self._remover = Remover(
-            problem.scene, problem.clearances, fixed=request.fixed, cones=request.cones, touch=self._touch
+            problem.scene,
+            workspace,
+            problem.clearances,
+            fixed=request.fixed,
+            cones=request.cones,
+            touch=self._touch,
+            control=control,
         )
         self._rng = np.random.default_rng(method.seed)
         self.sweeps = 0
@@ -158,10 +174,10 @@ class _Search:
             trial = self._attempt(q, free, "" if attempt == 0 else "restart")
             if best is None or trial.better(best, self._touch):
                 best = trial
-            if self._serves(best):
+            if self._serves(best) or self._control.over:
                 break
         assert best is not None
-        return best
+        return best if not self._control.over else replace(best, rested=False)
 
     def pushed_out(self, q: Array) -> Array:
         """Where pushing a posture q (nq,) out ends, or pushing one a little beside it, where that leads farther out."""
@@ -196,10 +212,11 @@ class _Search:
                 trial = _Trial(back, self._remover.deepest, self._error(back), True)
             step = float(np.abs(pin.difference(self._problem.scene.model, before, q)).max(initial=0.0))
             self.trace.append(Iterate(trial.error, trial.overlap, 0.0, step, note if turn == 0 else "overlap"))
+            self._control.tell(self.trace[-1])
             gained = best is None or trial.better(best, self._touch)
             if gained:
                 best = trial
-            if self._serves(trial) or not gained:
+            if self._serves(trial) or not gained or self._control.over:
                 break
         assert best is not None
         return best

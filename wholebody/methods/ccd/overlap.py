@@ -10,7 +10,6 @@ interpolation with the last posture without overlap (algorithm 1, step 4, of Sch
 from __future__ import annotations
 
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
@@ -88,20 +87,17 @@ def remove_overlap(
         InputError: a posture of the wrong shape, or a value that is not finite.
     """
     checked = [_posture(scene, q, what) for q, what in ((q_free, "q_free"), (q_wanted, "q_wanted"))]
-    if scene not in _FRAMES or _FRAMES[scene].revision != scene.revision:
-        _FRAMES[scene] = Frames(scene)
-    return _FRAMES[scene].remove(checked[0], checked[1], rng, pace)
+    with scene.built.pool(Frames, lambda: Frames(scene)).lend() as frames:
+        return frames.remove(checked[0], checked[1], rng, pace)
 
 
 class Frames:
     """Removal of overlap from frame to frame in one scene."""
 
-    def __init__(self, scene: Scene, remover: Remover | None = None) -> None:
+    def __init__(self, scene: Scene) -> None:
         """Prepare the chains, and which degrees of freedom are of which."""
-        self.revision = scene.revision
-        self._model, self._figure, self._proximity = scene.model, scene.figure, scene.proximity
-        self._remover = Remover(scene, exact=False) if remover is None else remover
-        self._sweeper = scene.sweeper
+        self._model, self._figure, self._workspace = scene.model, scene.figure, scene.workspace()
+        self._remover = Remover(scene, self._workspace, exact=False)
         self._drawer = Drawer(scene, self._remover)
         self._parts = self._drawer.parts
 
@@ -109,6 +105,7 @@ class Frames:
         self, q_free: Array, q_wanted: Array, rng: np.random.Generator, pace: Array | None = None
     ) -> OverlapResult:
         """See `remove_overlap`."""
+        self._workspace.begin()
         self._pace = np.full(self._model.nv, np.inf) if pace is None else pace
         remover = self._remover
         remover.tally, remover.skin = Tally(), SKIN
@@ -123,7 +120,7 @@ class Frames:
                 break
         if overlaps:
             return self._result(q if remover.look(wanted) else wanted)
-        before = self._proximity.placements.copy()
+        before = self._remover.placements
         shown = None
         self._drawer.free = not remover.look(wanted)
         remover.skin = WIDE if self._drawer.free else SKIN
@@ -163,7 +160,7 @@ class Frames:
                 trial = self._interpolate(q, self._hit)
             q = self._drawer.keep_gains(q, trial, wanted, drawn[1], settled)
             way.append(q)
-            before = self._proximity.placements.copy()
+            before = self._remover.placements
         return way
 
     def _toward(self, q0: Array, q1: Array) -> Array | None:
@@ -192,7 +189,7 @@ class Frames:
             self._remover.look(np.asarray(pin.interpolate(self._model, q0, q1, (k + 1) / (looks + 1))))
             if self._remover.deepest > DIP:
                 return False
-        return self._sweeper.first_contact(q0, q1, None, 2.0 * DIP) is None
+        return self._workspace.sweep.first_contact(q0, q1, None, 2.0 * DIP) is None
 
     def _shaken(self, q: Array, size: float, rng: np.random.Generator) -> Array:
         """Copy of a posture q (nq,) with its joints moved at random: a straight arm pushed along itself must bend."""
@@ -217,7 +214,7 @@ class Frames:
     def _jumps(self, before: Array, q0: Array, q1: Array) -> bool:
         """Whether the motion passes through something; `_hit` is then where it meets it first."""
         remover = self._remover
-        hit = jump(remover.scene, before, self._proximity.placements, q0, q1, ~remover.overlapping)
+        hit = jump(self._workspace, before, remover.placements, q0, q1, ~remover.overlapping)
         if hit is not None:
             self._hit = hit.q
         return hit is not None
@@ -243,6 +240,3 @@ def _posture(scene: Scene, q: Array, what: str) -> Array:
     if posture.shape != (scene.model.nq,) or not np.isfinite(posture).all():
         raise InputError(f"{what} is ({scene.model.nq},) finite numbers; got shape {posture.shape}")
     return np.asarray(pin.normalize(scene.model, posture))
-
-
-_FRAMES: WeakKeyDictionary[Scene, Frames] = WeakKeyDictionary()

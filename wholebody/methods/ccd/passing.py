@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.geometry.sweep import FirstContact
-from wholebody.scene import Scene
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -18,35 +18,32 @@ ARC = 1.1  # length of an arc over its chord, at the most, for the turns that on
 OVERLAP = 2e-3  # m: overlap on the way that does not count; what is shown in the end is swept more closely
 
 
-def jump(scene: Scene, before: Array, after: Array, q0: Array, q1: Array, apart: Array) -> FirstContact | None:
+def jump(workspace: Workspace, before: Array, after: Array, q0: Array, q1: Array, apart: Array) -> FirstContact | None:
     """First contact on the way of a pair that is apart again at its end; None where nothing was jumped over.
 
     Args:
-        scene: figure and things.
-        before: (n, 4, 3) placements of the pieces before the motion; see `Proximity.placements`.
+        workspace: of the run.
+        before: (n, 4, 3) placements of the pieces before the motion; see `Contacts.placements`.
         after: those after it.
         q0: (nq,) posture before it.
         q1: (nq,) posture after it.
         apart: (pairs,) bool: which pairs are apart after it.
     """
-    proximity = scene.proximity
+    table = workspace.table
     shift = after - before
     center = np.sqrt(np.einsum("ij,ij->i", shift[:, 3], shift[:, 3]))
     # |R1 - R0| in the Frobenius norm is 2 sqrt(2) sin(angle / 2): no point moves more than 1/sqrt(2) of it times reach
     turn = np.sqrt(0.5 * np.einsum("ijk,ijk->i", shift[:, :3], shift[:, :3]))
-    reach = np.where(np.isfinite(proximity.reach), proximity.reach, 0.0)
+    reach = np.where(np.isfinite(table.reach), table.reach, 0.0)
     way = ARC * (center + turn * reach)
-    first, second = proximity.pairs[:, 0], proximity.pairs[:, 1]
-    doubtful = np.flatnonzero(apart & (way[first] + way[second] > proximity.widths))
+    first, second = table.pairs[:, 0], table.pairs[:, 1]
+    doubtful = np.flatnonzero(apart & (way[first] + way[second] > table.widths))
     if len(doubtful):
         between = before[first[doubtful], 3] - before[second[doubtful], 3]
-        gap = (
-            np.sqrt(np.einsum("ij,ij->i", between, between))
-            - (proximity.reach[first] + proximity.reach[second])[doubtful]
-        )
+        gap = np.sqrt(np.einsum("ij,ij->i", between, between)) - (table.reach[first] + table.reach[second])[doubtful]
         doubtful = doubtful[
-            way[first[doubtful]] + way[second[doubtful]] > proximity.widths[doubtful] + np.maximum(gap, 0.0)
+            way[first[doubtful]] + way[second[doubtful]] > table.widths[doubtful] + np.maximum(gap, 0.0)
         ]
     if not len(doubtful):
         return None
-    return scene.sweeper.first_contact(q0, q1, proximity.pairs[doubtful], OVERLAP)
+    return workspace.sweep.first_contact(q0, q1, table.pairs[doubtful], OVERLAP)

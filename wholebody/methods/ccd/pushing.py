@@ -13,6 +13,7 @@ from wholebody.methods.ccd.limbs import Limbs, moved, rotated, seen_from
 from wholebody.methods.ccd.links import Link, LinkFinder, Overlap, Vector
 from wholebody.methods.ccd.sweep import Aims, sweep
 from wholebody.scene import Scene
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -36,6 +37,7 @@ class ChainPusher:
     def __init__(
         self,
         scene: Scene,
+        workspace: Workspace,
         name: str,
         joints: Sequence[int],
         foreign: frozenset[int],
@@ -47,6 +49,7 @@ class ChainPusher:
 
         Args:
             scene: figure and things.
+            workspace: of the run.
             name: of the chain.
             joints: Pinocchio's indices of its joints.
             foreign: joints of the other chains.
@@ -56,29 +59,29 @@ class ChainPusher:
         """
         self.name = name
         self.limbs = Limbs(scene.model, joints)
-        self._finder = LinkFinder(scene, self.limbs, foreign, exact)
+        self._finder = LinkFinder(workspace, self.limbs, foreign, exact)
         self._guards = guards(scene.figure, self.limbs, cones)
         self._tip = _three(scene.model.frames[tip].placement.translation)
-        self._bearing = self._links_with_pieces(scene)
-        self.reach = self._reaches(scene)
+        self._bearing = self._links_with_pieces(workspace)
+        self.reach = self._reaches(workspace)
 
-    def _links_with_pieces(self, scene: Scene) -> list[int]:
-        carriers = {self.limbs.carrier(int(joint)) for joint in scene.proximity.joint}
+    def _links_with_pieces(self, workspace: Workspace) -> list[int]:
+        carriers = {self.limbs.carrier(int(joint)) for joint in workspace.table.joint}
         return sorted(node for node in carriers if node >= 0)
 
-    def _reaches(self, scene: Scene) -> list[float]:
+    def _reaches(self, workspace: Workspace) -> list[float]:
         """Lengths of the bones from each joint outwards, and the size of the last link's pieces."""
         last = self.limbs.joints[-1]
         sizes = [
             float(np.linalg.norm(piece.placement.translation)) + float(size)
-            for piece, size in zip(scene.geometry.geometryObjects, scene.proximity.reach, strict=True)
+            for piece, size in zip(workspace.geometry.geometryObjects, workspace.table.reach, strict=True)
             if piece.parentJoint == last
         ]
         reach = max([float(np.linalg.norm(self._tip)), *sizes])
         reaches = []
         for joint in reversed(self.limbs.joints):
             reaches.append(reach)
-            reach += float(np.linalg.norm(scene.model.jointPlacements[joint].translation))
+            reach += float(np.linalg.norm(workspace.model.jointPlacements[joint].translation))
         return reaches[::-1]
 
     def read(self, q: Array, data: Any) -> None:

@@ -15,6 +15,7 @@ from wholebody.methods.ccd.cones import guards
 from wholebody.methods.ccd.limbs import Limbs, Placement, floats, moved, rotated
 from wholebody.methods.ccd.sweep import Aims, sweep
 from wholebody.methods.ccd.terms import Request, Wish
+from wholebody.methods.control import Control
 
 Array = NDArray[np.float64]
 
@@ -46,8 +47,9 @@ class _Aim(NamedTuple):
 class Reach:
     """The joints of a request, and its goals."""
 
-    def __init__(self, figure: Figure, request: Request) -> None:
+    def __init__(self, figure: Figure, request: Request, control: Control) -> None:
         """Prepare the joints."""
+        self._control = control
         self._model, self._request = figure.model, request
         self.limbs = Limbs(figure.model, request.joints)
         self._guards = guards(figure, self.limbs, request.cones)
@@ -69,7 +71,7 @@ class Reach:
         steps = aims.plan(limbs)
         error, last = _error(aims, goals), inf
         sweeps, rested = 0, not steps
-        while error > tolerance and sweeps < most and not rested:
+        while error > tolerance and sweeps < most and not rested and not self._control.over:
             if sweeps % WINDOW == 0:
                 rested = error > PROGRESS * last
                 last = error

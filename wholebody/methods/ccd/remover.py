@@ -15,7 +15,9 @@ from wholebody.figures.figure import Figure
 from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.ccd.links import Overlap
 from wholebody.methods.ccd.pushing import SKIN, ChainPusher
+from wholebody.methods.control import Control
 from wholebody.scene import Scene
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -47,6 +49,8 @@ class Remover:
     """Takes overlap out of postures of one scene, re-used from posture to posture.
 
     Attributes:
+        workspace: of the run.
+        placements: (n, 4, 3) of the pieces at the last look.
         tally: what was done since it was last set.
         deepest: deepest overlap found by the last look, metres, against the distance asked of the pair.
         skin: how far outside links are pushed, metres.
@@ -56,30 +60,36 @@ class Remover:
     def __init__(
         self,
         scene: Scene,
+        workspace: Workspace,
         clearances: Array | None = None,
         fixed: frozenset[int] = frozenset(),
         cones: Sequence[str] | None = None,
         touch: float = TOUCH,
         exact: bool = True,
+        control: Control | None = None,
     ) -> None:
         """Prepare the chains of the figure.
 
         Args:
             scene: figure and things.
+            workspace: of the run, for as long as this is used.
             clearances: (pairs,) distance asked of every collision pair, metres; zero where None.
             fixed: Pinocchio's indices of joints that must not move.
             cones: names of the reach cones that are kept; all of the figure's where None.
             touch: overlap that does not count, metres.
             exact: where PD_g cancels, look for the least translation that separates, which takes up to 0.1 s.
+            control: what may end the pushing.
         """
+        self.control = Control() if control is None else control
         self.exact, self.skin = exact, SKIN
-        self.scene, self.clearances, self.touch = scene, clearances, touch
+        self.scene, self.workspace, self.clearances, self.touch = scene, workspace, clearances, touch
         self._within = 0.0 if clearances is None else float(clearances.max(initial=0.0))
         self._data = scene.model.createData()
-        self._joints = scene.proximity.joint.tolist()
+        self._joints = workspace.table.joint.tolist()
+        self.placements: Array = np.zeros((len(self._joints), 4, 3))
         self.tally = Tally()
         self.deepest = 0.0
-        self.overlapping = np.zeros(len(scene.proximity.pairs), dtype=bool)
+        self.overlapping = np.zeros(len(workspace.table.pairs), dtype=bool)
         self._fixed, self._cones = fixed, cones
 
     @cached_property
@@ -91,7 +101,9 @@ class Remover:
         }
         everything = frozenset(joint for joints, _ in named.values() for joint in joints)
         return {
-            name: ChainPusher(self.scene, name, joints, everything - set(joints), tip, self._cones, self.exact)
+            name: ChainPusher(
+                self.scene, self.workspace, name, joints, everything - set(joints), tip, self._cones, self.exact
+            )
             for name, (joints, tip) in named.items()
             if joints
         }
@@ -101,7 +113,8 @@ class Remover:
         began = time.perf_counter()
         self.tally.looks += 1
         pin.forwardKinematics(self.scene.model, self._data, q)
-        near = self.scene.proximity.near(self._data, self._within)
+        near = self.workspace.proximity.near(self._data, self._within)
+        self.placements = near.placements
         depth = -near.distance if self.clearances is None else self.clearances[near.number] - near.distance
         self.deepest = float(depth.max(initial=0.0))
         self.overlapping[:] = False
@@ -144,7 +157,7 @@ class Remover:
                 break
             before = self.deepest
             for k in rng.permutation(len(names)).tolist():
-                if self.tally.work > most_work:
+                if self.tally.work > most_work or self.control.over:
                     break
                 overlaps = self._leave(self.chains[names[k]], q, overlaps)
             if overlaps and self.deepest > GAIN * before:

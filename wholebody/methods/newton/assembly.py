@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -22,6 +23,7 @@ from wholebody.methods.newton.joint_register import JointRegister
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
 from wholebody.methods.newton.linear_algebra.choice import NAMES, linear_algebra
 from wholebody.methods.newton.system import System
+from wholebody.pool import OneAtATime
 from wholebody.tasks.inputs import direction, point, target_placement
 
 Array = NDArray[np.float64]
@@ -35,6 +37,8 @@ class Assembly:
 
     Joints are given at the bodies' present placements: `at` and `axis` in the world. Where the two sides do not fit
     yet, `at_first` and `at_second` say the place in either body's frame instead. Bodies need not be connected.
+
+    A solve moves the bodies, so an assembly is for one thread at a time. It can be pickled, and a copy is independent.
     """
 
     def __init__(self) -> None:
@@ -45,7 +49,19 @@ class Assembly:
         self._joints = JointRegister()
         self._equations = EquationSet()
         self._prepared: tuple[str, System, LinearAlgebra] | None = None
+        self._alone = OneAtATime("assembly")
         self.structures = 0
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what was stated and where the bodies are; what a solve prepares is prepared anew."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("_prepared", "_alone")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._prepared, self._alone = None, OneAtATime("assembly")
+
+    def __copy__(self) -> Assembly:
+        return copy.deepcopy(self)
 
     # ---- bodies
 
@@ -234,7 +250,7 @@ class Assembly:
                 little; without inequalities only.
 
         Raises:
-            InputError: there are no bodies, or a setting is out of range.
+            InputError: there are no bodies, a setting is out of range, or another thread solves this assembly.
             UnknownNameError: no such linear algebra.
         """
         number(tolerance, "tolerance", FINEST, TOLERANCE.high)
@@ -242,19 +258,20 @@ class Assembly:
         known(algebra, NAMES, "linear algebra")
         choice(inequalities, KINDS, "inequalities")
         flag(nearest, "nearest")
-        if self._prepared is None or self._prepared[0] != algebra:
-            system = self.system()
-            self._prepared = (algebra, system, linear_algebra(system.pattern, algebra))
-            self.structures += 1
-        _, system, factor = self._prepared
-        if nearest and system.inequality.any():
-            raise InputError("nearest is for assemblies without limits and one-sided planes; leave it out")
-        x, solution = solved(
-            list(self._names), Course(system, factor), self.variables(),
-            tolerance=tolerance, iterations=iterations, kind=inequalities, nearest=nearest,
-        )  # fmt: skip
-        self._places = list(x.reshape(-1, 7))
-        return solution
+        with self._alone:
+            if self._prepared is None or self._prepared[0] != algebra:
+                system = self.system()
+                self._prepared = (algebra, system, linear_algebra(system.pattern, algebra))
+                self.structures += 1
+            _, system, factor = self._prepared
+            if nearest and system.inequality.any():
+                raise InputError("nearest is for assemblies without limits and one-sided planes; leave it out")
+            x, solution = solved(
+                list(self._names), Course(system, factor), self.variables(),
+                tolerance=tolerance, iterations=iterations, kind=inequalities, nearest=nearest,
+            )  # fmt: skip
+            self._places = list(x.reshape(-1, 7))
+            return solution
 
     def _changed(self) -> Assembly:
         self._prepared = None

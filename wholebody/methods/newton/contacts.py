@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.geometry.moved_pairs import Placed, snapshot
+from wholebody.geometry.moved_pairs import Placed
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Coincide
 from wholebody.methods.passage import jumps
 from wholebody.problem import Problem
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -33,27 +34,26 @@ class ContactSet:
         pairs: (k,) places among the collision pairs.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, workspace: Workspace) -> None:
         """Begin without any."""
-        self.scene, self.clearances = problem.scene, problem.clearances
+        self.workspace, self.clearances = workspace, problem.clearances
         self.pairs: Indices = np.zeros(0, dtype=np.intp)
         self.structures = 0
         self._forced: Indices = np.zeros(0, dtype=np.intp)
         self._largest = float(problem.clearances.max(initial=0.0))
         self._within = LEAVE + self._largest
-        proximity = problem.scene.proximity
-        self._names = problem.scene.piece_names
+        table = workspace.table
+        self._names = tuple(piece.name for piece in workspace.geometry.geometryObjects)
         self._labels: list[str] = []
-        self._joint = proximity.joint[proximity.pairs].reshape(-1, 2)
-        thin = np.array([core.width for core in proximity.cores])[proximity.pairs].reshape(-1, 2).min(axis=1)
+        self._joint = table.joint[table.pairs].reshape(-1, 2)
+        thin = np.array([core.width for core in table.cores])[table.pairs].reshape(-1, 2).min(axis=1)
         self._bearable = np.minimum(DEEPEST, SHALLOW * thin)
         self._here: Placed | None = None
         self._there: Placed | None = None
 
     def look(self, data: Any) -> None:
         """Measure at the joints' places in `data` (Pinocchio's), where a step leads."""
-        proximity = self.scene.proximity
-        self._there = snapshot(proximity, proximity.near(data, self._within), self._within)
+        self._there = Placed(self.workspace.proximity.near(data, self._within), self._within)
 
     def runs_into(self) -> bool:
         """Whether a pair that is no inequality overlaps where the step leads; such pairs are from now on."""
@@ -78,7 +78,7 @@ class ContactSet:
         allowed = np.maximum(depth + MORE, self._bearable)
         if (-there.distance > allowed[there.number]).any():
             return False
-        return not jumps(self.scene, self._here, self._there, before, after)
+        return not jumps(self.workspace, self._here, self._there, before, after)
 
     def renew(self, data: Any, bodies: Array, world: int) -> Coincide:
         """The inequalities where `look` has just been.
@@ -92,7 +92,7 @@ class ContactSet:
         self._here = self._there
         contacts = self._here.contacts
         if len(self._forced) and not np.isin(self._forced, contacts.number).all():
-            contacts = self.scene.proximity.near(data, FAR + self._largest)
+            contacts = self.workspace.proximity.near(data, FAR + self._largest)
         spare = contacts.distance - self.clearances[contacts.number]
         member = np.zeros(len(self.clearances), dtype=bool)
         member[self.pairs] = True
@@ -104,13 +104,13 @@ class ContactSet:
         if not np.array_equal(wanted, self.pairs):
             self.pairs, self._labels = wanted, []
             names = self._names
-            for a, b in self.scene.proximity.pairs[wanted]:
+            for a, b in self.workspace.table.pairs[wanted]:
                 self._labels += [f"the distance of {names[a]!r} and {names[b]!r}"] * SLOTS
         return self._rows(contacts, bodies, world)
 
     def _rows(self, contacts: Any, bodies: Array, world: int) -> Coincide:
         clearance = self.clearances[contacts.number]
-        rows = self.scene.row_builder.rows(contacts, clearance)
+        rows = self.workspace.rows.rows(contacts, clearance)
         slot_of = np.full(len(self.clearances) + 1, -1, dtype=np.intp)
         slot_of[self.pairs] = np.arange(len(self.pairs))
         slot = slot_of[contacts.number[rows.contact]]

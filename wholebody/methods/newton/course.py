@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.methods.control import Control
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
 from wholebody.methods.newton.system import System
 
@@ -18,9 +19,11 @@ class Course:
         system: the equations.
         algebra: for the system's pattern.
         longest: metres that any part of a body may move in a step.
+        control: what may end the iteration.
     """
 
     longest = np.inf
+    control = Control()
 
     def __init__(self, system: System, algebra: LinearAlgebra) -> None:
         """Take equations that do not change."""

@@ -18,6 +18,7 @@ from wholebody.methods.newton.objective import Objective
 from wholebody.methods.newton.system import System
 from wholebody.methods.newton.terms import bound_equations, constraint_equations, goal_equations
 from wholebody.problem import Problem
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -39,33 +40,34 @@ class FigureCourse(Course):
         laying: processor's time that took [s].
     """
 
-    def __init__(self, problem: Problem, algebra: str, *, yielding: bool = False) -> None:
+    def __init__(self, problem: Problem, workspace: Workspace, algebra: str, *, yielding: bool = False) -> None:
         """State the equations.
 
         Args:
             problem: what is asked.
+            workspace: of the run, for as long as this is used.
             algebra: name of the factorisation.
             yielding: look for the least violation of the constraints, in place of the goals.
 
         Raises:
             InputError: a term or a joint that has no equations here.
         """
-        self.problem, self.algebra_name = problem, algebra
+        self.problem, self.workspace, self.algebra_name = problem, workspace, algebra
         self.bodies = FigureBodies(problem.scene.figure)
-        self.contacts = ContactSet(problem) if len(problem.scene.proximity.pairs) else None
+        self.contacts = ContactSet(problem, workspace) if len(workspace.table.pairs) else None
         self.longest = LONGEST if self.contacts else np.inf
         count = self.bodies.count
         unit = Unit(np.arange(count)[:, None], [f"the Euler parameters of {name!r}" for name in self.bodies.names])
         self._limits = self.bodies.limits()
         self._fixed: list[tuple[Batch, Key]] = [(unit, HARD), (self._limits, ONE_SIDED)]
         self._fixed += self.bodies.equations.batches(count)
-        self._fixed += bound_equations(problem).batches(count)
+        self._fixed += bound_equations(problem, workspace.state).batches(count)
         self._yielding = yielding
         if not yielding:
             self._fixed += constraint_equations(problem, self.bodies).batches(count)
         self._goals: list[tuple[Batch, Key]] = []
         self.retarget()
-        self.objective = Objective(problem, self.bodies)
+        self.objective = Objective(problem, self.bodies, workspace.state)
         self._fixed.append((self.objective.rows, Key(OBJECTIVE, False, False, 1.0)))
         self.q = self._left = problem.start
         self.structures, self.laying = 0, 0.0

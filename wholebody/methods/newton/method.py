@@ -3,47 +3,25 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wholebody import checks
-from wholebody.errors import InputError
+from wholebody.checks import choice, known
+from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.inequalities import KINDS, Kind
-from wholebody.methods.newton.linear_algebra.base import Pattern
 from wholebody.methods.newton.linear_algebra.choice import NAMES
-from wholebody.methods.newton.reaching import reach
-from wholebody.methods.newton.search import SHARPER, Found, Search, Settings
+from wholebody.methods.newton.search import Found, Search, Settings
 from wholebody.problem import Iterate, Problem, Solution, Status
-from wholebody.tasks import StepLimit
 
-Array = NDArray[np.float64]
-
-FRAME_TOLERANCE = 1e-4  # m, rad: on the way of a drag; its end is solved to the method's own
-FRAME_ITERATIONS = 12  # most of one frame; a goal that asks for more is followed over the next frames
+if TYPE_CHECKING:
+    from wholebody.methods.newton.tracking import NewtonTracker
 
 
-class NewtonStep(NamedTuple):
-    """Answer of one frame.
-
-    Attributes:
-        q: (nq,) the next posture.
-        iterations: Newton iterations.
-        systems: linear systems solved.
-        structures: how often the pattern has been laid out since the problem was first seen.
-    """
-
-    q: Array
-    iterations: int
-    systems: int
-    structures: int
-
-
-@dataclass
+@dataclass(frozen=True)
 class Newton:
     """Newton's method in full coordinates (Choi and Cremer 1999), for trees and closed loops alike.
 
@@ -52,6 +30,8 @@ class Newton:
     only, and the solution's message says so. Where the goals cannot be met, their least squares are sought with
     everything else held.
 
+    These are settings alone: one object serves any number of problems and threads at the same time.
+
     Attributes:
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most Newton iterations.
@@ -59,6 +39,7 @@ class Newton:
         inequalities: "slack" (squared slacks) or "barrier" (logarithmic).
         restarts: most seeded starts that are tried where the straight way does not serve.
         seed: of the restarts.
+        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
     """
 
     tolerance: float = 1e-5
@@ -67,7 +48,7 @@ class Newton:
     inequalities: Kind = "slack"
     restarts: int = 6
     seed: int = 0
-    _course: FigureCourse | None = field(default=None, init=False, repr=False)
+    time_limit: float | None = TIME_LIMIT
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -77,116 +58,71 @@ class Newton:
             UnknownNameError: no such linear algebra.
         """
         check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, restarts=RESTARTS, seed=SEED)
-        checks.known(self.algebra, NAMES, "linear algebra")
-        checks.choice(self.inequalities, KINDS, "inequalities")
+        known(self.algebra, NAMES, "linear algebra")
+        choice(self.inequalities, KINDS, "inequalities")
+        check_time_limit(self.time_limit)
 
     @property
     def name(self) -> str:
         """Name for tables."""
         return f"newton/{self.algebra}"
 
-    def solve(self, problem: Problem) -> Solution:
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
-
-        Raises:
-            InputError: the problem has a term that this method has no equations for.
-        """
-        began = time.perf_counter()
-        search = Search(self._prepared(problem), self._settings())
-        found = search.everywhere(problem.scene.figure.clamp(problem.start))
-        return self._answer(search, found, began)
-
-    def follow(self, problem: Problem, q: Array) -> Solution:
-        """The straight way from the posture q (nq,), for goals that move from call to call.
-
-        What was laid out is kept, and no other starts are tried.
-
-        Raises:
-            InputError: the problem has a term that this method has no equations for.
-        """
-        began = time.perf_counter()
-        search = Search(self._prepared(problem), self._settings())
-        q = checks.posture(q, problem.scene.model.nq)
-        return self._answer(search, search.from_here(q), began)
-
-    def step(
-        self, problem: Problem, q: Array, tolerance: float = FRAME_TOLERANCE, dt: float | None = None
-    ) -> NewtonStep:
-        """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
-
-        What was laid out for the same problem is kept.
 
         Args:
             problem: what is asked.
-            q: where the frame begins.
-            tolerance: of the goals, metres and radians.
-            dt: seconds of the frame, for bounds on speeds; none hold where it is None.
+            progress: see `wholebody.methods.control.Progress`.
 
         Raises:
             InputError: the problem has a term that this method has no equations for.
         """
-        course, q = self._prepared(problem), checks.posture(q, problem.scene.model.nq)
-        tolerance = checks.number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
-        if dt is not None:
-            checks.time_step(dt, "dt")
-        course.objective.anchor(q)
-        if dt is not None and any(isinstance(bound, StepLimit) for bound in problem.bounds):
-            state = problem.scene.state(q)
-            ranges = np.array([bound.bounds(state, dt) for bound in problem.bounds])
-            course.bodies.bound_step(q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0))
-        found = reach(
-            course,
-            course.variables(q),
-            tolerance=SHARPER * self.tolerance,
-            goal_tolerance=tolerance,
-            iterations=FRAME_ITERATIONS,
-            kind=self.inequalities,
-            hurried=True,
-        )
-        return NewtonStep(course.posture(found.x), found.iterations, found.systems, course.structures)
+        check_problem(problem, "Newton.solve: problem")
+        began = time.perf_counter()
+        with problem.lend() as workspace, Control(self.time_limit, progress) as control:
+            course = FigureCourse(problem, workspace, self.algebra)
+            course.control = control
+            search = Search(course, self.settings)
+            found = search.everywhere(problem.scene.figure.clamp(problem.start))
+            return answer(search, found, began)
 
-    def pattern(self) -> Pattern:
-        """Where the Jacobian of the last problem can be other than zero.
+    def tracker(self, problem: Problem, dt: float | None = None) -> NewtonTracker:
+        """What follows the goals of a problem that move from call to call; its equations are laid out once.
+
+        Args:
+            problem: what is asked.
+            dt: seconds a frame, for bounds on speeds; none hold where it is None.
 
         Raises:
-            InputError: there was none.
+            InputError: the problem has a term that this method has no equations for, dt is not a positive finite
+                number, or the scene changed after the problem was stated.
         """
-        if self._course is None:
-            raise InputError("nothing has been solved yet; call solve(problem) first")
-        return self._course.system.pattern
+        from wholebody.methods.newton.tracking import NewtonTracker
 
-    def laid_out(self) -> tuple[int, float]:
-        """How many patterns the last problem needed, and the processor's time to lay them out and analyse them [s]."""
-        return (0, 0.0) if self._course is None else (self._course.structures, self._course.laying)
+        return NewtonTracker(problem, self.algebra, self.settings, dt)
 
-    def _settings(self) -> Settings:
+    @property
+    def settings(self) -> Settings:
+        """What a search is bounded by."""
         return Settings(self.tolerance, self.iterations, self.restarts, self.seed, self.inequalities)
 
-    def _prepared(self, problem: Problem) -> FigureCourse:
-        """The equations of the problem with its present goals; laid out anew where they are others."""
-        check_problem(problem, "Newton: problem")
-        problem.check_fresh()
-        course = self._course
-        if course is None or course.problem is not problem:
-            course = self._course = FigureCourse(problem, self.algebra)
-        course.retarget()
-        course.objective.follow()
-        course.bodies.free_step()
-        return course
 
-    def _answer(self, search: Search, found: Found, began: float) -> Solution:
-        course, judgement = search.course, found.judgement
-        status = _status(found, search.settings)
-        return Solution(
-            q=found.q,
-            status=status,
-            seconds=time.perf_counter() - began,
-            iterations=search.iterations,
-            assessment=judgement,
-            trace=tuple(Iterate(error, 0.0, 0.0, 0.0) for error in search.residuals),
-            method=f"newton/{course.algebra.name}",
-            message=_message(status, found, search) + _reported(course),
-        )
+def answer(search: Search, found: Found, began: float) -> Solution:
+    """The solution that a search found, with status and message; it began at `began` by `time.perf_counter`."""
+    stopped = search.course.control.message(found.judgement)
+    status = _status(found, search.settings)
+    if stopped and status != "solved":
+        status = "stalled"
+    return Solution(
+        q=found.q,
+        status=status,
+        seconds=time.perf_counter() - began,
+        iterations=search.iterations,
+        assessment=found.judgement,
+        trace=tuple(Iterate(error, 0.0, 0.0, 0.0) for error in search.residuals),
+        method=f"newton/{search.course.algebra.name}",
+        message=(stopped or _message(status, found, search)) + found.judgement.in_the_way + _reported(search.course),
+    )
 
 
 def _status(found: Found, settings: Settings) -> Status:
@@ -206,14 +142,14 @@ def _message(status: Status, found: Found, search: Search) -> str:
         return f"not reachable from here: nothing is violated, {left}"
     if judgement.holds(search.settings.counted):
         return f"ran out of iterations: {left}"
-    name, missed = _worst(search.course.problem, found)
+    name, missed = _worst(search.course, found)
     why = "what must hold cannot all hold" if status == "infeasible" else "ran out of iterations"
     return f"{why}: {name} is missed by {missed:.3g} m or rad"
 
 
-def _worst(problem: Problem, found: Found) -> tuple[str, float]:
+def _worst(course: FigureCourse, found: Found) -> tuple[str, float]:
     """What is farthest from holding, and by how much."""
-    state = problem.scene.state(found.q)
+    problem, state = course.problem, course.workspace.state.update(found.q)
     worst = ("the clearance of a pair", max(found.judgement.clearance_lack, found.judgement.penetration))
     for number, term in enumerate(problem.constraints):
         value = np.atleast_1d(term.value(state))

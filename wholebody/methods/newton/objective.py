@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.figures.state import State
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.system import System
 from wholebody.problem import Problem
@@ -30,9 +31,15 @@ class Objective:
         reported: names of the others.
     """
 
-    def __init__(self, problem: Problem, bodies: FigureBodies) -> None:
-        """Lay the rows out for the figure's turning joints."""
-        self._scene, self._bodies = problem.scene, bodies
+    def __init__(self, problem: Problem, bodies: FigureBodies, state: State) -> None:
+        """Lay the rows out for the figure's turning joints.
+
+        Args:
+            problem: what is asked.
+            bodies: of its figure.
+            state: of the run; it is moved.
+        """
+        self._state, self._bodies = state, bodies
         self.minimised = [term for term in problem.measures if isinstance(term, CAN)]
         self.reported = [type(term).__name__ for term in problem.measures if not isinstance(term, CAN)]
         self.rows, self._tangent = bodies.distance(problem.start)
@@ -41,7 +48,7 @@ class Objective:
 
     def value(self, x: Array) -> float:
         """The minimised measures at the bodies x (7 n,)."""
-        state = self._scene.state(self._bodies.posture(x))
+        state = self._state.update(self._bodies.posture(x))
         return sum(term.weight * term.value(state) for term in self.minimised)
 
     def anchor(self, q: Array) -> None:
@@ -64,7 +71,7 @@ class Objective:
         system.stiffness[system.objective] = self.stiffness
 
     def _model_at(self, q: Array) -> None:
-        state = self._scene.state(q)
+        state = self._state.update(q)
         gradient, curvature = np.zeros(state.model.nv), np.zeros(state.model.nv)
         for term in self.minimised:
             gradient += term.weight * term.gradient(state)

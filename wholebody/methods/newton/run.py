@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.inequalities import FREE, Inequalities, Kind, inequalities
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
+from wholebody.problem import Iterate
 
 Array = NDArray[np.float64]
 Measures = Literal["lower", "keep", "ignore"]
@@ -108,6 +109,9 @@ class Run:
         for _ in range(iterations):
             if (self.met if goals else self.hard <= self.tolerance) and self.state.finished():
                 return
+            if self.course.control.over:
+                return
+            self.course.control.tell(Iterate(self.goal, self.hard, 0.0, 0.0))
             before = self._norms(self.residual)
             try:
                 mend = not goals or (self.goal > self.goal_tolerance and before[0] > MEND * funnel)

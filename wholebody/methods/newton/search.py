@@ -24,6 +24,7 @@ SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessm
 SLACK = 1.05  # times the tolerance: an assessment measures with other arithmetic, and coal's own accuracy is 1e-6 m
 COAL_ACCURACY = 1e-6  # m
 TRIAL = 30  # iterations that another start is given to come nearer than the best so far
+FOR_STARTS = 0.5  # share of the time limit that other starts may take: to come nearest takes its time too
 ALIKE = 1e-5  # share of a goal's error by which two ends may differ and count as equally near
 
 
@@ -81,8 +82,10 @@ class Search:
                     found = self._go(found.q, how, self.settings.iterations)
                 if self._better(found, best):
                     best = found
-                if self._serves(best):
+                if self._serves(best) or self.course.control.over or self.course.control.spent > FOR_STARTS:
                     break
+        if self.course.control.over:
+            return best
         if not best.judgement.holds(self.settings.counted):
             best = self._least_violation(best, q)
         if self._serves(best) and self.course.objective.minimised:
@@ -91,11 +94,11 @@ class Search:
 
     def _starts(self, q: Array) -> Iterator[tuple[Array, str]]:
         problem = self.course.problem
-        start = bent(problem, q)
+        start = bent(problem, self.course.workspace.state, q)
         if start is not None:
             yield start, " from a start with bent joints"
         rng = np.random.default_rng(self.settings.seed)
-        for start in restarts(problem, q, rng, self.settings.restarts):
+        for start in restarts(problem, self.course.workspace.state, q, rng, self.settings.restarts):
             yield start, " from another start"
 
     def _go(self, q: Array, how: str, iterations: int) -> Found:
@@ -122,7 +125,8 @@ class Search:
     def _least_violation(self, best: Found, q: Array) -> Found:
         """The nearest to all constraints, if that breaks less: where they cannot all hold."""
         whole = self.course
-        self.course = FigureCourse(whole.problem, whole.algebra_name, yielding=True)
+        self.course = FigureCourse(whole.problem, whole.workspace, whole.algebra_name, yielding=True)
+        self.course.control = whole.control
         found = self._go(q, best.how, self.settings.iterations)
         self.course = whole
         stationary = best.reached.stationary or found.reached.stationary

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.errors import InputError
+from wholebody.figures.state import State
 from wholebody.methods.newton.batches import Array, Batch
 from wholebody.methods.newton.directions import Cone, Toward
 from wholebody.methods.newton.equations import EquationSet
@@ -92,8 +93,12 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
     return result
 
 
-def bound_equations(problem: Problem) -> EquationSet:
+def bound_equations(problem: Problem, state: State) -> EquationSet:
     """Equations of bounds.
+
+    Args:
+        problem: whose bounds.
+        state: of the run; it is moved to the problem's start.
 
     Raises:
         InputError: one that has none here.
@@ -101,7 +106,7 @@ def bound_equations(problem: Problem) -> EquationSet:
     result = EquationSet()
     for bound in problem.bounds:
         if isinstance(bound, Freeze):
-            _frozen(result, problem, bound)
+            _frozen(result, problem, bound, state)
         elif not isinstance(bound, StepLimit):  # a solve is not tied to time, so a step limit bounds nothing
             raise _refused(type(bound).__name__)
     return result
@@ -161,10 +166,10 @@ def _placement(
         equations.turn(a, b, label, wanted, pin.Quaternion(local.rotation), 3, goal=goal, weight=weight)
 
 
-def _frozen(equations: EquationSet, problem: Problem, bound: Freeze) -> None:
+def _frozen(equations: EquationSet, problem: Problem, bound: Freeze, state: State) -> None:
     """Joints that keep their placement to their parent."""
     figure, model = problem.scene.figure, problem.scene.model
-    state = problem.scene.state(problem.start)
+    state.update(problem.start)
     for name in figure.joint_names(bound.joints):
         joint = figure.joint_id(name)
         parent = int(model.parents[joint])

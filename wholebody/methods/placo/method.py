@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,12 +11,13 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
-from wholebody.figures.state import State
 from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, check, named_frames
 from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
@@ -34,7 +35,7 @@ STIFFER, LOOSER = 4.0, 0.5  # factors on that, after another such step and after
 MOST_DAMPING = 10.0
 
 
-@dataclass
+@dataclass(frozen=True)
 class Placo:
     """placo's `KinematicsSolver`, by its documented tasks, iterated.
 
@@ -48,11 +49,12 @@ class Placo:
     Attributes:
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most programs.
+        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
     """
 
     tolerance: float = 1e-5
     iterations: int = 200
-    _robot: tuple[Problem, Robot] | None = field(default=None, init=False, repr=False)
+    time_limit: float | None = TIME_LIMIT
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -61,6 +63,7 @@ class Placo:
             InputError: a setting out of range.
         """
         check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS)
+        check_time_limit(self.time_limit)
 
     @property
     def name(self) -> str:
@@ -74,18 +77,30 @@ class Placo:
             InputError: placo cannot express the problem, or its scene changed after it was stated.
             MissingPackageError: placo is not installed.
         """
-        self._prepared(problem)
+        check_problem(problem, "Placo.prepare: problem")
+        with problem.lend() as workspace, problem.scene.built.pool(_Room, _Room).lend() as room:
+            room.robot(problem, workspace)
 
-    def solve(self, problem: Problem) -> Solution:
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
+
+        Args:
+            problem: what is asked.
+            progress: see `wholebody.methods.control.Progress`.
 
         Raises:
             InputError: placo cannot express the problem, or its scene changed after it was stated.
             MissingPackageError: placo is not installed.
         """
+        check_problem(problem, "Placo.solve: problem")
         began = time.perf_counter()
-        run = _Run(problem, self._prepared(problem), self)
-        run.go()
+        with (
+            problem.lend() as workspace,
+            problem.scene.built.pool(_Room, _Room).lend() as room,
+            Control(self.time_limit, progress) as control,
+        ):
+            run = _Run(problem, workspace, room.robot(problem, workspace), self, control)
+            run.go()
         judgement = assess(problem, run.q)
         status = _status(judgement, run, 1.05 * self.tolerance + 1e-6)
         return Solution(
@@ -96,17 +111,24 @@ class Placo:
             assessment=judgement,
             trace=tuple(run.trace),
             method=self.name,
-            message=_message(status, judgement, run),
+            message=(control.message(judgement) or _message(status, judgement, run)) + judgement.in_the_way,
         )
 
-    def _prepared(self, problem: Problem) -> Robot:
-        check_problem(problem, "Placo: problem")
-        problem.check_fresh()
+
+class _Room:
+    """Where the robot that one solve built waits for the next one on the same scene, which may be about the same."""
+
+    def __init__(self) -> None:
+        self._robot: Robot | None = None
+
+    def robot(self, problem: Problem, workspace: Workspace) -> Robot:
+        """Placo's robot for a problem, with things where the workspace sees them."""
         check(problem)
         frames = named_frames(problem)
-        if self._robot is None or self._robot[0] is not problem or not set(frames) <= set(self._robot[1].frames):
-            self._robot = (problem, Robot(problem, frames))
-        return self._robot[1]
+        if self._robot is None or not self._robot.serves(problem, frames):
+            self._robot = Robot(problem, frames)
+        self._robot.place_objects(workspace.geometry)
+        return self._robot
 
 
 class _Run:
@@ -119,16 +141,15 @@ class _Run:
         failure: placo's words where it found no solution.
     """
 
-    def __init__(self, problem: Problem, robot: Robot, method: Placo) -> None:
+    def __init__(self, problem: Problem, workspace: Workspace, robot: Robot, method: Placo, control: Control) -> None:
         import placo
 
-        self._problem, self._robot, self._method = problem, robot, method
+        self._problem, self._robot, self._method, self._control = problem, robot, method, control
+        self._proximity, self._state = workspace.proximity, workspace.state
         self.q: Array = problem.scene.figure.clamp(problem.start)
-        self._state = State(problem.scene.model)
         self.trace: list[Iterate] = []
         self.programs, self.rested, self.failure = 0, False, ""
         self._damping, self._last = 0.0, np.zeros(problem.scene.model.nv)
-        robot.place_objects()
         self._solver: Any = placo.KinematicsSolver(robot.wrapper)
         self._tasks = add_terms(self._solver, robot, problem)
         self._regular = self._solver.add_regularization_task(REGULAR * COMFORT)
@@ -149,13 +170,14 @@ class _Run:
         while True:
             error, violation = self._look()
             self.trace.append(Iterate(error, violation, 0.0, step))
+            self._control.tell(self.trace[-1])
             enough = SHARE * method.tolerance
             if max(error, violation) <= enough and self._apart(enough):
                 return
             if self.programs and step <= REST * method.tolerance:
                 self.rested = True
                 return
-            if self.programs == method.iterations:
+            if self.programs == method.iterations or self._control.over:
                 return
             move = self._program()
             if move is None:
@@ -180,7 +202,7 @@ class _Run:
     def _apart(self, tolerance: float) -> bool:
         """Whether all pairs keep their clearance."""
         clearances = self._problem.clearances
-        near = self._problem.scene.proximity.near(self._state.data, float(clearances.max(initial=0.0)))
+        near = self._proximity.near(self._state.data, float(clearances.max(initial=0.0)))
         return bool((near.distance >= clearances[near.number] - tolerance - COAL_ACCURACY).all())
 
     def _program(self) -> Array | None:
@@ -212,8 +234,6 @@ def _status(judgement: Assessment, run: _Run, slack: float) -> Status:
         return "infeasible" if ended else "stalled"
     if judgement.met(slack):
         return "solved"
-    if run.failure:
-        return "infeasible"
     return "unreachable" if run.rested else "stalled"
 
 

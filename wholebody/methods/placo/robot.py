@@ -56,7 +56,8 @@ class Robot:
         except ImportError:
             raise MissingPackageError("placo is not installed; install it with: pip install placo") from None
         figure = problem.scene.figure
-        self.frames, self._scene = dict(frames), problem.scene
+        self.frames, self._root = dict(frames), figure.root
+        self._clearances = problem.clearances.copy()
         text = ElementTree.tostring(_skeleton(figure, self.frames), encoding="unicode")
         self.wrapper = placo.RobotWrapper("", placo.Flags.ignore_collisions, text)
         self._copy_model(figure)
@@ -65,18 +66,22 @@ class Robot:
     @property
     def floating(self) -> bool:
         """Whether the figure moves its root too."""
-        return bool(self._scene.figure.root == "free")
+        return self._root == "free"
 
     def move(self, q: Array) -> None:
-        """Take our posture q (nq,), and the objects' present places."""
+        """Take our posture q (nq,)."""
         theirs = pin.neutral(self.wrapper.model)
         theirs[self._idx_q] = q
         self.wrapper.state.q = theirs
         self.wrapper.update_kinematics()
 
-    def place_objects(self) -> None:
-        """Move the pieces to where the scene has them now."""
-        model, ours = self.wrapper.collision_model, self._scene.geometry
+    def serves(self, problem: Problem, frames: Mapping[str, tuple[int, pin.SE3]]) -> bool:
+        """Whether it was built for such a problem of the same scene: its clearances, and these frames or more."""
+        return set(frames) <= set(self.frames) and np.array_equal(self._clearances, problem.clearances)
+
+    def place_objects(self, ours: pin.GeometryModel) -> None:
+        """Move the pieces to where a geometry model like the scene's has them."""
+        model = self.wrapper.collision_model
         for index, number in enumerate(self._pieces):
             model.geometryObjects[index].placement = ours.geometryObjects[number].placement
 

@@ -5,8 +5,9 @@ the multipliers y of the soft and active elastic rows A (Schur complement of the
 
     (A_F D_F^-1 A_F' + W^-1) y = A x_fixed-part - A_F D_F^-1 g_F - b,        x_F = -D_F^-1 (g_F + A_F' y),
 
-of a few dozen unknowns: about 30 us. Weights enter as their inverse, so very large ones cost no accuracy, and rows that
-repeat each other do no harm. The set is then corrected where signs are wrong (the primal-dual active set method,
+of a few dozen unknowns: about 30 us. Weights enter as their inverse, so large ones cost no accuracy. With more rows
+than variables, and where rows repeat each other to rounding, the system in x is the better one: the least squares
+problem of the weighted rows, by QR. The set is then corrected where signs are wrong (the primal-dual active set method,
 Hintermueller, Ito and Kunisch 2002), which ends after a few corrections when the guess was near. First-order solvers
 such as OSQP thereby end in answers exact to rounding.
 """
@@ -17,10 +18,11 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import qr_multiply, solve_triangular
 from scipy.linalg.lapack import dposv
 
 from wholebody.compiled import compiled_module
-from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution, QuadraticProgram
+from wholebody.methods.qp.quadratic_program import ActiveSet, Array, Mask, QPSolution, QuadraticProgram
 
 BOUND_TOLERANCE = 1e-11  # rad, m: an x this far outside its box counts as inside
 ROW_TOLERANCE = 1e-11  # m: likewise for elastic rows
@@ -54,7 +56,11 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
 
     Returns:
         The answer, or None when the sets did not settle.
+
+    Raises:
+        ValueError: the sizes of the program or of the guess do not fit together.
     """
+    program.check_shapes(guess)
     kernel = compiled_kernel()
     if kernel is None:
         return solve_in_arrays(program, guess, corrections)
@@ -114,24 +120,44 @@ def minimise_on_face(program: QuadraticProgram, active: ActiveSet) -> FacePoint 
     """
     rows = np.vstack([program.rows, program.elastic[active.elastic]])
     target = np.concatenate([program.target, program.least[active.elastic]])
-    compliance = 1.0 / np.concatenate([program.weight, program.elastic_weight[active.elastic]])
+    weight = np.concatenate([program.weight, program.elastic_weight[active.elastic]])
     x = np.where(active.lower, program.lower, np.where(active.upper, program.upper, 0.0))
-    inverse = np.where(active.lower | active.upper, 0.0, 1.0 / program.diagonal)
-    if len(rows):
+    free = ~(active.lower | active.upper)
+    inverse = np.where(free, 1.0 / program.diagonal, 0.0)
+    multiplier, in_columns = np.zeros(len(rows)), len(rows) > program.size
+    if len(rows) and not in_columns:
         scaled = rows * inverse
         system = scaled @ rows.T
-        system.flat[:: len(rows) + 1] += compliance
+        system.flat[:: len(rows) + 1] += 1.0 / weight
         _, multiplier, info = dposv(system, rows @ x - scaled @ program.linear - target)
-        if info != 0:
-            return None
-        pull = program.linear + multiplier @ rows
-    else:
-        multiplier = target
-        pull = program.linear
-    x = x - inverse * pull
+        trial = x - inverse * (program.linear + multiplier @ rows)
+        # rows that repeat each other to rounding leave multipliers that do not belong to their residuals
+        in_columns = info != 0 or not np.abs(rows @ trial - target - multiplier / weight).max() <= ROW_TOLERANCE
+    if in_columns:
+        x[free] = _in_columns(program, rows[:, free], target - rows @ x, weight, free)
+        multiplier = weight * (rows @ x - target)
+    pull = program.linear + multiplier @ rows
+    x = x if in_columns else x - inverse * pull
     if not np.isfinite(x).all():
         return None
     return FacePoint(x, program.diagonal * x + pull, -multiplier[len(program.target) :])
+
+
+def _in_columns(program: QuadraticProgram, rows: Array, target: Array, weight: Array, free: Mask) -> Array:
+    """Free entries (f,) of the minimiser on a face with more rows than variables.
+
+    They minimise |W^1/2 (A x - b)|^2 + |D^1/2 x + D^-1/2 g|^2. The rows stand in the order of their weights, for which
+    Householder's QR is stable row by row (Cox and Higham 1998).
+    """
+    if not free.any():
+        return np.zeros(0)
+    heavy = np.argsort(-weight, kind="stable")
+    root, own = np.sqrt(weight[heavy]), np.sqrt(program.diagonal[free])
+    table = np.vstack([rows[heavy] * root[:, None], np.diag(own)])
+    right = np.concatenate([target[heavy] * root, -program.linear[free] / own])
+    turned, factor = qr_multiply(table, right, mode="right")
+    result: Array = solve_triangular(factor, turned)
+    return result
 
 
 def _corrected(program: QuadraticProgram, active: ActiveSet, point: FacePoint) -> ActiveSet:

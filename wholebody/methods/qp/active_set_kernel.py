@@ -48,7 +48,7 @@ def settle(
     right[:m] = target
     for i in range(m):
         compliance[i] = 1.0 / weight[i]
-    inverse, gradient = np.empty(n), np.empty(n)
+    inverse, gradient, trial, multiplier = np.empty(n), np.empty(n), np.empty(n), np.empty(m + k)
     push, active = np.empty(k), np.empty(k, dtype=np.int64)
     next_lower, next_upper, next_pushing = np.empty(n, np.bool_), np.empty(n, np.bool_), np.empty(k, np.bool_)
     for attempt in range(corrections):
@@ -66,21 +66,31 @@ def settle(
             x[i] = lower[i] if at_lower[i] else (upper[i] if at_upper[i] else 0.0)
             inverse[i] = 0.0 if held else 1.0 / diagonal[i]
             gradient[i] = linear[i]
-        if size:
+        in_columns = size > n
+        if 0 < size <= n:
             for r in range(size):
                 for i in range(n):
                     scaled[r, i] = stacked[r, i] * inverse[i]
             system = np.dot(scaled[:size], stacked[:size].T)
-            multiplier = np.dot(stacked[:size], x) - np.dot(scaled[:size], linear) - right[:size]
+            multiplier[:size] = np.dot(stacked[:size], x) - np.dot(scaled[:size], linear) - right[:size]
             for r in range(size):
                 system[r, r] += compliance[r]
-            if not _solve(system, multiplier):
-                return False
-            gradient += np.dot(multiplier, stacked[:size])
-            for j in range(count):
-                push[j] = -multiplier[m + j]
+            in_columns = not _solve(system, multiplier[:size])
+            if not in_columns:
+                pull = linear + np.dot(multiplier[:size], stacked[:size])
+                for i in range(n):
+                    trial[i] = x[i] - inverse[i] * pull[i]
+                left = np.dot(stacked[:size], trial) - right[:size] - compliance[:size] * multiplier[:size]
+                in_columns = not np.abs(left).max() <= row_tolerance
+        if in_columns:
+            _minimise_in_columns(stacked, right, compliance, size, diagonal, linear, inverse, x, multiplier)
+        if size:
+            gradient += np.dot(multiplier[:size], stacked[:size])
+        for j in range(count):
+            push[j] = -multiplier[m + j]
         for i in range(n):
-            x[i] -= inverse[i] * gradient[i]
+            if not in_columns:
+                x[i] -= inverse[i] * gradient[i]
             gradient[i] += diagonal[i] * x[i]
             if not np.isfinite(x[i]):
                 return False
@@ -126,6 +136,91 @@ def settle(
         mask = at_lower if kind == 0 else (at_upper if kind == 1 else pushing)
         mask[place] = not mask[place]
     return False
+
+
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _minimise_in_columns(
+    stacked: Array,
+    right: Array,
+    compliance: Array,
+    size: int,
+    diagonal: Array,
+    linear: Array,
+    inverse: Array,
+    x: Array,
+    multiplier: Array,
+) -> None:
+    """Minimiser on a face with more rows than variables, by Householder's QR of the weighted rows.
+
+    The free entries of x minimise |W^1/2 (A x - b)|^2 + |D^1/2 x + D^-1/2 g|^2. The rows stand in the order of their
+    weights, for which the factorisation is stable row by row (Cox and Higham 1998): heavy rows lose no digits to light
+    ones, nor light ones to heavy.
+
+    Args:
+        stacked: (size or more, n) rows A.
+        right: (size or more,) b.
+        compliance: (size or more,) inverse weights.
+        size: how many rows count.
+        diagonal: (n,) D.
+        linear: (n,) g.
+        inverse: (n,) 1 / D of the free variables, 0 of the held ones.
+        x: (n,) with the held entries; the free ones are filled in.
+        multiplier: (size or more,) is filled with the weight times the residual of each row.
+    """
+    n = len(x)
+    free = np.flatnonzero(inverse)
+    columns = len(free)
+    order = np.argsort(compliance[:size])
+    table = np.zeros((size + columns, columns + 1))
+    for place in range(size):
+        r = order[place]
+        root = 1.0 / np.sqrt(compliance[r])
+        total = right[r]
+        for i in range(n):
+            if inverse[i] == 0.0:
+                total -= stacked[r, i] * x[i]
+        for c in range(columns):
+            table[place, c] = root * stacked[r, free[c]]
+        table[place, columns] = root * total
+    for c in range(columns):
+        root = np.sqrt(diagonal[free[c]])
+        table[size + c, c] = root
+        table[size + c, columns] = -linear[free[c]] / root
+    work = np.empty(columns + 1)
+    for c in range(columns):
+        last = size + c + 1  # the rows of D below have nothing in this column yet
+        square = 0.0
+        for r in range(c, last):
+            square += table[r, c] * table[r, c]
+        norm = -np.sqrt(square) if table[c, c] > 0.0 else np.sqrt(square)
+        head = table[c, c] - norm  # Householder's vector: this, and the column below
+        scale = -1.0 / (norm * head)
+        for d in range(c + 1, columns + 1):
+            work[d] = head * table[c, d]
+        for r in range(c + 1, last):
+            entry = table[r, c]
+            if entry != 0.0:
+                for d in range(c + 1, columns + 1):
+                    work[d] += entry * table[r, d]
+        for d in range(c + 1, columns + 1):
+            work[d] *= scale
+            table[c, d] -= head * work[d]
+        for r in range(c + 1, last):
+            entry = table[r, c]
+            if entry != 0.0:
+                for d in range(c + 1, columns + 1):
+                    table[r, d] -= entry * work[d]
+        table[c, c] = norm
+    for c in range(columns - 1, -1, -1):
+        total = table[c, columns]
+        for d in range(c + 1, columns):
+            total -= table[c, d] * x[free[d]]
+        x[free[c]] = total / table[c, c]
+    for r in range(size):
+        total = -right[r]
+        for i in range(n):
+            total += stacked[r, i] * x[i]
+        multiplier[r] = total / compliance[r]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})  # type: ignore[untyped-decorator]

@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from wholebody.geometry.moved_pairs import snapshot
+from wholebody.geometry.moved_pairs import Placed
 from wholebody.linearisation import Lineariser
+from wholebody.methods.control import Control
 from wholebody.methods.passage import jumps
 from wholebody.methods.qp.acceleration import Anderson
 from wholebody.methods.qp.funnel import Funnel, Outlook, Verdict
@@ -61,6 +62,7 @@ class Descent:
         hasty: whether to give up where the violation hardly lessens for a while.
         eager: whether to ask for all of the way to the goals in every step, damped by how far they are, until steps are
             rejected or gain little; else for a piece of it.
+        control: what may end it.
     """
 
     subproblem: Subproblem
@@ -74,6 +76,7 @@ class Descent:
     measures: bool = True
     hasty: bool = False
     eager: bool = False
+    control: Control = field(default_factory=Control)
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
@@ -95,7 +98,7 @@ class Descent:
         working_set = WorkingSet(self.solver)
         history: list[float] = []
         count, converged, renewals = 0, False, RENEWALS
-        while count < self.iterations:
+        while count < self.iterations and not self.control.over:
             if not self.measures and here.violation.worst <= self.tolerance:
                 converged = True
                 break
@@ -253,7 +256,7 @@ class Descent:
         return there.violation.goal < here.violation.goal and broken < MENDABLE
 
     def _jumps(self, here: Visit, there: Visit) -> bool:
-        return jumps(self.lineariser.scene, here.placed, there.placed, here.at.q, there.at.q)
+        return jumps(self.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
 
     def _visit(self, q: Array) -> Visit:
         within = min(max(LEAST_WITHIN, PULL * self._radius), MOST_WITHIN)
@@ -261,8 +264,7 @@ class Descent:
         rows = self.subproblem.rows(at)
         if self.offset is not None:
             rows.soft_error[: rows.goals] -= self.offset
-        proximity = self.lineariser.scene.proximity
-        return Visit(at, rows, self.subproblem.violation(rows), snapshot(proximity, at.contacts, within))
+        return Visit(at, rows, self.subproblem.violation(rows), Placed(at.contacts, within))
 
     def _judge(self, here: Visit, there: Visit, outlook: Outlook) -> Verdict:
         """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""
@@ -288,3 +290,4 @@ class Descent:
                 note,
             )
         )
+        self.control.tell(self.trace[-1])

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from wholebody.assessment import Assessment, assess
 from wholebody.checks import flag
+from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
-from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.search import Search, Settings
 from wholebody.methods.qp.solvers.base import make_solver
-from wholebody.methods.qp.tracking import Step, Tracker
+from wholebody.methods.qp.tracking import Tracker
 from wholebody.methods.qp.visit import Local
 from wholebody.problem import Problem, Solution, Status
 
 
-@dataclass
+@dataclass(frozen=True)
 class QP:
     """Quadratic programs, solved by a QP solver of your choice.
+
+    These are settings alone: one object serves any number of problems and threads at the same time.
 
     Attributes:
         solver: "osqp", "daqp" or any name that qpsolvers lists on this machine; see `wholebody doctor`.
@@ -32,6 +34,7 @@ class QP:
         seed: of the restarts.
         measures: whether the measures are to be least. Without, the first posture is the answer that meets the goals
             with everything held, which is there in a fifth to nine tenths of the time. This is for `solve`.
+        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
     """
 
     solver: str = "osqp"
@@ -41,7 +44,7 @@ class QP:
     restarts: int = 40
     seed: int = 0
     measures: bool = True
-    _tracker: Tracker | None = field(default=None, init=False, repr=False)
+    time_limit: float | None = TIME_LIMIT
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -52,24 +55,33 @@ class QP:
         """
         check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, budget=BUDGET, restarts=RESTARTS, seed=SEED)
         flag(self.measures, "measures")
-        self._solver = make_solver(self.solver)
+        check_time_limit(self.time_limit)
+        make_solver(self.solver)
 
     @property
     def name(self) -> str:
         """Name for tables."""
         return f"qp/{self.solver}"
 
-    def solve(self, problem: Problem) -> Solution:
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture; the best of a descent, of goals approached in stages, and of seeded starts.
 
         The later ones are tried only when the earlier ones did not reach the goals, and within the budget. Never
         raises for a goal out of reach or a start in penetration: the status says so.
+
+        Args:
+            problem: what is asked.
+            progress: see `wholebody.methods.control.Progress`.
+
+        Raises:
+            InputError: the scene changed after the problem was stated.
         """
         check_problem(problem, "QP.solve: problem")
         began = time.perf_counter()
         settings = Settings(self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures)
-        search = Search(problem, self._solver, settings)
-        best = search.run()
+        with problem.lend() as workspace, Control(self.time_limit, progress) as control:
+            search = Search(problem, workspace, make_solver(self.solver), settings, control)
+            best = search.run()
         judgement = assess(problem, best.q)
         status = _status(best, judgement, self.tolerance)
         return Solution(
@@ -80,20 +92,16 @@ class QP:
             assessment=judgement,
             trace=tuple(search.trace),
             method=self.name,
-            message=_message(status, judgement, search.how),
+            message=(control.message(judgement) or _message(status, judgement, search.how)) + judgement.in_the_way,
         )
 
-    def step(self, problem: Problem, q: Array, dt: float, *, measures: bool = True) -> Step:
-        """One step of tracking from the posture q, shape (nq,): one program, for goals that move from call to call.
+    def tracker(self, problem: Problem, dt: float) -> Tracker:
+        """What follows the goals of a problem that move from call to call: one program a step of `dt` seconds.
 
-        The workspace lives on between calls with the same problem. Without `measures` the step only puts right what
-        the one before has left of the goals. See `Tracker`.
+        Raises:
+            InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
         """
-        flag(measures, "QP.step: measures")
-        tracker = self._tracker
-        if tracker is None or tracker.problem is not problem or not isinstance(dt, (int, float)) or tracker.dt != dt:
-            tracker = self._tracker = Tracker(problem, self._solver, dt)
-        return tracker.step(q, measures)
+        return Tracker(problem, make_solver(self.solver), dt)
 
 
 def _status(local: Local, judgement: Assessment, tolerance: float) -> Status:

@@ -48,6 +48,16 @@ class QuadraticProgram:
     lower: Array
     upper: Array
 
+    def check_shapes(self, active: ActiveSet) -> None:
+        """Raise ValueError where sizes do not fit together: compiled loops do not look, and read beyond an end."""
+        n, m, k = len(self.diagonal), len(self.target), len(self.least)
+        found = (
+            self.linear.shape, self.lower.shape, self.upper.shape, active.lower.shape, active.upper.shape,
+            self.rows.shape, self.weight.shape, self.elastic.shape, self.elastic_weight.shape, active.elastic.shape,
+        )  # fmt: skip
+        if found != ((n,), (n,), (n,), (n,), (n,), (m, n), (m,), (k, n), (k,), (k,)):
+            raise ValueError(f"a program of {n} variables, {m} soft and {k} elastic rows has parts of shapes {found}")
+
     @property
     def size(self) -> int:
         """Number of variables n."""
@@ -118,8 +128,8 @@ class QPSolution(NamedTuple):
         active: the active set it was found with.
         exact: whether the optimality conditions hold to rounding; otherwise x is the best found.
         iterations: iterations of the solver that was used; 0 where the last active set was right at once.
-        by: what closed the program: "first active set" or "last active set", the solver's name, or "daqp" where
-            another solver's answer did not lead to an exact one.
+        by: what closed the program: "first active set" or "last active set", the solver's name, or
+            "semismooth newton" where its answer did not lead to an exact one.
     """
 
     x: Array

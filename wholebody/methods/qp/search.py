@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wholebody.methods.control import Control
 from wholebody.methods.qp.descent import Descent
 from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.solvers.base import QPSolver
@@ -15,6 +16,7 @@ from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.visit import Local
 from wholebody.methods.starts import bent, restarts
 from wholebody.problem import Iterate, Problem
+from wholebody.workspace import Workspace
 
 ALIKE = 1e-5  # share of a goal's error by which two descents may differ and count as equally near
 JUST = 0.05  # tolerances by which what must hold may be missed more and count as held as well
@@ -41,11 +43,13 @@ class Settings(NamedTuple):
 class Search:
     """Descent, continuation and restarts for one problem, remembering the best posture."""
 
-    def __init__(self, problem: Problem, solver: QPSolver, settings: Settings) -> None:
+    def __init__(
+        self, problem: Problem, workspace: Workspace, solver: QPSolver, settings: Settings, control: Control
+    ) -> None:
         """Set up for a problem; `run` does it all."""
-        self.problem, self.solver, self.settings = problem, solver, settings
-        self.subproblem = Subproblem(problem)
-        self.lineariser = problem.lineariser()
+        self.problem, self.solver, self.settings, self.control = problem, solver, settings, control
+        self.subproblem = Subproblem(problem, workspace.state)
+        self.lineariser = problem.lineariser(workspace)
         self.trace: list[Iterate] = []
         self.spent = 0
         self._left = settings.budget  # programs that the ways after the first may still solve
@@ -63,24 +67,24 @@ class Search:
         """Try one way after the other until the goals are met; the best that was found."""
         self._try_ways()
         self._settle()
-        return self.best
+        return self.best._replace(converged=False) if self.control.reason else self.best
 
     def _try_ways(self) -> None:
         start = self.problem.scene.figure.clamp(self.problem.start)
         if self._accept(self._descend(start, eager=not self.settings.measures), "directly"):
             return
         rng = np.random.default_rng(self.settings.seed)
-        starts = chain([start], restarts(self.problem, start, rng, self.settings.restarts))
+        starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, self.settings.restarts))
         ways = chain(
             self._bent(start), self._scouted(islice(starts, FIRST)), self._staged(start), self._scouted(starts)
         )
         for local, how in ways:
-            if self._accept(local, how) or self._left <= 0:
+            if self._accept(local, how) or self._left <= 0 or self.control.over:
                 return
 
     def _bent(self, start: Array) -> Iterator[tuple[Local, str]]:
         """Straight limbs hide what bending them would do: the same descent with joints moved off their limits."""
-        q = bent(self.problem, start)
+        q = bent(self.problem, self.lineariser.state, start)
         if q is not None:
             yield self._try(q, "bent"), "from a start with bent joints"
 
@@ -100,7 +104,7 @@ class Search:
         a row, although nothing was in their way, came no nearer than the best posture, the goals are out of reach.
         """
         for q in starts:
-            if self._in_vain == NO_NEARER or self._left <= 0:
+            if self._in_vain == NO_NEARER or self._left <= 0 or self.control.over:
                 return
             ghost = self._scout(q, GHOST)
             nearer = ghost.violation.left < (1.0 - NEARER) * self.best.violation.left
@@ -132,6 +136,8 @@ class Search:
     def _settle(self) -> None:
         """Where the goals are not reached, come as near as goes, then improve the measures from there."""
         tolerance = self.settings.tolerance
+        if self.control.over:
+            return
         if not _held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
         if self.best.violation.left <= tolerance:
@@ -197,7 +203,7 @@ class Search:
     ) -> Descent:
         return Descent(
             self.subproblem, self.lineariser, self.solver, self.settings.tolerance, iterations, offset, self.trace,
-            note, measures and self.settings.measures, hasty, eager,
+            note, measures and self.settings.measures, hasty, eager, self.control,
         )  # fmt: skip
 
     def _accept(self, local: Local, how: str) -> bool:

@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.errors import InputError
+from wholebody.figures.state import State
 from wholebody.linearisation import Linearisation
 from wholebody.methods.qp.quadratic_program import Array, QuadraticProgram
 from wholebody.problem import Problem
@@ -86,10 +88,15 @@ class Rows(NamedTuple):
 class Subproblem:
     """Builds programs for one problem."""
 
-    def __init__(self, problem: Problem) -> None:
-        """Read off which constraint rows are equalities."""
+    def __init__(self, problem: Problem, state: State) -> None:
+        """Read off which constraint rows are equalities.
+
+        Args:
+            problem: what is asked.
+            state: of the run; it is moved to the problem's start.
+        """
         lower, upper, weight = [], [], []
-        state = problem.scene.state(problem.start)
+        state.update(problem.start)
         for constraint in problem.constraints:
             size = np.atleast_1d(constraint.value(state)).shape
             lower.append(np.broadcast_to(constraint.lower, size))
@@ -110,8 +117,17 @@ class Subproblem:
         self._high = np.flatnonzero((self._lower != self._upper) & np.isfinite(self._upper))
 
     def rows(self, at: Linearisation) -> Rows:
-        """Sort the rows of a linearisation."""
+        """Sort the rows of a linearisation.
+
+        Raises:
+            InputError: the terms have other numbers of rows than when this was set up.
+        """
         goals = len(at.goal_error)
+        if goals != len(self._goal_share) or len(at.value) != len(self._lower):
+            raise InputError(
+                f"goals and constraints have {goals} and {len(at.value)} rows here, and had {len(self._goal_share)} "
+                f"and {len(self._lower)} at the start; give each term one number of rows at all postures"
+            )
         soft = np.vstack([at.goal_jacobian, at.value_jacobian[self._equal]])
         error = np.concatenate([at.goal_error, at.value[self._equal] - self._lower[self._equal]])
         distance = float(np.linalg.norm(at.goal_error))

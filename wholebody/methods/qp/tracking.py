@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.checks import time_step
+from wholebody.checks import flag, time_step
 from wholebody.linearisation import Linearisation
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
+from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
+from wholebody.tasks.base import Goal
 
 LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
 LARGEST_WITHIN = 0.5
@@ -59,7 +62,15 @@ class Tracker:
     """Follows the goals of one problem, step by step.
 
     No step moves any piece farther than half the distance within which pairs were looked at, so nothing is jumped over,
-    however thin, at any dt.
+    however thin, at any dt. Goals, other terms and clearances of the problem may be replaced between steps, and things
+    may be moved. The steps of a new tracker depend on nothing that was solved before.
+
+    A tracker remembers the step before, so it is for one figure and one thread at a time.
+
+    Attributes:
+        problem: whose goals are followed.
+        dt: seconds a step.
+        workspace: its own; between steps it may be moved.
     """
 
     def __init__(self, problem: Problem, solver: QPSolver, dt: float) -> None:
@@ -68,33 +79,43 @@ class Tracker:
         Raises:
             InputError: dt is not a positive finite number.
         """
-        self.problem = check_problem(problem, "problem")
+        self.problem = check_problem(problem, "tracker: problem")
         self.dt = time_step(dt, "dt")
-        self._subproblem = Subproblem(problem)
-        self._lineariser = problem.lineariser(dt)
         self._working_set = WorkingSet(solver)
         self._within = LEAST_WITHIN
-        proximity = problem.scene.proximity
-        self._moving = np.flatnonzero(proximity.joint > 0)
-        self._support = self._lineariser.state.support[proximity.joint[self._moving]]
-        self._reach = proximity.reach[self._moving]
+        self._alone = OneAtATime("tracker")
+        self.workspace = problem.workspace()
+        self._set_up()
+        table = self.workspace.table
+        self._moving = np.flatnonzero(table.joint > 0)
+        self._support = self.workspace.state.support[table.joint[self._moving]]
+        self._reach = table.reach[self._moving]
 
     def step(self, q: Array, measures: bool = True) -> Step:
         """One step from q, shape (nq,); a posture out of limits is brought back first.
 
         Without `measures` it is the least step that meets the goals, which puts right what a step with them left: it
         ends as near to the goals as its own curvature lets it, and does not go on to improve the measures.
+
+        Raises:
+            InputError: q is no posture, objects came to or left the scene, or another thread is within a step of this
+                tracker.
         """
+        flag(measures, "measures")
+        with self._alone:
+            return self._step(q, measures)
+
+    def _step(self, q: Array, measures: bool) -> Step:
         self.problem.check_fresh()
-        if self.problem.goals is not self._lineariser.goals:
-            self._retarget()
+        self.workspace.refresh()
+        self._renew()
         at, rows, program, answer = self._solved(q, measures)
-        motion, turn = self._motion(answer.x)
+        motion, turn = self._motion(at, answer.x)
         if motion > 0.5 * self._within and rows.lack.max(initial=0.0) > UNSEEN:
             # something came in fast: to get out of its way, one must look as far as one has to go
             self._within = min(HEADROOM * motion, LARGEST_WITHIN)
             at, rows, program, answer = self._solved(q, measures)
-            motion, turn = self._motion(answer.x)
+            motion, turn = self._motion(at, answer.x)
         share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
         displacement = answer.x if share == 1.0 else share * answer.x
         if 0.5 * share**2 * motion * turn > UNSEEN:
@@ -138,8 +159,8 @@ class Tracker:
                 return displacement, share
             groups[rows.groups - len(short) :] += short
             again = self._working_set.solve(replace(program, least=program.least + groups[rows.group]), rows.key)
-            self.problem.scene.proximity.place(self._lineariser.state.update(at.q).data)  # where motion begins
-            motion, _ = self._motion(again.x)
+            self.workspace.state.update(at.q)  # where motion begins
+            motion, _ = self._motion(at, again.x)
             share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
             displacement = share * again.x
         for _ in range(CUTS):
@@ -158,26 +179,47 @@ class Tracker:
 
     def _shortfall(self, at: Linearisation, displacement: Array, kept: Array) -> Array:
         """By how much each contact (k,) is nearer after a displacement (nv,) than the distances (k,) it should keep."""
-        scene = self.problem.scene
-        state = self._lineariser.state.update(pin.integrate(scene.model, at.q, displacement))
-        near = scene.proximity.near(state.data, float(at.clearance.max(initial=0.0)) + UNSEEN)
-        after = np.full(len(scene.proximity.pairs), np.inf)
+        workspace = self.workspace
+        q = pin.integrate(workspace.model, at.q, displacement)
+        near = workspace.near(q, float(at.clearance.max(initial=0.0)) + UNSEEN)
+        after = np.full(len(workspace.table.pairs), np.inf)
         after[near.number] = near.distance
         short: Array = np.maximum(kept - after[at.contacts.number], 0.0)
         return short
 
-    def _retarget(self) -> None:
-        """Take the problem's new goals; what was set up stays where they have the same kinds and weights."""
-        before, now = self._lineariser.goals, self.problem.goals
-        self._lineariser.goals = now
-        if [(type(goal), goal.weight) for goal in before] != [(type(goal), goal.weight) for goal in now]:
-            self._subproblem = Subproblem(self.problem)
-            self._working_set.forget()
+    def _set_up(self) -> None:
+        """Take the problem's terms as they are now."""
+        problem = self.problem
+        self._subproblem = Subproblem(problem, self.workspace.state)
+        self._lineariser = problem.lineariser(self.workspace, self.dt)
+        self._terms = (problem.goals, problem.constraints, problem.bounds, problem.measures)
+        self._goals = self._signatures(problem.goals)
 
-    def _motion(self, displacement: Array) -> tuple[float, float]:
-        """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,)."""
-        twist = (self._support * displacement) @ self._lineariser.state.jacobian.T
-        center = self.problem.scene.proximity.placements[self._moving, 3]
+    def _renew(self) -> None:
+        """Take what was replaced of the problem since the last step; where targets moved only, keep what is set up."""
+        problem = self.problem
+        goals, *others = self._terms
+        now = (problem.constraints, problem.bounds, problem.measures)
+        other = any(new is not old for new, old in zip(now, others, strict=True))
+        if other or (problem.goals is not goals and self._signatures(problem.goals) != self._goals):
+            self._set_up()
+            self._working_set.forget()
+        else:
+            self._terms = (problem.goals, *now)
+            self._lineariser.take(problem.goals, problem.clearances)
+
+    def _signatures(self, goals: Sequence[Goal]) -> list[tuple[type, float, int]]:
+        """What programs are set up from: kind, weight and number of rows of each goal."""
+        state = self.workspace.state  # wherever it is
+        return [(type(goal), goal.weight, np.size(goal.error(state))) for goal in goals]
+
+    def _motion(self, at: Linearisation, displacement: Array) -> tuple[float, float]:
+        """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,).
+
+        The workspace's state is where the linearisation is.
+        """
+        twist = (self._support * displacement) @ self.workspace.state.jacobian.T
+        center = at.contacts.placements[self._moving, 3]
         turn = twist[:, 3:]
         shift = twist[:, :3].copy()
         shift[:, 0] += turn[:, 1] * center[:, 2] - turn[:, 2] * center[:, 1]

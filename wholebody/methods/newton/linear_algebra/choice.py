@@ -13,6 +13,7 @@ from wholebody.methods.newton.linear_algebra.reference import Dense, SingularVal
 
 NAMES = ("auto", "normal", "llt", "kkt", "schur", "dense", "svd")
 DENSE_ROWS = 60  # rows in which a column must stand to be split off, as of a hub; fewer = more splits
+MOST_DENSE = 50  # dense columns that are split off; with hundreds, as of a body near to everything, a step took 2 s
 
 
 def dense_columns(pattern: Pattern) -> Indices:
@@ -28,9 +29,9 @@ def linear_algebra(pattern: Pattern, name: str = "auto") -> LinearAlgebra:
     """
     known(name, NAMES, "linear algebra")
     dense = dense_columns(pattern)
-    if name == "schur" or (name == "auto" and len(dense)):
+    if name == "schur" or (name == "auto" and 0 < len(dense) <= MOST_DENSE):
         return DenseColumns(pattern, dense)
-    if name == "kkt":
+    if name == "kkt" or (name == "auto" and len(dense)):
         return QuasiDefinite(pattern)
     if name == "dense":
         return Dense(pattern)

@@ -8,7 +8,7 @@ import daqp
 import numpy as np
 
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import QPSolver, approximate, finish
+from wholebody.methods.qp.solvers.base import QPSolver, finish, last_resort
 from wholebody.methods.qp.solvers.split_form import split
 
 FAR = 1e30  # DAQP's infinity
@@ -27,34 +27,29 @@ class DAQPSolver(QPSolver):
     name = "daqp"
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
-        """Minimise; see `QPSolver.solve_cold`."""
-        return solve_with_daqp(program)
-
-
-def solve_with_daqp(program: QuadraticProgram) -> QPSolution:
-    """Minimise with mild weights, and where that does not lead to the exact answer, with the true ones."""
-    n, m, k = program.size, len(program.target), len(program.least)
-    iterations = 0
-    x = np.zeros(n)
-    for heaviest in HEAVIEST:
-        form = split(program, heaviest)
-        upper = np.concatenate([program.upper, np.minimum(form.upper, FAR)])
-        lower = np.concatenate([program.lower, form.lower])
-        sense = np.zeros(n + m + k, dtype=c_int)
-        sense[n : n + m] = EQUALITY
-        x, _, _, info = daqp.solve(
-            np.diag(form.diagonal),
-            form.linear,
-            form.matrix,
-            upper,
-            lower,
-            sense,
-            primal_tol=TOLERANCE,
-            iter_limit=LIMIT,
-        )
-        x = np.where(np.isfinite(x[:n]), x[:n], 0.0)
-        iterations += int(info["iterations"])
-        solution = finish(program, x, iterations, "daqp")
-        if solution is not None:
-            return solution
-    return approximate(program, x, iterations, "daqp")
+        """Minimise with mild weights, and where that does not lead to the exact answer, with the true ones."""
+        n, m, k = program.size, len(program.target), len(program.least)
+        iterations = 0
+        x = np.zeros(n)
+        for heaviest in HEAVIEST:
+            form = split(program, heaviest)
+            upper = np.concatenate([program.upper, np.minimum(form.upper, FAR)])
+            lower = np.concatenate([program.lower, form.lower])
+            sense = np.zeros(n + m + k, dtype=c_int)
+            sense[n : n + m] = EQUALITY
+            x, _, _, info = daqp.solve(
+                np.diag(form.diagonal),
+                form.linear,
+                form.matrix,
+                upper,
+                lower,
+                sense,
+                primal_tol=TOLERANCE,
+                iter_limit=LIMIT,
+            )
+            x = np.where(np.isfinite(x[:n]), x[:n], 0.0)
+            iterations += int(info["iterations"])
+            solution = finish(program, x, iterations, self.name)
+            if solution is not None:
+                return solution
+        return last_resort(program, x, iterations, self.name)

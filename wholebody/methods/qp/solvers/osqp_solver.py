@@ -23,8 +23,8 @@ class OSQPSolver(QPSolver):
     """OSQP (Stellato et al. 2020) on the split form.
 
     OSQP iterates until an active set read off its answer settles. It is a first-order method, and where many bounds and
-    contacts bind at once thousands of its iterations may not tell the set; such programs, a few in a hundred, are given
-    to DAQP.
+    contacts bind at once thousands of its iterations may not tell the set; such programs, a few in a hundred, are
+    finished by semismooth Newton steps.
     """
 
     name = "osqp"

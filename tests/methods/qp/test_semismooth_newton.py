@@ -1,0 +1,89 @@
+"""Programs with far more rows than variables, and with rows that repeat each other: exact, and in bounded work."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.methods.qp.test_programs import by_quadprog
+from wholebody.methods.qp.active_set import lacking, minimise_on_face, solve_from, solve_in_arrays
+from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
+from wholebody.methods.qp.semismooth_newton import minimise
+from wholebody.methods.qp.solvers.base import make_solver
+
+
+def crowded(rng, n=12, m=3, k=400, diagonal=2e-3):
+    """A hand among overlapping things: hundreds of heavy elastic rows that contradict each other, and a weak D."""
+    few = rng.normal(size=(k // 20, n)) * (rng.random((k // 20, n)) < 0.6)
+    rows = few[rng.integers(len(few), size=k)] * rng.choice([-1.0, 1.0], size=(k, 1)) + 1e-4 * rng.normal(size=(k, n))
+    return QuadraticProgram(
+        diagonal=diagonal * rng.uniform(1.0, 1e3, n),
+        linear=np.zeros(n),
+        rows=rng.normal(size=(m, n)),
+        target=0.1 * rng.normal(size=m),
+        weight=np.full(m, 1e5),
+        elastic=rows,
+        least=rng.uniform(-0.05, 0.05, k),
+        elastic_weight=np.full(k, 1e10),
+        lower=np.full(n, -0.6),
+        upper=np.full(n, 0.6),
+    )
+
+
+@pytest.mark.parametrize("k", [40, 400, 2000])
+def test_crowded_programs_are_solved_to_rounding(k):
+    rng = np.random.default_rng(k)
+    for _ in range(5):
+        program = crowded(rng, k=k)
+        x, _, used = minimise(program, np.zeros(program.size), 300)
+        assert used < 300
+        assert program.optimality(x) < 1e-10
+        assert (x >= program.lower).all()
+        assert (x <= program.upper).all()
+
+
+def test_quadprog_agrees():
+    rng = np.random.default_rng(3)
+    for _ in range(10):
+        program = crowded(rng, n=6, k=60, diagonal=1.0)
+        mild = replace(program, elastic_weight=np.full(60, 1e4))
+        x, active, _ = minimise(mild, rng.normal(size=6), 300)
+        assert x == pytest.approx(by_quadprog(mild), abs=1e-6)
+        assert np.array_equal(active.elastic, mild.elastic @ x < mild.least)
+
+
+@pytest.mark.parametrize("settle", [solve_from, solve_in_arrays])
+def test_correcting_a_set_takes_the_smaller_system(settle):
+    rng = np.random.default_rng(8)
+    for _ in range(5):
+        program = crowded(rng, n=10, k=600, diagonal=1.0)
+        _, active, _ = minimise(program, np.zeros(10), 300)
+        answer = settle(program, active, 5)
+        assert answer is not None
+        assert program.optimality(answer.x) < 1e-10
+
+
+def test_rows_that_repeat_each_other_have_multipliers_that_belong_to_their_residuals():
+    rng = np.random.default_rng(2)
+    base = rng.normal(size=(4, 12))
+    program = replace(
+        crowded(rng, k=20),
+        elastic=np.repeat(base, 2, axis=0) + 1e-9 * rng.normal(size=(8, 12)),
+        least=rng.uniform(0.0, 0.05, 8),
+        elastic_weight=np.full(8, 1e10),
+    )
+    none = np.zeros(12, dtype=bool)
+    point = minimise_on_face(program, ActiveSet(none, none, np.ones(8, dtype=bool)))
+    lack = program.least - program.elastic @ point.x
+    assert point.push == pytest.approx(1e10 * lack, rel=1e-3, abs=1e-3)
+    assert np.abs(point.gradient).max() < 1e-3
+
+
+@pytest.mark.parametrize("name", ["osqp", "daqp"])
+def test_a_solver_hands_on_what_is_too_large_for_it(name):
+    program = crowded(np.random.default_rng(11), n=24, k=2500)
+    answer = make_solver(name).solve(program, lacking(program))
+    assert answer.exact
+    assert program.optimality(answer.x) < 1e-9

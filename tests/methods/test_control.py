@@ -1,0 +1,107 @@
+"""What ends a solve before it has finished, with every method: time, the caller, Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.methods.control import Control
+
+METHODS = {"qp": wb.QP, "ccd": wb.CCD, "newton": wb.Newton, "placo": wb.Placo, "dls": wb.DampedLeastSquares}
+
+
+@pytest.fixture(scope="module")
+def reach():
+    """A hand asked for a place two metres away: every method works on it as long as it may."""
+    scene = wb.Scene(wb.load("avatar"))
+    return wb.Problem(scene, goals=[wb.Point("right_index_tip", (2.0, -1.0, 1.5))], measures=[])
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_time_limit_ends_a_solve_with_the_best_so_far(reach, name):
+    whole = METHODS[name]().solve(reach)
+    began = time.monotonic()
+    answer = METHODS[name](time_limit=1e-6).solve(reach)
+    assert time.monotonic() - began < 5.0  # not a measurement: a limit that nobody looks at would take all restarts
+    assert answer.status == "stalled"
+    assert "time limit of 1e-06 s" in answer.message
+    assert answer.iterations <= max(whole.iterations // 4, 2)
+    assert np.isfinite(answer.q).all()
+    assert reach.scene.figure.within_limits(answer.q)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_progress_sees_every_iteration_and_may_end_the_solve(reach, name):
+    seen = []
+
+    def progress(entry):
+        seen.append(entry.goal_error)
+        return len(seen) == 3
+
+    answer = wb.solve(reach, METHODS[name](), progress=progress)
+    assert answer.status == "stalled"
+    assert "progress ended it" in answer.message
+    assert 3 <= len(seen) <= 5
+    assert seen[-1] <= seen[0]
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_ctrl_c_answers_with_the_best_so_far(reach, name):
+    calls = []
+
+    def progress(entry):
+        calls.append(entry)
+        if len(calls) == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    answer = wb.solve(reach, METHODS[name](), progress=progress)
+    assert answer.status == "stalled"
+    assert "Ctrl-C ended it" in answer.message
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_second_ctrl_c_is_a_keyboard_interrupt(reach):
+    def progress(entry):
+        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        wb.solve(reach, progress=progress)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_other_threads_leave_ctrl_c_alone():
+    handlers = []
+
+    def run():
+        with Control():
+            handlers.append(signal.getsignal(signal.SIGINT))
+
+    before = signal.getsignal(signal.SIGINT)
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    assert handlers == [before]
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf"), "1", True])
+def test_a_time_limit_is_seconds_above_zero(name, value):
+    with pytest.raises(wb.InputError, match="time_limit"):
+        METHODS[name](time_limit=value)
+
+
+def test_progress_is_a_function(reach):
+    with pytest.raises(wb.InputError, match="progress"):
+        wb.solve(reach, progress=3)
+
+
+def test_a_solve_that_is_let_alone_is_the_same(reach):
+    one, other = wb.QP(time_limit=1000.0).solve(reach), wb.QP().solve(reach)
+    assert np.array_equal(one.q, other.q)

@@ -1,0 +1,86 @@
+"""What stands in the way, on postures where it is known by construction."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.view.composition import Composition
+
+LENGTHS = (0.5, 0.4)
+
+
+def named(problem, q):
+    return {str(blocker): blocker for blocker in wb.assess(problem, q).blockers}
+
+
+def test_nothing_is_in_the_way_of_what_fits(planar_arm):
+    problem = wb.Problem(wb.Scene(planar_arm(LENGTHS)), goals=[wb.Point("tip", (0.9, 0.0, 0.0))])
+    assert wb.assess(problem, np.zeros(2)).blockers == ()
+    assert wb.assess(problem, np.zeros(2)).in_the_way == ""
+
+
+def test_a_joint_at_its_limit_is_named_and_one_away_from_it_is_not(planar_arm):
+    scene = wb.Scene(planar_arm(LENGTHS, limit=1.0))
+    problem = wb.Problem(scene, goals=[wb.Point("tip", (0.5 * np.cos(1.4), 0.9 * np.sin(1.4), 0.0))])
+    found = named(problem, np.array([1.0, 0.2]))
+    assert set(found) == {"the limit of turn0"}
+    assert found["the limit of turn0"].share == 1.0
+    assert not found["the limit of turn0"].violated
+
+
+def test_a_frozen_joint_is_told_from_one_at_its_limit(planar_arm):
+    scene = wb.Scene(planar_arm(LENGTHS))
+    problem = wb.Problem(scene, goals=[wb.Point("tip", (0.0, 0.9, 0.0))], constraints=[wb.Freeze("turn0")])
+    assert set(named(problem, problem.start)) >= {"the bound on turn0"}
+
+
+def test_a_wall_between_a_ball_and_its_goal(free_bodies):
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Box((0.1, 2.0, 2.0)), name="wall", at=(0.5, 0.0, 0.0))
+    scene.add(wb.Sphere(0.2), name="bystander", at=(0.0, 2.0, 0.0))
+    problem = wb.Problem(scene, goals=[wb.Point("body0", (1.0, 0.0, 0.0))])
+    q = scene.figure.neutral
+    q[0] = 0.35
+    assert set(named(problem, q)) == {"body0 against wall"}
+    q[0] = 0.38  # 3 cm inside: now it is violated
+    found = named(problem, q)
+    assert next(iter(found)) == "body0 against wall"
+    assert found["body0 against wall"].violated
+
+
+def test_two_walls_share_by_how_hard_they_push(free_bodies):
+    """A ball in a corner, pulled three times as far along x as along y: the forces are as three to one."""
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1)))
+    scene.add(wb.Box((0.1, 4.0, 4.0)), name="in x", at=(0.15, 0.0, 0.0))
+    scene.add(wb.Box((4.0, 0.1, 4.0)), name="in y", at=(0.0, 0.15, 0.0))
+    problem = wb.Problem(scene, goals=[wb.Point("body0", (3.0, 1.0, 0.0))])
+    found = named(problem, scene.figure.neutral)
+    assert set(found) == {"body0 against in x", "body0 against in y"}
+    assert found["body0 against in y"].share == pytest.approx(1.0 / 3.0, rel=1e-3)
+
+
+def test_a_hold_that_the_goal_pulls_against_is_named_with_its_frame(planar_arm):
+    scene = wb.Scene(planar_arm(LENGTHS))
+    hold = wb.Hold("tip", at=(0.9, 0.0, 0.0), orientation=False)
+    problem = wb.Problem(scene, goals=[wb.Point("link1", (0.3, 0.3, 0.0))], constraints=[hold])
+    assert "constraints[0], Hold('tip')" in named(problem, np.zeros(2))
+
+
+def test_an_answer_says_it_in_words_and_in_the_picture(planar_arm):
+    scene = wb.Scene(planar_arm(LENGTHS)).add(wb.Box((0.2, 0.2, 0.2)), name="block", at=(0.5, 0.5, 0.0))
+    problem = wb.Problem(scene, goals=[wb.Point("tip", (0.5, 0.5, 0.0))])
+    solution = wb.solve(problem)
+    assert solution.status == "unreachable"
+    assert "in the way: " in solution.message
+    with wb.Viewer(scene) as viewer:
+        viewer.show(solution.q, problem=problem)
+        composition: Composition = viewer._composition
+        moment = composition.moment(solution.q, problem, wb.assess(problem, solution.q).blockers)
+    labels = [marker.text for marker, _ in moment.markers.values() if marker.text]
+    assert any(text.startswith("in the way: link1 against block") for text in labels)
+
+
+def test_stretched_limbs_are_said_to_be_too_short(planar_arm):
+    problem = wb.Problem(wb.Scene(planar_arm(LENGTHS)), goals=[wb.Point("tip", (1.5, 0.0, 0.0))])
+    assert wb.assess(problem, np.zeros(2)).in_the_way == "; nothing pushes back: the limbs do not reach"

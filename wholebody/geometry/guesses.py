@@ -1,0 +1,60 @@
+"""What coal remembers from query to query: for each pair, where its search for the nearest points last ended.
+
+A search that begins there is a fifth faster, and ends within 1e-6 m of where any other would, but not at the same
+number. Whoever must give the same answer to the same question forgets these guesses first.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+REQUEST_STRIDE = 128  # bytes of a coal.DistanceRequest
+SUPPORT_OFFSET = 24  # bytes from the guessed direction to the guessed vertices of the two shapes
+FIRST_DIRECTION = (1.0, 0.0, 0.0)  # coal's own guess for a pair it has not seen
+
+
+class Guesses:
+    """The guesses of all pairs of a pin.GeometryData, as arrays where they are laid out in memory as expected."""
+
+    def __init__(self, results: Any) -> None:
+        """Lay views over the guesses; they own nothing, so the data is kept."""
+        self._requests = results.distanceRequests
+        self._views = _views(self._requests)
+
+    def forget(self) -> None:
+        """Guess for every pair what coal guesses for one it has not seen."""
+        if self._views is not None:
+            directions, vertices = self._views
+            directions[:] = FIRST_DIRECTION
+            vertices[:] = 0
+            return
+        for request in self._requests:
+            request.cached_gjk_guess = np.array(FIRST_DIRECTION)
+            request.cached_support_func_guess = np.zeros(2, dtype=np.int32)
+
+
+def _views(requests: Any) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
+    """Views (n, 3) of the directions and (n, 2) of the vertices; None where memory is not laid out as expected."""
+    count = len(requests)
+    if count == 0:
+        return np.zeros((0, 3)), np.zeros((0, 2), dtype=np.int32)
+    direction, vertices = requests[0].cached_gjk_guess, requests[0].cached_support_func_guess
+    base = _address(direction)
+    if vertices.dtype != np.int32 or vertices.shape != (2,) or direction.shape != (3,):
+        return None
+    for k in {0, count // 2, count - 1}:
+        if _address(requests[k].cached_gjk_guess) != base + REQUEST_STRIDE * k:
+            return None
+        if _address(requests[k].cached_support_func_guess) != base + REQUEST_STRIDE * k + SUPPORT_OFFSET:
+            return None
+    return (
+        np.lib.stride_tricks.as_strided(direction, (count, 3), (REQUEST_STRIDE, 8)),
+        np.lib.stride_tricks.as_strided(vertices, (count, 2), (REQUEST_STRIDE, 4)),
+    )
+
+
+def _address(array: NDArray[Any]) -> int:
+    return int(array.__array_interface__["data"][0])

@@ -1,0 +1,110 @@
+"""What ends a solve before it has finished: a time limit, the caller's progress function, Ctrl-C."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable
+from types import FrameType, TracebackType
+from typing import Any
+
+import numpy as np
+
+from wholebody.assessment import Assessment
+from wholebody.checks import a, number
+from wholebody.errors import InputError
+from wholebody.problem import Iterate
+
+TIME_LIMIT = 4.0
+"""Seconds that a solve may take unless its method is told otherwise. Few come near it; answers of those that do depend
+on the machine's load, and say so."""
+
+LIMITS = (1e-9, 1e9)
+"""Least and greatest time limit, seconds."""
+
+Progress = Callable[[Iterate], Any]
+"""Called after every iteration with its entry of the trace; where it returns True, the solve ends."""
+
+
+class Control:
+    """Watches over one solve; methods ask it once an iteration.
+
+    A context manager: inside it, in the main thread, a first Ctrl-C ends the solve, which then answers with the best
+    posture so far. A second one raises KeyboardInterrupt as usual.
+
+    Attributes:
+        reason: why the solve was ended, for its message; empty while it was not.
+    """
+
+    def __init__(self, time_limit: float | None = None, progress: Progress | None = None) -> None:
+        """Begin to count.
+
+        Args:
+            time_limit: seconds; None for no limit. See `check_time_limit`.
+            progress: see `Progress`.
+
+        Raises:
+            InputError: `progress` cannot be called.
+        """
+        if progress is not None and not callable(progress):
+            raise InputError(f"progress is {a(type(progress))}; give a function of one trace entry")
+        self.reason = ""
+        self._time_limit, self._progress = time_limit, progress
+        self._began = time.monotonic()
+        self._handler: Any = None
+
+    @property
+    def over(self) -> bool:
+        """Whether the solve has to end now."""
+        if not self.reason and self.spent > 1.0:
+            self.reason = f"the time limit of {self._time_limit:g} s ended it"
+        return bool(self.reason)
+
+    @property
+    def spent(self) -> float:
+        """Share of the time limit that is over; 0 without a limit."""
+        return 0.0 if self._time_limit is None else (time.monotonic() - self._began) / self._time_limit
+
+    def message(self, judgement: Assessment) -> str:
+        """Why the solve was ended and what is left then; empty where it was not ended."""
+        if not self.reason:
+            return ""
+        left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
+        broken = max(judgement.clearance_lack, judgement.constraint_violation, judgement.limit_violation)
+        return f"{self.reason}: {left}" + (f", and what must hold is missed by {broken:.3g} m or rad" * (broken > 1e-4))
+
+    def tell(self, entry: Iterate) -> None:
+        """Tell the caller of an iteration."""
+        if self._progress is not None and self._progress(entry) is True and not self.reason:
+            self.reason = "progress ended it"
+
+    def __enter__(self) -> Control:
+        """Take Ctrl-C over, where it would raise KeyboardInterrupt."""
+        main = threading.current_thread() is threading.main_thread()
+        if main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            self._handler = signal.signal(signal.SIGINT, self._interrupt)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Give Ctrl-C back."""
+        if self._handler is not None:
+            signal.signal(signal.SIGINT, self._handler)
+            self._handler = None
+
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        if self.reason:
+            signal.default_int_handler(number, frame)
+        self.reason = "Ctrl-C ended it"
+
+
+def check_time_limit(value: float | None) -> None:
+    """Check a method's setting `time_limit`.
+
+    Raises:
+        InputError: it is neither None nor a positive finite number.
+    """
+    if value is not None:
+        number(value, "time_limit", *LIMITS, "s, or None for no limit")

@@ -1,0 +1,138 @@
+"""Goals that move, followed by Newton's method: what was laid out for a problem is kept from frame to frame."""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.checks import number, posture, time_step
+from wholebody.methods.inputs import TOLERANCE, check_problem
+from wholebody.methods.newton.figure_course import FigureCourse
+from wholebody.methods.newton.linear_algebra.base import Pattern
+from wholebody.methods.newton.method import answer
+from wholebody.methods.newton.reaching import reach
+from wholebody.methods.newton.search import SHARPER, Search, Settings
+from wholebody.pool import OneAtATime
+from wholebody.problem import Problem, Solution
+from wholebody.tasks import StepLimit
+
+Array = NDArray[np.float64]
+
+FRAME_TOLERANCE = 1e-4  # m, rad: on the way of a drag; its end is solved to the method's own
+FRAME_ITERATIONS = 12  # most of one frame; a goal that asks for more is followed over the next frames
+
+
+class NewtonStep(NamedTuple):
+    """Answer of one frame.
+
+    Attributes:
+        q: (nq,) the next posture.
+        iterations: Newton iterations.
+        systems: linear systems solved.
+        structures: how often the pattern has been laid out since the tracker was made.
+    """
+
+    q: Array
+    iterations: int
+    systems: int
+    structures: int
+
+
+class NewtonTracker:
+    """Follows the goals of one problem, frame by frame.
+
+    Goals, other terms and clearances of the problem may be replaced between calls, and things may be moved. A tracker
+    remembers the frame before, so it is for one figure and one thread at a time.
+
+    Attributes:
+        problem: whose goals are followed.
+        dt: seconds a frame; None where frames are not tied to time.
+        workspace: its own; between calls it may be moved.
+    """
+
+    def __init__(self, problem: Problem, algebra: str, settings: Settings, dt: float | None) -> None:
+        """Lay out the equations.
+
+        Raises:
+            InputError: the problem has a term that this method has no equations for, or dt is not positive and finite.
+        """
+        self.problem = check_problem(problem, "tracker: problem")
+        self.dt = None if dt is None else time_step(dt, "dt")
+        self._algebra, self._settings = algebra, settings
+        self.workspace = problem.workspace()
+        self._alone = OneAtATime("tracker")
+        self._lay_out()
+
+    def step(self, q: Array, tolerance: float = FRAME_TOLERANCE) -> NewtonStep:
+        """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
+
+        Args:
+            q: where the frame begins.
+            tolerance: of the goals, metres and radians.
+
+        Raises:
+            InputError: objects came to or left the scene, a new term has no equations, or another thread is within a
+                call of this tracker.
+        """
+        q = posture(q, self.workspace.model.nq)
+        tolerance = number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
+        with self._alone:
+            course = self._renewed()
+            course.objective.anchor(q)
+            if self.dt is not None and any(isinstance(bound, StepLimit) for bound in self.problem.bounds):
+                state = self.workspace.state.update(q)
+                ranges = np.array([bound.bounds(state, self.dt) for bound in self.problem.bounds])
+                course.bodies.bound_step(q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0))
+            found = reach(
+                course,
+                course.variables(q),
+                tolerance=SHARPER * self._settings.tolerance,
+                goal_tolerance=tolerance,
+                iterations=FRAME_ITERATIONS,
+                kind=self._settings.inequalities,
+                hurried=True,
+            )
+            return NewtonStep(course.posture(found.x), found.iterations, found.systems, course.structures)
+
+    def solve(self, q: Array) -> Solution:
+        """The straight way from the posture q (nq,) to the problem's present goals; no other starts are tried.
+
+        Raises:
+            InputError: as for `step`.
+        """
+        began = time.perf_counter()
+        q = posture(q, self.workspace.model.nq)
+        with self._alone:
+            search = Search(self._renewed(), self._settings)
+            return answer(search, search.from_here(q), began)
+
+    @property
+    def pattern(self) -> Pattern:
+        """Where the Jacobian can be other than zero."""
+        return self._course.system.pattern
+
+    @property
+    def laid_out(self) -> tuple[int, float]:
+        """How many patterns were needed, and the processor's time to lay them out and analyse them [s]."""
+        return self._course.structures, self._course.laying
+
+    def _lay_out(self) -> None:
+        problem = self.problem
+        self._course = FigureCourse(problem, self.workspace, self._algebra)
+        self._terms = (problem.constraints, problem.bounds, problem.measures)
+
+    def _renewed(self) -> FigureCourse:
+        """The equations of the problem with its present goals; laid out anew where other terms were replaced."""
+        problem = self.problem
+        problem.check_fresh()
+        self.workspace.refresh()
+        now = (problem.constraints, problem.bounds, problem.measures)
+        if any(new is not old for new, old in zip(now, self._terms, strict=True)):
+            self._lay_out()
+        self._course.retarget()
+        self._course.objective.follow()
+        self._course.bodies.free_step()
+        return self._course

@@ -1,0 +1,85 @@
+"""What one run changes as it goes: a kinematic state, the distances at it, a sweep. No two runs share one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.figures.state import State
+from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.geometry.proximity import Contacts, PairTable, Proximity
+from wholebody.scene_geometry import SceneGeometry
+
+if TYPE_CHECKING:
+    from wholebody.geometry.sweep import Sweep
+
+Array = NDArray[np.float64]
+
+
+class Workspace:
+    """Room for one run on a scene; lent by `Scene.lend`, or made by `Scene.workspace` for what lives on.
+
+    A run sees things where they were at its last `begin` or `refresh`, whoever moves them meanwhile. After `begin` the
+    same questions have the same answers, whatever was asked before.
+
+    Attributes:
+        model: Pinocchio's model of the figure.
+        table: pieces and pairs of the scene.
+        rows: builds their contact rows.
+        owners: the segment or object that each piece is part of.
+        state: moves from posture to posture.
+        proximity: distances between the pieces.
+    """
+
+    def __init__(self, built: SceneGeometry) -> None:
+        """Allocate, which takes some 3 ms for a person."""
+        self._built = built
+        self.model: pin.Model = built.model
+        self.table: PairTable = built.table
+        self.rows: ContactRowBuilder = built.rows
+        self.owners = built.owners
+        self.state = State(built.model)
+        self._seen = 0
+        self.proximity = Proximity(built.table)
+        self._sweep: Sweep | None = None
+        self._seen = built.bring(self.proximity, -1)
+
+    def begin(self) -> None:
+        """Forget what was asked before, and see things where they are now."""
+        self.proximity.forget()
+        self.refresh()
+
+    def refresh(self) -> None:
+        """See things where they are now."""
+        self._seen = self._built.bring(self.proximity, self._seen)
+
+    @property
+    def geometry(self) -> pin.GeometryModel:
+        """The scene's geometry model, with the placements that this run sees."""
+        return self.proximity.geometry
+
+    @property
+    def sweep(self) -> Sweep:
+        """Continuous collision detection; made when it is first needed."""
+        if self._sweep is None:
+            from wholebody.geometry.sweep import Sweep
+
+            self._sweep = Sweep(self.model, self.geometry)
+        return self._sweep
+
+    def near(self, q: Array, within: float) -> Contacts:
+        """Every pair nearer than `within` metres at the posture q, shape (nq,), in the order of the pairs."""
+        return self.proximity.near(self.state.update(q).data, within)
+
+
+@contextmanager
+def lent(built: SceneGeometry) -> Iterator[Workspace]:
+    """A workspace of a scene for one run; it is used again when the context ends."""
+    with built.pool(Workspace, lambda: Workspace(built)).lend() as workspace:
+        workspace.begin()
+        yield workspace
