@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -173,3 +175,40 @@ def test_what_is_no_posture_is_refused(planar_arm, q):
     problem = wb.Problem(wb.Scene(planar_arm(LENGTHS)))
     with pytest.raises(wb.InputError, match=r"a posture (has shape|entry)"):
         wb.assess(problem, q)
+
+
+def test_clearances_are_read_afresh(free_bodies):
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.1), name="ball", at=(0.25, 0.0, 0.0))
+    problem = wb.Problem(scene)
+    assert wb.assess(problem, problem.start).clearance_lack == 0.0
+    problem.clearances += 0.1
+    assert wb.assess(problem, problem.start).clearance_lack == pytest.approx(0.05, abs=1e-6)
+    assert wb.solve(problem).q[0] == pytest.approx(-0.05, abs=1e-4)
+    problem.clearances = np.zeros(2)
+    with pytest.raises(wb.InputError, match="one for each of the 1 pairs"):
+        wb.assess(problem, problem.start)
+    with pytest.raises(wb.InputError, match="one for each of the 1 pairs"):
+        wb.solve(problem)
+
+
+def test_problems_of_one_scene_are_judged_in_the_same_room(free_bodies, monkeypatch):
+    """Whatever problem asks: what judging needs is made once for a scene, and anew when things come or go."""
+    made = []
+    whole = AllPairs.__init__
+    monkeypatch.setattr(AllPairs, "__init__", lambda self, built: (made.append(built), whole(self, built))[1])
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.1), name="ball", at=(0.25, 0.0, 0.0))
+    problem = wb.Problem(scene)
+    for one in (problem, copy.copy(problem), wb.Problem(scene, clearance=0.01)):
+        wb.assess(one, one.start)
+    assert made == [scene.built]
+    scene.add(wb.Sphere(0.1), name="other", at=(0.0, 0.3, 0.0))
+    wb.assess(wb.Problem(scene), problem.start)
+    assert len(made) == 2
+
+
+def test_a_moved_thing_is_judged_where_it_is(free_bodies):
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.1), name="ball", at=(0.25, 0.0, 0.0))
+    problem = wb.Problem(scene)
+    for x in (0.15, 0.3, 0.12):
+        scene.move("ball", at=(x, 0.0, 0.0))
+        assert wb.assess(problem, problem.start).least_distance == pytest.approx(x - 0.2, abs=1e-9)

@@ -75,7 +75,7 @@ ODD: dict[str, Any] = {
     "object": object(),
     "unshowable": Unshowable(),
     "function": lambda *_: None,
-    "type": int,
+    "type": str,
     "module": math,
     "iterator": iter(()),
     "three numbers": (1.0, 2.0, 3.0),
@@ -178,8 +178,6 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     track = interaction.Track.of(arm, np.array([q, q, q, q]), 0.1)
     solve_it = partial(solvable, path)
     person = wb.Scene(human())
-    solved = wb.Newton()
-    solved.solve(ask)
 
     def on_a_person(term: Any) -> Any:
         return term.resolve(person, person.figure.neutral)
@@ -219,11 +217,15 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
             lambda made: made.contacts(q),
         ),
     )
+    near = there.contacts(q, within=1.0)
+    yield "Contacts.nearest_first", Call(near.nearest_first, {})
     yield "Scene.penetration", Call(there.penetration, {"q": q})
+    yield "Scene.lend", Call(there.lend, {})
+    yield "Scene.workspace", Call(there.workspace, {})
     yield "Scene.remove", Call(lambda **given: scene(path).remove(**given), {"name": "ball"})
     yield "Scene.simplified", Call(ask.scene.simplified, {"problem": ask, "lock": True})
     yield "Scene.state", Call(there.state, {"q": q})
-    yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1})
+    yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4})
 
     def put(shape: Any) -> Any:
         return wb.Scene(arm).add(shape, name="it").contacts(q)
@@ -288,9 +290,12 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Problem", Call(wb.Problem, stated, wb.solve)
     yield "Problem(touching)", Call(lambda pair: wb.Problem(there, touching=[pair]), {"pair": ("link4", "ball")})
     yield "Problem.check_fresh", Call(ask.check_fresh, {})
-    yield "Problem.lineariser", Call(ask.lineariser, {"dt": 0.1})
+    lent = ask.workspace()
+    yield "Problem.lineariser", Call(lambda dt: ask.lineariser(lent, dt), {"dt": 0.1})
+    yield "Problem.lend", Call(ask.lend, {})
+    yield "Problem.workspace", Call(ask.workspace, {})
     yield "Problem.retarget", Call(retarget, {"goals": [wb.Point("link4", at)]})
-    yield "solve", Call(wb.solve, {"problem": ask, "method": "qp"})
+    yield "solve", Call(wb.solve, {"problem": ask, "method": "qp", "progress": print})
     yield "assess", Call(wb.assess, {"problem": ask, "q": q})
     judged = wb.assess(ask, q)
     yield "Assessment.holds", Call(judged.holds, {"tolerance": 0.1})
@@ -298,26 +303,34 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "read_task", Call(wb.read_task, {"path": path / "task.toml"})
 
     used = partial(easily, path)
-    settings = {"tolerance": 1e-4, "iterations": 30, "budget": 20, "restarts": 1, "seed": 0, "measures": True}
+    settings = {
+        "tolerance": 1e-4,
+        "iterations": 30,
+        "budget": 20,
+        "restarts": 1,
+        "seed": 0,
+        "measures": True,
+        "time_limit": 4.0,
+    }
     yield "QP", Call(wb.QP, {"solver": "osqp", **settings}, used)
-    yield "QP.solve", Call(wb.QP().solve, {"problem": ask})
-    yield "QP.step", Call(wb.QP().step, {"problem": ask, "q": q, "dt": 0.1, "measures": True})
-    yield "CCD", Call(wb.CCD, {"tolerance": 1e-4, "iterations": 5, "restarts": 1, "seed": 0}, used)
-    yield "CCD.solve", Call(wb.CCD().solve, {"problem": ask})
+    yield "QP.solve", Call(wb.QP().solve, {"problem": ask, "progress": print})
+    yield "QP.tracker", Call(wb.QP().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
+    yield "Tracker.step", Call(wb.QP().tracker(ask, 0.1).step, {"q": q, "measures": True})
+    yield "CCD", Call(wb.CCD, {"tolerance": 1e-4, "iterations": 5, "restarts": 1, "seed": 0, "time_limit": None}, used)
+    yield "CCD.solve", Call(wb.CCD().solve, {"problem": ask, "progress": print})
     yield "CCD.pushed_out", Call(wb.CCD().pushed_out, {"problem": ask, "q": q})
-    newton = {"algebra": "auto", "inequalities": "slack", "restarts": 1, "seed": 0}
+    newton = {"algebra": "auto", "inequalities": "slack", "restarts": 1, "seed": 0, "time_limit": 1.0}
     yield "Newton", Call(wb.Newton, {"tolerance": 1e-4, "iterations": 5, **newton}, used)
-    yield "Newton.solve", Call(wb.Newton().solve, {"problem": ask})
-    yield "Newton.follow", Call(wb.Newton().follow, {"problem": ask, "q": q})
-    yield "Newton.step", Call(wb.Newton().step, {"problem": ask, "q": q, "tolerance": 1e-4, "dt": 0.1})
-    for method in ("laid_out", "pattern"):
-        yield f"Newton.{method}", Call(getattr(solved, method), {})
-    yield "Placo", Call(wb.Placo, {"tolerance": 1e-4, "iterations": 5}, used)
-    yield "Placo.solve", Call(wb.Placo().solve, {"problem": ask})
+    yield "Newton.solve", Call(wb.Newton().solve, {"problem": ask, "progress": print})
+    yield "Newton.tracker", Call(wb.Newton().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
+    yield "NewtonTracker.step", Call(wb.Newton().tracker(ask).step, {"q": q, "tolerance": 1e-4})
+    yield "NewtonTracker.solve", Call(wb.Newton().tracker(ask).solve, {"q": q})
+    yield "Placo", Call(wb.Placo, {"tolerance": 1e-4, "iterations": 5, "time_limit": 1.0}, used)
+    yield "Placo.solve", Call(wb.Placo().solve, {"problem": ask, "progress": print})
     yield "Placo.prepare", Call(wb.Placo().prepare, {"problem": ask})
-    damped = {"tolerance": 1e-4, "iterations": 5, "damping": 1e-3}
+    damped = {"tolerance": 1e-4, "iterations": 5, "damping": 1e-3, "time_limit": 1.0}
     yield "DampedLeastSquares", Call(wb.DampedLeastSquares, damped, used)
-    yield "DampedLeastSquares.solve", Call(wb.DampedLeastSquares().solve, {"problem": ask})
+    yield "DampedLeastSquares.solve", Call(wb.DampedLeastSquares().solve, {"problem": ask, "progress": print})
 
     dragged = {"problem": ask, "method": "qp", "goal": 0, "dt": 0.1}
     yield "Drag", Call(wb.Drag, dragged, lambda drag: drag.to(at))
@@ -401,7 +414,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
 
 @cache
 def human() -> wb.Figure:
-    return wb.load("human", detail="spheres")
+    return wb.load("human")
 
 
 def shown(parts: Parts) -> None:
@@ -444,7 +457,21 @@ ANSWERS = (
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 
-DERIVATIVES = ("resolve", "error", "jacobian", "value", "gradient", "curvature", "bounds", "rows", "wrench_jacobian")
+OF_METHODS = ("Tracker", "NewtonTracker")
+"""What `tracker` of a method builds; and workspaces, which a run has to itself, are for methods of one's own."""
+
+DERIVATIVES = (
+    "companion",
+    "resolve",
+    "error",
+    "jacobian",
+    "value",
+    "gradient",
+    "curvature",
+    "bounds",
+    "rows",
+    "wrench_jacobian",
+)
 """What problems and methods, not people, ask of terms and states; at every posture, which is too often for checks."""
 
 ABSTRACT = ("Shape", "Goal", "Constraint", "Bound", "Measure", "Figure")
@@ -458,6 +485,8 @@ def fed(name: str) -> bool:
     """Whether a name of the surface is fed here."""
     owner, _, method = name.partition(".")
     if name in ANSWERS or (owner == "Viewer" and method in BROWSER) or name == "write_strip":
+        return False
+    if name in OF_METHODS or owner == "Workspace":
         return False
     if method in DERIVATIVES and owner != "Assembly":
         return False

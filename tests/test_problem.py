@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.problem import built_in_goals
 
 
 @pytest.fixture
@@ -131,3 +132,41 @@ def test_terms_are_not_changed_by_being_used(scene):
     assert wb.assess(one, one.start).constraint_violation == 0.0
     assert wb.assess(two, two.start).constraint_violation < 1e-12
     assert wb.assess(one, two.start).constraint_violation > 0.01
+
+
+class _Broken(wb.Goal):
+    """A user's goal whose Jacobian has another shape, or whose error is not a number."""
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+
+    def error(self, state):
+        return np.full(2, np.nan if self.kind == "nan" else 1.0)
+
+    def jacobian(self, state):
+        return np.zeros((3 if self.kind == "shape" else 2, state.model.nv))
+
+
+@pytest.mark.parametrize(("kind", "said"), [("nan", "not finite"), ("shape", "give shape")])
+def test_new_goals_are_checked_as_the_first_ones_and_refused_whole(scene, kind, said):
+    with pytest.raises(wb.InputError, match=rf"goals\[1\] \(_Broken\) .*{said}"):
+        wb.Problem(scene, goals=[GOAL, _Broken(kind)])
+    problem = wb.Problem(scene, goals=[GOAL])
+    before = problem.goals
+    with pytest.raises(wb.InputError, match=rf"goals\[1\] \(_Broken\) .*{said}"):
+        problem.retarget([wb.Posture("standing"), _Broken(kind)])
+    assert problem.goals is before
+
+
+def test_built_in_goals_leave_nothing_for_retarget_to_find(scene):
+    """They are not evaluated there, so what evaluation would find they refuse themselves."""
+    assert {wb.Point, wb.Frame, wb.Posture} <= built_in_goals()
+    for make in (
+        lambda: wb.Point("head", (np.nan, 0.0, 0.0)), lambda: wb.Frame("head", (0, 0, np.inf)),
+        lambda: wb.CenterOfMass((0, np.nan, 0)), lambda: wb.Axis("head", (1, 0, 0), direction=(np.nan, 0, 0)),
+        lambda: wb.Orientation("head", (0, 0, np.nan, 1)), lambda: wb.Relative("head", "pelvis", (0, np.nan, 0)),
+        lambda: wb.Posture(np.full(scene.model.nq, np.nan)),
+    ):  # fmt: skip
+        problem = wb.Problem(scene, goals=[GOAL])
+        with pytest.raises(wb.InputError):
+            problem.retarget([make()])

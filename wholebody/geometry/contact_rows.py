@@ -82,14 +82,14 @@ class ContactRowBuilder:
             clearance: distance asked of each contact, (k,) or one for all, metres.
 
         Raises:
-            InputError: contacts of other pieces, or clearances of other contacts.
+            InputError: contacts of other pieces.
         """
         k = len(contacts.distance)
         joint = self.table.joint
-        if len(contacts.placements) != len(joint) or np.shape(clearance) not in ((), (k,)):
+        if len(contacts.placements) != len(joint):
             raise InputError(
-                f"{k} contacts of {len(contacts.placements)} pieces with clearances of shape {np.shape(clearance)} do "
-                f"not belong to these {len(joint)} pieces; ask the scene that the contacts come from"
+                f"contacts among {len(contacts.placements)} pieces are not among these {len(joint)}; ask the scene "
+                "that they come from"
             )
         wide = np.flatnonzero(self._extended[contacts.number] & (contacts.distance < clearance + LEVER_DISTANCE))
         if len(wide):

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
+from wholebody.methods.contradictions import explanation
 from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.problem import Iterate, Problem, Solution, Status
@@ -91,6 +92,8 @@ class DampedLeastSquares:
             rested = descent.run()
         judgement = assess(problem, descent.best)
         status = _status(judgement, rested, 1.05 * self.tolerance + 1e-6)
+        why = "" if status == "solved" else explanation(problem)
+        said = why or control.message(judgement) or _message(status, judgement, descent.steps)
         return Solution(
             q=descent.best,
             status=status,
@@ -99,7 +102,7 @@ class DampedLeastSquares:
             assessment=judgement,
             trace=tuple(descent.trace),
             method=self.name,
-            message=(control.message(judgement) or _message(status, judgement, descent.steps)) + judgement.in_the_way,
+            message=said + judgement.in_the_way,
         )
 
 

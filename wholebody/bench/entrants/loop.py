@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
 from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.methods.contradictions import explanation
 from wholebody.methods.control import Control, Progress
 from wholebody.problem import Iterate, Problem, Solution, Status
 from wholebody.tasks import Displacement, Effort, Hold
@@ -138,6 +139,8 @@ class Loop(ABC):
             run.go()
         judgement = assess(problem, run.q)
         status = _status(judgement, run, 1.05 * self.tolerance + 1e-6)
+        why = "" if status == "solved" else explanation(problem)
+        said = why or control.message(judgement) or _message(status, judgement, run, self.name)
         return Solution(
             q=run.q,
             status=status,
@@ -146,7 +149,7 @@ class Loop(ABC):
             assessment=judgement,
             trace=tuple(run.trace),
             method=self.name,
-            message=(control.message(judgement) or _message(status, judgement, run, self.name)) + judgement.in_the_way,
+            message=said + judgement.in_the_way,
         )
 
     def _check(self, problem: Problem) -> None:

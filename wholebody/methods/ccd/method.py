@@ -16,6 +16,7 @@ from wholebody.methods.ccd.overlap import SHAKES
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.remover import TOUCH, Remover
 from wholebody.methods.ccd.terms import read
+from wholebody.methods.contradictions import Contradiction, contradictions, in_words, proven
 from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, check_problem, check_settings
 from wholebody.problem import Iterate, Problem, Solution, Status
@@ -106,6 +107,12 @@ class CCD:
             best = search.run()
         judgement = assess(problem, best.q)
         status = self._status(best, judgement)
+        status = proven(status, search.contradictions)
+        said = (
+            in_words(search.contradictions)
+            or control.message(judgement)
+            or _message(status, judgement, len(search.trace))
+        )
         return Solution(
             q=best.q,
             status=status,
@@ -114,8 +121,7 @@ class CCD:
             assessment=judgement,
             trace=tuple(search.trace),
             method=self.name,
-            message=(control.message(judgement) or _message(status, judgement, len(search.trace)))
-            + judgement.in_the_way,
+            message=said + judgement.in_the_way,
         )
 
     def pushed_out(self, problem: Problem, q: Array) -> Array:
@@ -160,6 +166,8 @@ class _Search:
         )
         self._rng = np.random.default_rng(method.seed)
         self.sweeps = 0
+        self.contradictions: tuple[Contradiction, ...] = ()
+        self._workspace = workspace
         self.trace: list[Iterate] = []
 
     def run(self) -> _Trial:
@@ -175,6 +183,10 @@ class _Search:
             if best is None or trial.better(best, self._touch):
                 best = trial
             if self._serves(best) or self._control.over:
+                break
+            if attempt == 0:
+                self.contradictions = contradictions(self._problem, self._workspace)
+            if self.contradictions:
                 break
         assert best is not None
         return best if not self._control.over else replace(best, rested=False)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wholebody.checks import choice, known
+from wholebody.methods.contradictions import in_words, proven
 from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.newton.figure_course import FigureCourse
@@ -113,6 +114,8 @@ def answer(search: Search, found: Found, began: float) -> Solution:
     status = _status(found, search.settings)
     if stopped and status != "solved":
         status = "stalled"
+    status = proven(status, search.contradictions)
+    said = in_words(search.contradictions) or stopped or _message(status, found, search)
     return Solution(
         q=found.q,
         status=status,
@@ -121,7 +124,7 @@ def answer(search: Search, found: Found, began: float) -> Solution:
         assessment=found.judgement,
         trace=tuple(Iterate(error, 0.0, 0.0, 0.0) for error in search.residuals),
         method=f"newton/{search.course.algebra.name}",
-        message=(stopped or _message(status, found, search)) + found.judgement.in_the_way + _reported(search.course),
+        message=said + found.judgement.in_the_way + _reported(search.course),
     )
 
 

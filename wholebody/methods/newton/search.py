@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
+from wholebody.methods.contradictions import Contradiction, contradictions
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.polishing import polish
@@ -67,6 +68,7 @@ class Search:
         self.course, self.settings = course, settings
         self.iterations = 0
         self.residuals: list[float] = []
+        self.contradictions: tuple[Contradiction, ...] = ()
 
     def from_here(self, q: Array) -> Found:
         """The end of the straight way from a posture (nq,)."""
@@ -74,8 +76,9 @@ class Search:
 
     def everywhere(self, q: Array) -> Found:
         """The best end of all ways, the measures brought to their least there if it serves."""
-        best = self.from_here(q)
-        if not self._serves(best):
+        self.contradictions = contradictions(self.course.problem, self.course.workspace)
+        best = self._go(q, "", TRIAL) if self.contradictions else self.from_here(q)
+        if not self._serves(best) and not self.contradictions:
             for start, how in self._starts(q):
                 found = self._go(start, how, min(TRIAL, self.settings.iterations))
                 if self._better(found, best) and not found.reached.stationary and not self._serves(found):
@@ -86,7 +89,7 @@ class Search:
                     break
         if self.course.control.over:
             return best
-        if not best.judgement.holds(self.settings.counted):
+        if not best.judgement.holds(self.settings.counted) and not self.contradictions:
             best = self._least_violation(best, q)
         if self._serves(best) and self.course.objective.minimised:
             best = self._polished(best)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
 from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.methods.contradictions import explanation
 from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.methods.placo.robot import SWELL, Robot
@@ -103,6 +104,8 @@ class Placo:
             run.go()
         judgement = assess(problem, run.q)
         status = _status(judgement, run, 1.05 * self.tolerance + 1e-6)
+        why = "" if status == "solved" else explanation(problem)
+        said = why or control.message(judgement) or _message(status, judgement, run)
         return Solution(
             q=run.q,
             status=status,
@@ -111,7 +114,7 @@ class Placo:
             assessment=judgement,
             trace=tuple(run.trace),
             method=self.name,
-            message=(control.message(judgement) or _message(status, judgement, run)) + judgement.in_the_way,
+            message=said + judgement.in_the_way,
         )
 
 

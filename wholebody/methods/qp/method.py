@@ -9,6 +9,7 @@ import numpy as np
 
 from wholebody.assessment import Assessment, assess
 from wholebody.checks import flag
+from wholebody.methods.contradictions import in_words, proven
 from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
 from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.qp.search import Search, Settings
@@ -84,6 +85,8 @@ class QP:
             best = search.run()
         judgement = assess(problem, best.q)
         status = _status(best, judgement, self.tolerance)
+        status = proven(status, search.contradictions)
+        said = in_words(search.contradictions) or control.message(judgement) or _message(status, judgement, search.how)
         return Solution(
             q=best.q,
             status=status,
@@ -92,7 +95,7 @@ class QP:
             assessment=judgement,
             trace=tuple(search.trace),
             method=self.name,
-            message=(control.message(judgement) or _message(status, judgement, search.how)) + judgement.in_the_way,
+            message=said + judgement.in_the_way,
         )
 
     def tracker(self, problem: Problem, dt: float) -> Tracker:

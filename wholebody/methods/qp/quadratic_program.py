@@ -51,12 +51,14 @@ class QuadraticProgram:
     def check_shapes(self, active: ActiveSet) -> None:
         """Raise ValueError where sizes do not fit together: compiled loops do not look, and read beyond an end."""
         n, m, k = len(self.diagonal), len(self.target), len(self.least)
-        found = (
-            self.linear.shape, self.lower.shape, self.upper.shape, active.lower.shape, active.upper.shape,
-            self.rows.shape, self.weight.shape, self.elastic.shape, self.elastic_weight.shape, active.elastic.shape,
-        )  # fmt: skip
-        if found != ((n,), (n,), (n,), (n,), (n,), (m, n), (m,), (k, n), (k,), (k,)):
-            raise ValueError(f"a program of {n} variables, {m} soft and {k} elastic rows has parts of shapes {found}")
+        if not (
+            len(self.linear) == len(self.lower) == len(self.upper) == len(active.lower) == len(active.upper) == n
+            and self.rows.shape == (m, n)
+            and len(self.weight) == m
+            and self.elastic.shape == (k, n)
+            and len(self.elastic_weight) == len(active.elastic) == k
+        ):
+            raise ValueError(f"a program of {n} variables, {m} soft and {k} elastic rows has parts of other sizes")
 
     @property
     def size(self) -> int:

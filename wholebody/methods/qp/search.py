@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wholebody.methods.contradictions import Contradiction, contradictions
 from wholebody.methods.control import Control
 from wholebody.methods.qp.descent import Descent
 from wholebody.methods.qp.quadratic_program import Array
@@ -55,6 +56,7 @@ class Search:
         self._left = settings.budget  # programs that the ways after the first may still solve
         self._in_vain = 0  # scouts in a row that came no nearer
         self.how = "directly"
+        self.contradictions: tuple[Contradiction, ...] = ()
         self._best: Local | None = None
 
     @property
@@ -72,6 +74,9 @@ class Search:
     def _try_ways(self) -> None:
         start = self.problem.scene.figure.clamp(self.problem.start)
         if self._accept(self._descend(start, eager=not self.settings.measures), "directly"):
+            return
+        self.contradictions = contradictions(self.problem, self.lineariser.workspace)
+        if self.contradictions:
             return
         rng = np.random.default_rng(self.settings.seed)
         starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, self.settings.restarts))

@@ -192,21 +192,21 @@ class Tracker:
         problem = self.problem
         self._subproblem = Subproblem(problem, self.workspace.state)
         self._lineariser = problem.lineariser(self.workspace, self.dt)
-        self._terms = (problem.goals, problem.constraints, problem.bounds, problem.measures)
         self._goals = self._signatures(problem.goals)
 
     def _renew(self) -> None:
         """Take what was replaced of the problem since the last step; where targets moved only, keep what is set up."""
-        problem = self.problem
-        goals, *others = self._terms
-        now = (problem.constraints, problem.bounds, problem.measures)
-        other = any(new is not old for new, old in zip(now, others, strict=True))
-        if other or (problem.goals is not goals and self._signatures(problem.goals) != self._goals):
+        problem, own = self.problem, self._lineariser
+        others = (
+            problem.constraints is not own.constraints
+            or problem.bounds is not own.bounds
+            or problem.measures is not own.measures
+        )
+        if others or (problem.goals is not own.goals and self._signatures(problem.goals) != self._goals):
             self._set_up()
             self._working_set.forget()
         else:
-            self._terms = (problem.goals, *now)
-            self._lineariser.take(problem.goals, problem.clearances)
+            own.take(problem.goals, problem.clearances)
 
     def _signatures(self, goals: Sequence[Goal]) -> list[tuple[type, float, int]]:
         """What programs are set up from: kind, weight and number of rows of each goal."""

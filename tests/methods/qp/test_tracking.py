@@ -1,0 +1,120 @@
+"""Trackers whose problem is changed between steps, and compiled loops that are given the wrong sizes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.methods.qp.active_set import lacking, solve_from
+from wholebody.methods.qp.quadratic_program import QuadraticProgram
+from wholebody.tasks.base import Goal
+
+SLOW = wb.StepLimit(0.2, root_velocity=0.1, root_turn=0.1)  # steps so short that none is cut
+FEET = (wb.Hold("left_foot"), wb.Hold("right_foot"), SLOW)
+
+
+@pytest.fixture(scope="module")
+def scene() -> wb.Scene:
+    return wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+
+
+def fresh(problem: wb.Problem, q: np.ndarray) -> np.ndarray:
+    """What a tracker does that never knew other goals."""
+    step = wb.QP().tracker(problem, 0.02).step(q)
+    assert step.share == 1.0
+    return step.displacement
+
+
+CHANGES = {
+    "rows": ([wb.CenterOfMass((0.05, 0.0, 1.0), axes="xy")], [wb.CenterOfMass((0.05, 0.0, 1.0), axes="xyz")]),
+    "joints": ([wb.Posture("arms_forward", joints=["neck"])], [wb.Posture("arms_forward")]),
+    "fewer rows": ([wb.Posture("arms_forward")], [wb.Posture("arms_forward", joints=["neck"])]),
+    "weight": ([wb.Point("head", (0.1, 0, 1.5))], [wb.Point("head", (0.1, 0, 1.5), weight=100.0)]),
+    "order": (
+        [wb.Point("head", (0.1, 0.0, 1.5)), wb.CenterOfMass((0.05, 0.0, 1.0), axes="xy")],
+        [wb.CenterOfMass((0.05, 0.0, 1.0), axes="xy"), wb.Point("head", (0.1, 0.0, 1.5))],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_other_goals_are_followed_as_by_a_new_tracker(scene: wb.Scene, change: str) -> None:
+    """Without this the weights of the old goals stayed: a held foot moved by centimetres, or the step broke off."""
+    first, second = CHANGES[change]
+    problem = wb.Problem(scene, goals=first, constraints=FEET)
+    tracker, q = wb.QP().tracker(problem, 0.02), problem.start
+    for goals in (first, second, first, second):
+        problem.retarget(goals)
+        step = tracker.step(q)
+        assert step.displacement == pytest.approx(fresh(problem, q), abs=1e-6)
+    for foot in problem.constraints:
+        assert np.abs(foot.value(scene.state(step.q))).max() < 1e-3
+
+
+def test_other_terms_are_followed_as_by_a_new_tracker(scene: wb.Scene) -> None:
+    problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.3, -0.3, 1.0))], constraints=FEET)
+    other = wb.Problem(scene, goals=problem.goals, constraints=[FEET[0], SLOW], measures=[wb.Displacement()])
+    tracker, q = wb.QP().tracker(problem, 0.02), problem.start
+    tracker.step(q)
+    problem.constraints, problem.measures = other.constraints, other.measures
+    assert tracker.step(q).displacement == pytest.approx(fresh(problem, q), abs=1e-7)
+    problem.clearances += 0.02
+    assert tracker.step(q).displacement == pytest.approx(fresh(problem, q), abs=1e-7)
+    problem.clearances = problem.clearances[:-1]
+    with pytest.raises(wb.InputError, match="one for each of the"):
+        tracker.step(q)
+
+
+class _Growing(Goal):
+    """A user's goal that has more rows at some postures."""
+
+    def __init__(self) -> None:
+        self.rows = 1
+
+    def error(self, state):
+        return np.zeros(self.rows)
+
+    def jacobian(self, state):
+        return np.eye(state.model.nv)[: self.rows]
+
+
+def test_a_goal_that_changes_its_rows_is_refused(scene: wb.Scene) -> None:
+    problem = wb.Problem(scene, goals=[_Growing()])
+    tracker = wb.QP().tracker(problem, 0.02)
+    tracker.step(problem.start)
+    problem.goals[0].rows = 3
+    with pytest.raises(wb.InputError, match="one number of rows at all postures"):
+        tracker.step(problem.start)
+
+
+class _Uneven(_Growing):
+    def jacobian(self, state):
+        return np.eye(state.model.nv)[:1]
+
+
+def test_a_goal_with_other_numbers_of_values_and_rows_is_refused(scene: wb.Scene) -> None:
+    problem = wb.Problem(scene, goals=[_Uneven()])
+    problem.goals[0].rows = 2
+    with pytest.raises(wb.InputError, match="_Uneven has 2 values and 1 rows"):
+        wb.QP().tracker(problem, 0.02).step(problem.start)
+
+
+def program() -> QuadraticProgram:
+    rng = np.random.default_rng(0)
+    return QuadraticProgram(
+        diagonal=np.ones(4), linear=np.ones(4), rows=rng.normal(size=(3, 4)), target=np.ones(3), weight=np.ones(3),
+        elastic=rng.normal(size=(5, 4)), least=np.zeros(5), elastic_weight=np.ones(5), lower=-np.ones(4),
+        upper=np.ones(4),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("field", ["linear", "rows", "weight", "elastic", "elastic_weight", "lower", "upper"])
+def test_compiled_loops_are_not_given_sizes_that_do_not_fit(field: str) -> None:
+    whole = program()
+    assert solve_from(whole, lacking(whole), 50) is not None
+    broken = replace(whole, **{field: getattr(whole, field)[:-1]})
+    with pytest.raises(ValueError, match="other sizes"):
+        solve_from(broken, lacking(whole), 50)

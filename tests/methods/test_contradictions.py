@@ -1,0 +1,108 @@
+"""What no posture can give is found at once, and both sides of it are named; what some posture gives is not blamed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.bench.problem_sets.registry import SETS
+from wholebody.methods.contradictions import contradictions
+
+METHODS = {"qp": wb.QP, "ccd": wb.CCD, "newton": wb.Newton, "placo": wb.Placo, "dls": wb.DampedLeastSquares}
+
+
+def found(problem):
+    with problem.lend() as workspace:
+        return contradictions(problem, workspace)
+
+
+@pytest.fixture
+def standing():
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+
+    def make(*things, goals=(), constraints=(), clearance=0.0):
+        for number, (shape, at) in enumerate(things):
+            scene.add(shape, name=f"thing{number}", at=at)
+        return wb.Problem(scene, goals=goals, constraints=constraints, clearance=clearance)
+
+    return make
+
+
+def test_a_held_foot_inside_a_thing(standing):
+    problem = standing((wb.Box((0.5, 0.5, 0.5)), (0.0, 0.1, 0.1)), constraints=[wb.Hold("left_foot")])
+    (only,) = found(problem)
+    assert only.status == "infeasible"
+    assert "left_foot (kept by constraints[0], Hold('left_foot'))" in only.text
+    assert "inside thing0 (kept by the world)" in only.text
+
+
+def test_a_frozen_arm_inside_a_thing(standing):
+    arm = ("right_arm", "spine", "root")
+    problem = standing((wb.Sphere(0.1), (0.0, -0.2, 1.1)), constraints=[wb.Freeze(*arm)])
+    assert [entry.status for entry in found(problem)] == ["infeasible"]
+    free = standing(constraints=[wb.Freeze("right_arm", "root")])  # the trunk can still take the arm away
+    assert found(free) == ()
+
+
+def test_two_holds_of_one_frame_and_of_one_frozen_part(standing):
+    here = wb.Hold("left_foot")
+    there = wb.Hold("left_foot", at=(0.0, 0.1, 0.5))
+    (only,) = found(standing(constraints=[here, there]))
+    assert "constraints[1]" in only.text
+    assert "constraints[0]" in only.text
+    elbow = wb.Hold("right_hand", at=(0.3, -0.3, 1.2))
+    shoulder = wb.Hold("right_upper_arm", at=(0.0, -0.2, 1.3))
+    assert found(standing(constraints=[elbow, shoulder])) == ()
+    assert len(found(standing(constraints=[elbow, shoulder, wb.Freeze("right_arm")]))) == 1
+
+
+def test_goals_against_holds_and_against_each_other(standing):
+    foot, tip = wb.Hold("left_foot"), (0.3, -0.2, 1.6)
+    (only,) = found(standing(goals=[wb.Point("left_heel", (1.0, 0.0, 0.0))], constraints=[foot]))
+    assert only.status == "unreachable"
+    goals = [wb.Point("right_index_tip", tip), wb.Point("right_index_tip", (0.3, -0.2, 1.7))]
+    (only,) = found(standing(goals=goals))
+    assert "100 mm" in only.text
+    offset = wb.Point("right_index_tip", (0.3, -0.2, 1.7), offset=(0.0, 0.0, 0.1))
+    assert found(standing(goals=[goals[0], offset])) == ()
+
+
+def test_an_arm_without_joints_to_move():
+    """The world itself is a rigid group: what a frozen fixed arm should reach is told where it is."""
+    figure = wb.load("avatar")
+    scene = wb.Scene(figure)
+    problem = wb.Problem(
+        scene, goals=[wb.Point("right_index_tip", (0.5, 0.0, 1.0))], constraints=[wb.Freeze(*figure.groups, "root")]
+    )
+    assert [entry.status for entry in found(problem)] == ["unreachable"]
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_names_both_sides(name):
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.5, 0.5, 0.5)), name="block", at=(0.0, 0.1, 0.1))
+    goals = [wb.Point("right_index_tip", (0.4, -0.3, 1.2))]
+    problem = wb.Problem(scene, goals=goals, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")])
+    if name == "ccd":
+        problem = wb.Problem(scene, goals=goals, constraints=[wb.Freeze("left_leg", "root")])
+    answer = METHODS[name]().solve(problem)
+    assert answer.status in ("infeasible", "stalled")
+    assert "what is asked contradicts itself: left_" in answer.message
+    assert "block" in answer.message
+
+
+@pytest.mark.parametrize("name", [name for name in SETS if not SETS[name].moving])
+def test_problems_with_a_witness_contradict_nothing(name):
+    for number in range(10):
+        case = SETS[name].make(number, 5)
+        assert found(case.problem) == ()
+
+
+def test_a_hold_where_the_start_is_not_is_taken_at_its_word(free_bodies):
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 0.0))
+    into = wb.Hold("body0", at=pin.SE3(np.eye(3), np.array([0.9, 0.0, 0.0])))
+    beside = wb.Hold("body0", at=pin.SE3(np.eye(3), np.array([0.7, 0.0, 0.0])))
+    assert len(found(wb.Problem(scene, constraints=[into]))) == 1
+    assert found(wb.Problem(scene, constraints=[beside])) == ()

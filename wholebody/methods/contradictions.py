@@ -1,0 +1,211 @@
+"""What a problem asks that no posture can give, found before anything is searched.
+
+Joints that cannot turn make rigid groups of segments; a hold of a frame tells where its whole group is. Two tellings
+that differ, a group that is held inside of something that does not move, and a goal that is elsewhere on a group whose
+place is told, contradict each other whatever the other joints do.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.geometry.placement import placement
+from wholebody.problem import Problem, Status
+from wholebody.tasks.frame import Frame, Orientation
+from wholebody.tasks.hold import Hold
+from wholebody.tasks.inputs import find_place
+from wholebody.tasks.point import Point
+from wholebody.workspace import Workspace
+
+Array = NDArray[np.float64]
+
+CLEAR = 1e-4  # m, rad: what differs by less is left to the search
+
+
+class Contradiction(NamedTuple):
+    """Two things that cannot both be.
+
+    Attributes:
+        status: what an answer can be at best: "infeasible", or "unreachable" where a goal is one of the two.
+        text: both, and how far apart they are.
+    """
+
+    status: Literal["infeasible", "unreachable"]
+    text: str
+
+
+class _Told(NamedTuple):
+    """Where a rigid group is, and who says so."""
+
+    placement: pin.SE3
+    by: str
+
+
+def contradictions(problem: Problem, workspace: Workspace) -> tuple[Contradiction, ...]:
+    """Everything that contradicts itself, what must hold first.
+
+    Args:
+        problem: what is asked.
+        workspace: of the run; its state is left at the problem's start.
+    """
+    finder = _Finder(problem, workspace)
+    finder.holds()
+    finder.pairs()
+    finder.goals()
+    return tuple(finder.found)
+
+
+class _Finder:
+    """The rigid groups of one problem, and where they are told to be."""
+
+    def __init__(self, problem: Problem, workspace: Workspace) -> None:
+        self._problem, self._workspace = problem, workspace
+        self.found: list[Contradiction] = []
+        state = workspace.state.update(problem.start)
+        model = problem.scene.model
+        stuck = np.zeros(model.nv, dtype=bool)
+        for bound in problem.bounds:
+            low, high = bound.bounds(state, None)
+            stuck |= (low == 0.0) & (high == 0.0)
+        self._group = list(range(model.njoints))
+        for joint in range(1, model.njoints) if stuck.any() else ():
+            if stuck[model.idx_vs[joint] : model.idx_vs[joint] + model.nvs[joint]].all():
+                self._group[joint] = self._group[model.parents[joint]]
+        self._start = state.data
+        self._told: dict[int, _Told] = {0: _Told(pin.SE3.Identity(), "the world")}
+
+    def holds(self) -> None:
+        """Note where holds tell groups to be; those that differ contradict each other."""
+        for number, term in enumerate(self._problem.constraints):
+            if not isinstance(term, Hold) or term.relative_to is not None:
+                continue
+            name = f"constraints[{number}], Hold({term.frame!r})"
+            group, local = self._frame(term.frame)
+            here = self._at(group, local)
+            if here is not None:
+                self._compare("infeasible", name, here, term.kept_at, term.orientation, self._told[group].by)
+            elif term.orientation:
+                self._told[group] = _Told(term.kept_at * local.inverse(), name)
+
+    def pairs(self) -> None:
+        """Find pieces that cannot move and overlap, or come nearer than is asked."""
+        table, geometry = self._workspace.table, self._workspace.geometry
+        group = np.array([self._group[joint] for joint in table.joint.tolist()], dtype=np.intp)
+        told = np.isin(group, list(self._told))
+        pairs = table.pairs
+        fixed = np.flatnonzero((told[pairs].all(axis=1)) | (group[pairs[:, 0]] == group[pairs[:, 1]]))
+        if not len(fixed):
+            return
+        center = self._centers(group)
+        reach = table.reach[pairs[fixed]].sum(axis=1) + self._problem.clearances[fixed]
+        apart = np.linalg.norm(center[pairs[fixed, 0]] - center[pairs[fixed, 1]], axis=1)
+        for number in fixed[apart < reach].tolist():
+            a, b = pairs[number].tolist()
+            places = [self._piece(index, int(table.joint[index])) for index in (a, b)]
+            asked = float(self._problem.clearances[number])
+            shapes = [geometry.geometryObjects[index].geometry for index in (a, b)]
+            at = [coal.Transform3s(place.rotation, place.translation) for place in places]
+            distance = coal.distance(shapes[0], at[0], shapes[1], at[1], coal.DistanceRequest(), coal.DistanceResult())
+            if distance < asked - CLEAR:
+                self.found.append(Contradiction("infeasible", self._overlap(a, b, distance, asked)))
+                return  # one is enough: such parts mostly overlap in many pieces
+
+    def goals(self) -> None:
+        """Find goals that are elsewhere than their group is told to be, or than another goal on the same group."""
+        points: list[tuple[int, Array, Array, str]] = []
+        for number, goal in enumerate(self._problem.goals):
+            if not isinstance(goal, (Point, Frame, Orientation)):
+                continue
+            name = f"goals[{number}], {type(goal).__name__}({goal.frame!r})"
+            group, local = self._frame(goal.frame)
+            here = self._at(group, local)
+            if isinstance(goal, Frame):
+                target = placement(goal.target)
+                if here is not None:
+                    self._compare("unreachable", name, here, target, True, self._told[group].by)
+                else:
+                    self._told[group] = _Told(target * local.inverse(), name)
+            elif isinstance(goal, Point):
+                place, wanted = local.act(np.asarray(goal.offset, dtype=float)), np.asarray(goal.target, dtype=float)
+                if here is not None:
+                    away = float(np.linalg.norm(self._told[group].placement.act(place) - wanted))
+                    self._report("unreachable", name, away, 0.0, self._told[group].by)
+                for other, its_place, its_wanted, its_name in points:
+                    if other == group:
+                        apart = np.linalg.norm(wanted - its_wanted) - np.linalg.norm(place - its_place)
+                        self._report("unreachable", name, abs(float(apart)), 0.0, its_name)
+                points.append((group, place, wanted, name))
+
+    def _centers(self, group: NDArray[np.intp]) -> Array:
+        """Origins (n, 3) of the pieces, of told groups where they are told to be."""
+        center: Array = self._workspace.near(self._problem.start, 0.0).placements[:, 3].copy()
+        for told, (at, _) in self._told.items():
+            moved = at * self._start.oMi[told].inverse()
+            members = group == told
+            center[members] = center[members] @ moved.rotation.T + moved.translation
+        return center
+
+    def _local(self, joint: int) -> pin.SE3:
+        """Where a joint is in its group."""
+        return self._start.oMi[self._group[joint]].actInv(self._start.oMi[joint])
+
+    def _frame(self, name: str) -> tuple[int, pin.SE3]:
+        """The group that carries a frame, and where the frame is in it."""
+        place = find_place(self._problem.scene, name, "")
+        frame = self._problem.scene.model.frames[place.frame]
+        return self._group[place.joint], self._local(place.joint) * frame.placement
+
+    def _at(self, group: int, local: pin.SE3) -> pin.SE3 | None:
+        """Where something of a group is in the world, if that is told."""
+        return self._told[group].placement * local if group in self._told else None
+
+    def _piece(self, index: int, joint: int) -> pin.SE3:
+        """Where a piece is: in the world if that is told, else in its group."""
+        local = self._local(joint) * self._workspace.geometry.geometryObjects[index].placement
+        here = self._at(self._group[joint], local)
+        return local if here is None else here
+
+    def _compare(self, status: Any, name: str, here: pin.SE3, wanted: pin.SE3, turned: bool, by: str) -> None:
+        away = float(np.linalg.norm(here.translation - wanted.translation))
+        angle = float(np.linalg.norm(pin.log3(here.rotation.T @ wanted.rotation))) if turned else 0.0
+        self._report(status, name, away, angle, by)
+
+    def _report(self, status: Any, name: str, away: float, angle: float, by: str) -> None:
+        if max(away, angle) > CLEAR:
+            far = f"{1e3 * away:.3g} mm" if away > CLEAR else f"{np.degrees(angle):.3g} degrees"
+            self.found.append(Contradiction(status, f"{name}, is {far} from where {by}, keeps that part"))
+
+    def _overlap(self, a: int, b: int, distance: float, asked: float) -> str:
+        owners, joint = self._workspace.owners, self._workspace.table.joint.tolist()
+        said = [f"{owners[k]} (kept by {self._told[group].by})" if (group := self._group[joint[k]]) in self._told
+                else f"{owners[k]} (frozen)" for k in (a, b)]  # fmt: skip
+        what = f"{-1e3 * distance:.3g} mm inside" if distance < 0.0 else f"{1e3 * distance:.3g} mm from"
+        return f"{said[0]} is {what} {said[1]}" + (f", where {1e3 * asked:.3g} mm are asked" if asked else "")
+
+
+def in_words(found: tuple[Contradiction, ...]) -> str:
+    """One sentence about contradictions; empty without any."""
+    if not found:
+        return ""
+    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    return f"what is asked contradicts itself: {found[0].text}{more}"
+
+
+def proven(status: Status, found: tuple[Contradiction, ...]) -> Status:
+    """The status of an answer to a problem that contradicts itself: more iterations would not have served."""
+    return found[0].status if found and status == "stalled" else status
+
+
+def explanation(problem: Problem) -> str:
+    """One sentence about what a problem asks that no posture can give; empty where nothing is found.
+
+    Raises:
+        InputError: objects came to or left the scene after the problem was stated.
+    """
+    with problem.lend() as workspace:
+        return in_words(contradictions(problem, workspace))
