@@ -18,6 +18,8 @@ ROOMS = (
     *(
         "errors",
         "version",
+        "checks",
+        "files",
         "compiled",
         "pool",
         "geometry",

@@ -133,7 +133,7 @@ def test_mistakes_are_answered_before_anything_changes(scene):
         scene.add(wb.Sphere(0.1), name="table")
     with pytest.raises(wb.InputError, match="already has a 'thorax'"):
         scene.add(wb.Sphere(0.1), name="thorax")
-    with pytest.raises(wb.InputError, match="needs a name"):
+    with pytest.raises(wb.InputError, match="the name of an object is ''; give a line of text"):
         scene.add(wb.Sphere(0.1), name="")
     with pytest.raises(wb.InputError):
         scene.add(wb.Sphere(0.1), name="ball", at=(1.0, np.nan, 0.0))
@@ -158,3 +158,13 @@ def test_objects_cannot_be_changed_behind_the_scenes_back(scene):
         scene.objects["ball"] = 1
     with pytest.raises(TypeError):
         scene.excluded_pairs["a", "b"] = "because"
+
+
+@pytest.mark.parametrize("wrong", ["red", (1, 0), (1, 0, 0, 0, 0), (2, 0, 0), (np.nan, 0, 0), 3, object(), {}])
+def test_colors_are_checked_when_they_are_given(scene, wrong):
+    with pytest.raises(wb.InputError, match=r"'ball': color is .*each from 0 to 1"):
+        scene.add(wb.Sphere(0.1), name="ball", color=wrong)
+    with pytest.raises(wb.InputError, match="'ball': color is"):
+        scene.attach(wb.Sphere(0.1), to="head", name="ball", color=wrong)
+    scene.add(wb.Sphere(0.1), name="ball", at=(1, 1, 1), color=(1, 0, 0))
+    assert scene.objects["ball"].color == (1.0, 0.0, 0.0, 1.0)

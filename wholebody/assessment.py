@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.checks import a, number, posture
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.first_order import MET, AllPairs, Blocker, blockers, optimality
@@ -59,12 +61,13 @@ class Assessment:
 
     def holds(self, tolerance: float) -> bool:
         """Whether limits, constraints and clearances hold to a tolerance, metres and radians."""
+        tolerance = number(tolerance, "tolerance", 0.0, inf)
         worst = max(self.limit_violation, self.constraint_violation, self.clearance_lack, self.penetration)
         return bool(worst <= tolerance)
 
     def met(self, tolerance: float) -> bool:
         """Whether the goals are met to a tolerance, metres and radians."""
-        return bool(max(self.goal_error, self.goal_angle) <= tolerance)
+        return bool(max(self.goal_error, self.goal_angle) <= number(tolerance, "tolerance", 0.0, inf))
 
     @property
     def in_the_way(self) -> str:
@@ -88,9 +91,9 @@ def assess(problem: Problem, q: Array) -> Assessment:
         InputError: q has the wrong shape or a value that is not finite.
     """
     began = time.perf_counter()
-    q = np.asarray(q, dtype=float)
-    if q.shape != (problem.scene.model.nq,) or not np.isfinite(q).all():
-        raise InputError(f"a posture is ({problem.scene.model.nq},) finite numbers; got shape {q.shape}")
+    if not isinstance(problem, Problem):
+        raise InputError(f"assess: problem is {a(type(problem))}, not a Problem; state one with wb.Problem(scene)")
+    q = posture(q, problem.scene.model.nq)
     built = problem.scene.built
     problem.check_fresh()
     with built.pool(AllPairs, lambda: AllPairs(built)).lend() as pairs:

@@ -5,6 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+SHOWN = 80
+"""Characters of a name that a sentence repeats at most."""
+
+
+def one_line(text: str, most: int = SHOWN) -> str:
+    """A text as sentences repeat it: without line ends and what cannot be printed, and no longer than `most`."""
+    plain = text if text.isprintable() else text.encode("unicode_escape", "backslashreplace").decode()
+    return plain if len(plain) <= most else f"{plain[: most - 3]}..."
+
 
 class WholebodyError(Exception):
     """Base of every error that wholebody raises on purpose."""
@@ -27,11 +36,12 @@ class UnknownNameError(WholebodyError, KeyError):
             where: the place, such as "goal 2" or "task.toml, key goals[1].frame".
         """
         known = sorted(known)
-        near = get_close_matches(str(name), known, n=4, cutoff=0.4) or known[:6]
-        hint = f"did you mean {', '.join(near)}?" if near else "there are none."
+        near = get_close_matches(str(name)[:SHOWN], known, n=4, cutoff=0.4) or known[:6]
+        hint = f"did you mean {', '.join(map(one_line, near))}?" if near else "there are none."
         place = f"{where}: " if where else ""
         self.kind, self.name, self.known = kind, name, tuple(known)
-        super().__init__(f"{place}no {kind} is called {name!r}; {hint}")
+        called = repr(name) if len(name) <= SHOWN else f"{name[:SHOWN]!r}..."
+        super().__init__(f"{place}no {kind} is called {called}; {hint}")
 
     def __str__(self) -> str:
         """Return the sentence (KeyError would show its repr)."""

@@ -12,8 +12,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody import checks
+from wholebody.errors import InputError
 from wholebody.figures.state import State
+from wholebody.geometry.placement import FARTHEST
 from wholebody.linearisation import Lineariser
 from wholebody.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
@@ -76,7 +78,7 @@ class Problem:
         """
         from wholebody.tasks import Effort
 
-        self.scene = scene
+        self.scene = checks.instance(scene, Scene, "Problem: scene", "make one with wb.Scene(figure)")
         self._revision = scene.revision
         self.start = _start(scene, start)
         self.clearance = _clearance(clearance)
@@ -92,7 +94,8 @@ class Problem:
             term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
         )
         self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
-        self.touching = tuple(_owner_pair(scene, pair) for pair in touching)
+        pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
+        self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
         with self.lend() as workspace:
             state = workspace.state.update(self.start)
             self._check_frozen(state)
@@ -265,11 +268,9 @@ def _start(scene: Scene, start: Array | str | None) -> Array:
         return np.array(figure.posture(figure.postures[0]), dtype=float)
     if isinstance(start, str):
         return np.array(figure.posture(start), dtype=float)
-    q = np.array(start, dtype=float)
-    if q.shape != (scene.model.nq,):
-        raise InputError(f"start has shape ({scene.model.nq},), not {q.shape}; begin from figure.posture('standing')")
-    if not np.isfinite(q).all():
-        raise InputError(f"start entry {int(np.flatnonzero(~np.isfinite(q))[0])} is not finite; give finite numbers")
+    q = checks.posture(start, scene.model.nq, "start")
+    if np.abs(q).max(initial=0.0) > FARTHEST:
+        raise InputError(f"start has a value of {np.abs(q).max():.3g}; give metres and radians")
     normal = pin.normalize(scene.model, q)
     if np.abs(normal - q).max(initial=0.0) > UNIT_TOLERANCE:
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
@@ -277,32 +278,22 @@ def _start(scene: Scene, start: Array | str | None) -> Array:
 
 
 def _clearance(value: float) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"clearance is a distance in metres, not {value!r}") from None
-    if not 0.0 <= number <= LARGEST_CLEARANCE:
-        raise InputError(f"clearance is {number} m; give metres from 0 to {LARGEST_CLEARANCE}")
-    return number
+    return checks.number(value, "clearance", 0.0, LARGEST_CLEARANCE, "m")
 
 
 def _checked(terms: Any, kinds: tuple[type, ...], what: str) -> Sequence[Any]:
-    try:
-        listed = list(terms)
-    except TypeError:
-        raise InputError(f"{what} is a list of terms, not {type(terms).__name__}; write {what}=[...]") from None
+    listed = checks.listed(terms, what, f"{what}=[...]")
     for number, term in enumerate(listed):
         if not isinstance(term, kinds):
             wanted = " or ".join(kind.__name__ for kind in kinds)
-            raise InputError(f"{what}[{number}] is a {type(term).__name__}, not a {wanted}; see wholebody.tasks")
+            raise InputError(f"{what}[{number}] is {checks.a(type(term))}, not a {wanted}; see wholebody.tasks")
     return listed
 
 
 def _owner_pair(scene: Scene, pair: Any) -> tuple[str, str]:
     known = {*scene.figure.segments, *scene.objects}
     if not isinstance(pair, (tuple, list)) or len(pair) != 2:
-        raise InputError(f"touching takes pairs of names such as ('right_hand', 'table'), not {pair!r}")
+        raise InputError(f"touching takes pairs of names such as ('right_hand', 'table'), not {checks.shown(pair)}")
     for name in pair:
-        if name not in known:
-            raise UnknownNameError("segment or object", str(name), known, "touching")
+        checks.known(name, known, "segment or object", "touching")
     return str(pair[0]), str(pair[1])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from threading import RLock
@@ -13,8 +13,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody import checks
+from wholebody.errors import InputError
 from wholebody.figures.state import State
+from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.geometry.shapes import Shape
@@ -43,7 +45,13 @@ class Scene:
     """
 
     def __init__(self, figure: Figure) -> None:
-        """Begin with the figure alone."""
+        """Begin with the figure alone.
+
+        Raises:
+            InputError: it is no figure.
+        """
+        if not isinstance(getattr(figure, "model", None), pin.Model):
+            raise InputError(f"Scene takes a figure, not {checks.shown(figure)}; load one with wb.load('human')")
         self.figure = figure
         self._objects: dict[str, SceneObject] = {}
         self._excluded: dict[tuple[str, str], str] = {}
@@ -126,7 +134,7 @@ class Scene:
         *,
         name: str,
         at: Any = (0.0, 0.0, 0.0),
-        color: tuple[float, float, float, float] | None = None,
+        color: Sequence[float] | None = None,
     ) -> Scene:
         """Put a thing into the world.
 
@@ -134,15 +142,15 @@ class Scene:
             shape: a `wholebody.geometry.shapes.Shape`.
             name: a name that nothing else in the scene has.
             at: (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3.
-            color: red, green, blue, alpha.
+            color: red, green, blue and, if wanted, alpha, each from 0 to 1.
 
         Returns:
             The scene, so that calls can be chained.
 
         Raises:
-            InputError: the name is taken, or the placement cannot be read.
+            InputError: the name is taken, or the shape, placement or color is none.
         """
-        return self._put(SceneObject(self._new_name(name), shape, to_placement(at), None, color))
+        return self._put(self._new_name(name), shape, at, color)
 
     def attach(
         self,
@@ -152,7 +160,7 @@ class Scene:
         name: str,
         at: Any = (0.0, 0.0, 0.0),
         rests_on: Iterable[str] = (),
-        color: tuple[float, float, float, float] | None = None,
+        color: Sequence[float] | None = None,
     ) -> Scene:
         """Give the figure a thing to carry: it moves with a segment, at `at` in the segment's frame.
 
@@ -166,18 +174,18 @@ class Scene:
             name: a name that nothing else in the scene has.
             at: where, in that frame; as for `add`.
             rests_on: more segments that it is not tested against.
-            color: red, green, blue, alpha.
+            color: red, green, blue and, if wanted, alpha, each from 0 to 1.
 
         Raises:
-            InputError: the name is taken, or the placement cannot be read.
+            InputError: the name is taken, or the shape, placement or color is none.
             UnknownNameError: there is no such frame or segment.
         """
         self.frame_id(to)
-        rests = tuple(rests_on)
+        name = self._new_name(name)
+        rests = tuple(checks.listed(rests_on, f"attach {name!r}: rests_on", "['thorax']"))
         for segment in rests:
-            if segment not in self.figure.segments:
-                raise UnknownNameError("segment", segment, self.figure.segments, f"attach {name!r}: rests_on")
-        return self._put(SceneObject(self._new_name(name), shape, to_placement(at), to, color, rests))
+            checks.known(segment, self.figure.segments, "segment", f"attach {name!r}: rests_on")
+        return self._put(name, shape, at, color, to, rests)
 
     def move(self, name: str, *, at: Any) -> Scene:
         """Place a thing anew: in the world, or in its segment's frame.
@@ -186,7 +194,7 @@ class Scene:
             UnknownNameError: there is no such object.
             InputError: the placement cannot be read.
         """
-        place = to_placement(at)
+        place = to_placement(at, f"{checks.shown(name)}: at")
         with self._lock:
             moved = self._objects[name] = replace(self._object(name), placement=place)
             if self._built is not None:
@@ -208,13 +216,15 @@ class Scene:
             self._changed()
         return self
 
-    def _put(self, thing: SceneObject) -> Scene:
-        shape: object = thing.shape
-        if not isinstance(shape, Shape):
-            kind = type(shape).__name__
-            raise InputError(f"{thing.name!r} is a {kind}, not a shape; give wb.Box, wb.Sphere, wb.Mesh or another")
+    def _put(
+        self, name: str, shape: Shape, at: Any, color: Any, to: str | None = None, rests_on: tuple[str, ...] = ()
+    ) -> Scene:
+        checks.text(name, "the name of an object")
+        checks.instance(shape, Shape, repr(name), "give wb.Box, wb.Sphere, wb.Mesh or another")
+        place = to_placement(at, f"{name!r}: at")
+        painted = None if color is None else checks.color(color, f"{name!r}: color")
         with self._lock:
-            self._objects[self._new_name(thing.name)] = thing
+            self._objects[self._new_name(name)] = SceneObject(name, shape, place, to, painted, rests_on)
             self._changed()
         return self
 
@@ -223,13 +233,10 @@ class Scene:
         self.revision += 1
 
     def _object(self, name: str) -> SceneObject:
-        if name not in self._objects:
-            raise UnknownNameError("object", name, self._objects)
-        return self._objects[name]
+        return self._objects[checks.known(name, self._objects, "object")]
 
     def _new_name(self, name: str) -> str:
-        if not isinstance(name, str) or not name:
-            raise InputError("an object needs a name; give name='table'")
+        checks.text(name, "the name of an object")
         if name in self._objects or name in self.figure.segments:
             raise InputError(
                 f"the scene already has a {name!r}; give the new object another name, or move() the old one"
@@ -252,10 +259,9 @@ class Scene:
         Raises:
             InputError: q has the wrong shape or is not finite, or `within` is not a finite number.
         """
-        if not np.isfinite(within):
-            raise InputError(f"within is a finite distance in metres, not {within}")
+        within = checks.number(within, "within", -FARTHEST, FARTHEST, "m")
         with self.lend() as workspace:
-            return workspace.near(q, float(within)).nearest_first()
+            return workspace.near(q, within).nearest_first()
 
     def penetration(self, q: Array) -> list[ObjectPenetration]:
         """How deep owners (segments, objects) are in each other at q: PD_g and the least separating translation.
@@ -282,8 +288,11 @@ class Scene:
             InputError: postures of the wrong shape, not finite or with a quaternion that is not of unit length; a
                 tolerance below 1e-5 m.
         """
+        nq = self.model.nq
+        begin, end = checks.posture(q0, nq, "q0"), checks.posture(q1, nq, "q1")
+        tolerance = checks.number(tolerance, "tolerance", 1e-5, FARTHEST, "m")
         with self.lend() as workspace:
-            return workspace.sweep.first_contact(q0, q1, tolerance=tolerance)
+            return workspace.sweep.first_contact(begin, end, tolerance=tolerance)
 
     def simplified(self, problem: Problem, *, lock: bool = True) -> Simplified:
         """A smaller problem whose answers are answers of this one: the joints, pairs and corners that matter.
@@ -300,7 +309,8 @@ class Scene:
         """
         from wholebody.simplification.simplify import Parts, simplify
 
-        if problem.scene is self:
+        checks.flag(lock, "lock")
+        if getattr(problem, "scene", None) is self:
             return simplify(problem, Parts(lock=lock))
         raise InputError("the problem is about another scene; call problem.scene.simplified(problem)")
 

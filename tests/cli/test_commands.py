@@ -91,6 +91,39 @@ def test_the_result_is_the_posture(task: Path, capsys: pytest.CaptureFixture[str
     assert (reach["angle"], gaze["distance"]) == (None, None)
 
 
+@pytest.mark.parametrize("option", ["--json", "--no-picture"])
+def test_no_browser_is_asked_for_where_no_picture_is_wanted(
+    task: Path, option: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(browser, "find_chromium", lambda: pytest.fail("a browser is looked for"))
+    assert main(["pose", str(task), "--out", "here", option]) == 0
+    assert sorted(file.name for file in Path("here").iterdir()) == ["result.json", "scene.html"]
+    assert "no picture" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["pose"], ["drag"]])
+def test_every_method_can_be_named_and_the_help_lists_them(
+    command: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main([*command, "--help"])
+    assert "qp, ccd, newton, placo, dls" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("method", ["newton", "dls", "placo"])
+def test_methods_are_called_the_same_everywhere(
+    tmp_path: Path, method: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "free.toml"
+    path.write_text(
+        "[figure]\nname = 'avatar'\n[[goal]]\ntype = 'point'\nframe = 'right_index_tip'\ntarget = [0.35, -0.25, 1.1]\n"
+    )
+    main(["pose", str(path), "--method", method, "--out", str(tmp_path / "out"), "--json"])
+    assert json.loads(capsys.readouterr().out)["method"].partition("/")[0] == method
+    path.write_text(path.read_text() + f"[method]\nname = '{method}'\n")
+    assert wb.read_task(path).method.name.partition("/")[0] == method
+
+
 @pytest.mark.usefixtures("no_browser")
 def test_a_goal_out_of_reach_is_an_answer_with_its_own_code(task: Path, capsys: pytest.CaptureFixture[str]) -> None:
     far = (
@@ -132,7 +165,7 @@ def require_browser() -> None:
         (["show", "humna"], ["no figure is called 'humna'", "human"]),
         (["show", "human", "--posture", "siting", "--save", "a.html"], ["no posture", "sitting"]),
         (["show", "human", "--save", "a.gif"], [".html", ".png"]),
-        (["show", "absent.json"], ["absent.json", "result.json"]),
+        (["show", "absent.json"], ["absent.json", "no such file"]),
         (["figure", "human", "--stature", "175"], ["175", "between"]),
         (["figure", "avatar", "--out", "a.urdf"], ["--out", "human"]),
         (["figure", "human", "--out", "a.txt"], [".urdf"]),
@@ -155,6 +188,48 @@ def test_what_is_wrong_is_one_sentence_and_code_2(
 @pytest.mark.parametrize(
     "content",
     [
+        "a = " + "[" * 3000 + "]" * 3000,
+        "a = " + "{a = " * 3000,
+        ".".join(["a"] * 100_000) + " = 1",
+        "clearance = " + "9" * 5000,
+        "clearance = 0x" + "f" * 5000,
+        "clearance = 1e999",
+        "clearance = " + "9" * 400,
+        "'a\\nb' = 1",
+        "\ufeffclearance = -1",
+        "x" * 20_000_000,
+    ],
+)
+def test_a_task_that_is_none_is_refused(task: Path, content: str, capsys: pytest.CaptureFixture[str]) -> None:
+    task.write_text(content)
+    assert main(["pose", str(task)]) == 2
+    captured = capsys.readouterr().err
+    assert captured.startswith("wholebody: ")
+    assert captured.count("\n") == 1
+    assert len(captured) < 500
+
+
+@pytest.mark.parametrize("command", [["pose"], ["show", "--save", "a.html"], ["drag", "--path", "line"]])
+@pytest.mark.parametrize("name", ["/dev/zero", "pipe.toml", ".", "x" * 5000 + ".toml", "a\0b.toml", "\ud800.toml"])
+def test_what_is_no_file_is_refused(
+    task: Path, command: list[str], name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    os.mkfifo(task.parent / "pipe.toml")
+    assert main([command[0], name, *command[1:]]) == 2
+    captured = capsys.readouterr().err
+    assert captured.startswith("wholebody: ")
+    assert captured.count("\n") == 1
+    assert len(captured) < 700
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        '{"task": "small.toml", "q": [' + "9" * 400 + "]}",
+        '{"task": "small.toml", "q": [' + "9" * 5000 + "]}",
+        "[" * 200_000,
+        '{"task": "a\\u0000b", "q": [1]}',
+        '{"task": "/dev/zero", "q": [1]}',
         "{}",
         "[]",
         '{"task": "small.toml", "q": [1, 2]}',

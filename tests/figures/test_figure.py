@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from wholebody.errors import InputError, UnknownNameError
-from wholebody.figures import load
+from wholebody.figures import Figure, load
 from wholebody.figures.denavit_hartenberg import denavit_hartenberg
 
 HUMAN = load("human")
@@ -182,3 +182,25 @@ def test_denavit_hartenberg_of_a_textbook_arm(tmp_path):
     q = figure.with_joints(figure.neutral, dict(zip(("j1", "j2", "j3"), angles, strict=True)))
     assert dh.forward(angles).homogeneous == pytest.approx(place(figure, q, "tip").homogeneous, abs=1e-12)
     assert figure.joint_values(q)["j2"] == pytest.approx(angles[1])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda model: setattr(model.inertias[2], "mass", np.nan), "mass of nan kg"),
+        (lambda model: setattr(model.inertias[2], "mass", -1.0), "mass of -1 kg"),
+        (lambda model: setattr(model.inertias[2], "mass", 1e300), r"mass of 1e\+300 kg"),
+        (lambda model: setattr(model.inertias[2], "lever", np.full(3, np.inf)), "centre of mass .* not finite"),
+        (lambda model: setattr(model.jointPlacements[2], "translation", np.full(3, np.nan)), "origin is not finite"),
+        (lambda model: setattr(model.jointPlacements[2], "translation", np.full(3, 1e300)), "origin is not finite"),
+        (lambda model: model.lowerPositionLimit.__setitem__(1, 9.0), "limits are 9 and 3"),
+        (lambda model: model.upperPositionLimit.__setitem__(1, np.nan), "limits are -3 and nan"),
+        (lambda model: model.velocityLimit.__setitem__(1, -1.0), "velocity limit is -1"),
+    ],
+)
+def test_a_model_with_numbers_that_no_body_has_is_refused(planar_arm, spoil, said):
+    arm = planar_arm((0.3, 0.3))
+    model = arm.model.copy()
+    spoil(model)
+    with pytest.raises(InputError, match=f"^arm, joint 'turn1': .*{said}"):
+        Figure("arm", model, arm.geometry, "own", arm.describe())

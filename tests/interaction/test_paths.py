@@ -58,10 +58,10 @@ def test_a_bad_file_is_named_with_its_line(text: str, message: str, tmp_path: Pa
 
 
 def test_other_mistakes_are_named(tmp_path: Path) -> None:
-    with pytest.raises(wb.FileFormatError, match="cannot be read"):
+    with pytest.raises(wb.FileFormatError, match=r"there is no such file|no UTF-8 text"):
         read_path(tmp_path / "none.csv")
     (tmp_path / "binary").write_bytes(bytes(range(256)))
-    with pytest.raises(wb.FileFormatError, match="cannot be read"):
+    with pytest.raises(wb.FileFormatError, match=r"there is no such file|no UTF-8 text"):
         read_path(tmp_path / "binary")
     with pytest.raises(wb.InputError, match="radius"):
         circle((0, 0, 0), 0.0)

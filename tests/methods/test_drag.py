@@ -77,7 +77,7 @@ def test_newton_needs_few_iterations_a_frame_and_does_not_drift(scene: wb.Scene)
 
 def test_what_cannot_be_moved_is_named(scene: wb.Scene) -> None:
     problem = _problem(scene)
-    with pytest.raises(wb.InputError, match="none has the number 3"):
+    with pytest.raises(wb.InputError, match="the number of the goal is 3; give a whole number between 0 and 0"):
         wb.Drag(problem, goal=3)
     with pytest.raises(wb.UnknownNameError, match="method"):
         wb.Drag(problem, "jacobi")

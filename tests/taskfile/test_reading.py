@@ -155,7 +155,7 @@ def test_what_is_wrong_is_told_in_one_sentence(
 def test_what_is_no_text_or_no_toml_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "task.toml"
     path.write_bytes(content)
-    with pytest.raises(WholebodyError, match="TOML"):
+    with pytest.raises(WholebodyError, match=r"TOML|UTF-8"):
         read_task(path)
 
 

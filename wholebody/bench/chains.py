@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -13,6 +11,7 @@ from numpy.typing import NDArray
 import wholebody as wb
 from wholebody.bench.problem_sets.things import Occupied
 from wholebody.errors import InputError
+from wholebody.files import Scratch
 
 Array = NDArray[np.float64]
 
@@ -57,8 +56,8 @@ def chain(joints: int, pieces: int, segments: int | None = None) -> wb.Figure:
         f'<link name="{TIP}"/><joint name="end" type="fixed"><parent link="link{joints - 1}"/><child link="{TIP}"/>'
         f'<origin xyz="{LENGTH / joints:.9f} 0 0"/></joint>'
     )
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "chain.urdf"
+    with Scratch() as folder:
+        path = folder / "chain.urdf"
         path.write_text(f'<robot name="chain">{"".join(parts)}</robot>', encoding="utf-8")
         return wb.load(path)
 

@@ -9,12 +9,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
 import wholebody as wb
 from wholebody.errors import WholebodyError
+from wholebody.files import Scratch
 
 TIMEOUT = 300.0  # s
 PEAKS = """\
@@ -121,8 +121,8 @@ def memory(task: Path) -> MemoryRow:
     Raises:
         WholebodyError: the command failed.
     """
-    with TemporaryDirectory() as folder:
-        call = [sys.executable, "-c", PEAKS, str(task), folder]
+    with Scratch() as folder:
+        call = [sys.executable, "-c", PEAKS, str(task), str(folder)]
         began = time.perf_counter()
         done = subprocess.run(call, capture_output=True, text=True, timeout=TIMEOUT, check=False)
         seconds = time.perf_counter() - began

@@ -5,22 +5,20 @@ from __future__ import annotations
 import csv
 import dataclasses
 import io
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from wholebody.errors import FileFormatError
+from wholebody.files import make_folder, write
 
 _R = TypeVar("_R")
 
 
 def write_text(path: Path, text: str) -> None:
     """Write a file whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(text, encoding="utf-8")
-    os.replace(beside, path)
+    make_folder(path.parent)
+    write(path, text)
 
 
 def write_rows(path: Path, facts: Mapping[str, str], rows: Sequence[Any]) -> None:

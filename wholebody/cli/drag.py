@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wholebody.methods import METHODS
+
 if TYPE_CHECKING:
     from wholebody.bench.drag import DragRow
     from wholebody.interaction.dragging import Dragged, DragJudgement
@@ -38,7 +40,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser = commands.add_parser("drag", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
     parser.add_argument("task", type=Path, metavar="TASK.toml", help="the task file")
     parser.add_argument("--path", required=True, metavar="FILE|circle|line", help="along what the goal moves")
-    parser.add_argument("--method", default="newton", metavar="NAME", help="newton, qp or ccd (default: newton)")
+    parser.add_argument("--method", default="newton", metavar="NAME", help=f"{', '.join(METHODS)} (default: newton)")
     parser.add_argument("--goal", type=int, metavar="N", help="which goal, from 0 (default: first point or frame)")
     parser.add_argument("--frames", type=int, metavar="N", help="frames (default: so that it moves at 0.5 m/s)")
     parser.add_argument("--size", type=float, default=0.1, metavar="M", help="radius of a circle, m (default: 0.1)")
@@ -130,6 +132,7 @@ def _corners(problem: Problem, goal: int, arguments: argparse.Namespace) -> Any:
     import numpy as np
 
     from wholebody.errors import FileFormatError
+    from wholebody.files import is_file
     from wholebody.interaction.dragging import goal_place, present_place
     from wholebody.interaction.paths import circle, read_path
     from wholebody.tasks.inputs import point
@@ -139,7 +142,7 @@ def _corners(problem: Problem, goal: int, arguments: argparse.Namespace) -> Any:
         way = end[None]
     elif arguments.path == "circle":
         way = circle(goal_place(problem, goal), arguments.size, arguments.normal)
-    elif Path(arguments.path).is_file():
+    elif is_file(arguments.path):
         way = read_path(arguments.path)
     else:
         raise FileFormatError(f"--path: there is no file {arguments.path}; give line, circle or a file of places")

@@ -57,9 +57,6 @@ def _write(name: str, options: dict[str, Any], out: Path) -> int:
     if out.suffix != ".urdf":
         raise InputError(f"--out: {out} does not end in .urdf; give it that ending")
     person = body(options.get("sex", "male"), options.get("stature"), options.get("mass"))
-    try:
-        write_human(out, person)
-    except OSError as error:
-        raise InputError(f"{out}: cannot be written ({error.strerror}); give another place") from None
+    write_human(out, person)
     print(f"wrote {out}: {person.sex}, {person.stature:.3f} m, {person.mass:.1f} kg")
     return 0

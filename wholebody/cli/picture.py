@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody import files
 from wholebody.errors import InputError, MissingPackageError
 from wholebody.problem import Problem
 from wholebody.taskfile.task import View
@@ -20,21 +22,23 @@ def make_folder(folder: Path) -> None:
         InputError: it cannot be made.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made ({error.strerror}); give another folder with --out") from None
+        files.make_folder(folder)
+    except InputError as error:
+        raise InputError(f"--out: {error}") from None
 
 
-def viewer_of(problem: Problem, view: View, title: str) -> Viewer:
-    """A viewer of the problem's scene, its camera as the task asks."""
-    viewer = Viewer(problem.scene, see_through=view.see_through, title=title)
+def viewer_of(problem: Problem, view: View, title: str, **served: Any) -> Viewer:
+    """A viewer of the problem's scene, its camera as the task asks; `served` is the viewer's host and port."""
+    viewer = Viewer(problem.scene, see_through=view.see_through, title=title, **served)
     if view.eye is not None:
         viewer.look(view.eye, view.target)
     return viewer
 
 
-def draw(problem: Problem, q: NDArray[np.float64], view: View, folder: Path, title: str) -> tuple[list[Path], str]:
-    """Write scene.html and, where there is a Chromium, scene.png.
+def draw(
+    problem: Problem, q: NDArray[np.float64], view: View, folder: Path, title: str, *, picture: bool = True
+) -> tuple[list[Path], str]:
+    """Write scene.html and, where that is asked for and there is a Chromium, scene.png.
 
     Args:
         problem: whose scene and goals are drawn.
@@ -42,6 +46,7 @@ def draw(problem: Problem, q: NDArray[np.float64], view: View, folder: Path, tit
         view: the camera.
         folder: where to write; it exists.
         title: of the page.
+        picture: whether scene.png is asked for.
 
     Returns:
         The files, and a sentence for people where a picture could not be drawn.
@@ -49,6 +54,8 @@ def draw(problem: Problem, q: NDArray[np.float64], view: View, folder: Path, tit
     with viewer_of(problem, view, title) as viewer:
         viewer.show(q, problem=problem)
         written = [viewer.save(folder / "scene.html")]
+        if not picture:
+            return written, ""
         try:
             written.append(viewer.picture(folder / "scene.png"))
         except MissingPackageError as error:

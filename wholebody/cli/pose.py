@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.methods import METHODS
+
 HELP = "find a posture for a task file"
 DESCRIPTION = """\
 Find a posture for a task file, print how good it is, and write into a folder:
 
   result.json   the posture, joints by name (rad), and its assessment
   scene.html    the scene, for any browser, without a network
-  scene.png     a picture of it (needs Chromium)
+  scene.png     a picture of it (needs Chromium; not with --json or --no-picture)
 
 docs/taskfile.md lists all that a task file can say."""
 EPILOG = """\
@@ -26,19 +28,21 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("pose", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
     parser.add_argument("task", type=Path, metavar="TASK.toml", help="the task file")
-    parser.add_argument("--method", metavar="NAME", help="method to use instead of the file's: qp")
+    parser.add_argument("--method", metavar="NAME", help=f"instead of the file's: {', '.join(METHODS)}")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)")
-    parser.add_argument("--json", action="store_true", help="print the result as JSON instead of tables")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON instead of tables; no picture")
+    parser.add_argument("--no-picture", action="store_true", help="leave scene.png out, which takes seconds")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Pose, report and write; 1 where the posture is not a solution."""
     out = arguments.out or Path("out") / arguments.task.stem
-    return pose(arguments.task, arguments.method, out, as_json=arguments.json)
+    picture = not (arguments.no_picture or arguments.json)
+    return pose(arguments.task, arguments.method, out, as_json=arguments.json, draw=picture)
 
 
-def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False) -> int:
+def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False, draw: bool = True) -> int:
     """Pose the figure of a task file.
 
     Args:
@@ -46,6 +50,7 @@ def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False) ->
         method: name of the method, None for what the file asks for.
         out: folder to write to; made if absent.
         as_json: print the result as JSON instead of tables.
+        draw: draw scene.png too.
 
     Returns:
         The exit code.
@@ -55,26 +60,27 @@ def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False) ->
     """
     from rich.console import Console
 
+    from wholebody import files
     from wholebody.cli import picture, result, tables
     from wholebody.methods.solve import method_named, solve
     from wholebody.taskfile import read_task
 
     console = Console()
     notes = Console(stderr=True) if as_json else console
+    chosen = None if method is None else method_named(method)
     with notes.status("reading the task"):
         task = read_task(path)
-        chosen = method_named(method) if method else task.method
     picture.make_folder(out)
     with notes.status("posing"):
-        solution = solve(task.problem, chosen)
+        solution = solve(task.problem, chosen or task.method)
     text = result.as_json(result.describe(task, solution, out))
-    result.write(out / "result.json", text)
+    files.write(out / "result.json", text)
     if as_json:
         print(text, end="")
     else:
         tables.show_solution(console, task, solution)
     with notes.status("drawing"):
-        written, note = picture.draw(task.problem, solution.q, task.view, out, task.title)
+        written, note = picture.draw(task.problem, solution.q, task.view, out, task.title, picture=draw)
     for file in (out / "result.json", *written):
         notes.print(f"wrote {file}", highlight=False, soft_wrap=True)
     if note:

@@ -12,8 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.errors import FileFormatError, InputError
+from wholebody.errors import FileFormatError, one_line
 from wholebody.figures.state import State
+from wholebody.files import read_text
+from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem, Solution
 from wholebody.taskfile import Task, read_task
 from wholebody.version import __version__
@@ -81,20 +83,6 @@ def as_json(description: dict[str, Any]) -> str:
     return json.dumps(_finite(description), indent=2, allow_nan=False) + "\n"
 
 
-def write(path: Path, text: str) -> None:
-    """Write a file whole or not at all.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    beside = path.with_name(path.name + ".part")
-    try:
-        beside.write_text(text, encoding="utf-8")
-        os.replace(beside, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another folder with --out") from None
-
-
 def read(path: Path) -> tuple[Task, Array]:
     """Read a result: the task it belongs to, and its posture (nq,).
 
@@ -102,10 +90,12 @@ def read(path: Path) -> tuple[Task, Array]:
         FileFormatError: it is not a result, or not of the task as it is now.
         WholebodyError: its task cannot be read.
     """
+    text = read_text(path, "result")
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise FileFormatError(f"{path}: is no JSON ({error}); give a result.json that `wholebody pose` wrote") from None
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        why = one_line(str(error))
+        raise FileFormatError(f"{path}: is no JSON ({why}); give a result.json that `wholebody pose` wrote") from None
     if not isinstance(data, dict) or not isinstance(data.get("task"), str) or not isinstance(data.get("q"), list):
         raise FileFormatError(f"{path}: has no task and q; give a result.json that `wholebody pose` wrote")
     task = read_task(path.parent / data["task"])
@@ -113,7 +103,7 @@ def read(path: Path) -> tuple[Task, Array]:
 
 
 def _posture(path: Path, entries: list[Any], problem: Problem) -> Array:
-    numbers = [entry for entry in entries if isinstance(entry, (int, float)) and math.isfinite(entry)]
+    numbers = [entry for entry in entries if isinstance(entry, (int, float)) and abs(entry) <= FARTHEST]
     wanted = problem.scene.model.nq
     if len(entries) != wanted or len(numbers) != wanted:
         raise FileFormatError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,9 +14,10 @@ if TYPE_CHECKING:
     from wholebody.problem import Problem
     from wholebody.taskfile.task import View
 
+LOCAL = "127.0.0.1"
 HELP = "look at a figure, a task or a result"
 DESCRIPTION = """\
-Show in a browser, until its tab is closed (or Ctrl-C):
+Show in a browser. It waits for the first tab, however late, and ends when the last one is closed, or with Ctrl-C:
 
   a figure   human, avatar, hand, or the path of a URDF
   a task     a task file, as it starts, with its goals
@@ -24,6 +26,7 @@ EPILOG = """\
 examples:
   wholebody show human --posture sitting
   wholebody show out/shelf/result.json
+  wholebody show shelf.toml --port 7777            # on another machine: ssh -L 7777:localhost:7777 HOST, then this
   wholebody show shelf.toml --save shelf.png"""
 
 
@@ -34,24 +37,35 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser.add_argument("what", metavar="FIGURE|TASK|RESULT", help="what to show")
     parser.add_argument("--posture", metavar="NAME", help="a posture of the figure by name")
     parser.add_argument("--save", type=Path, metavar="FILE", help="write FILE.html or FILE.png; open no browser")
+    parser.add_argument(
+        "--port", type=int, default=0, metavar="N", help="of the live page (default: a free one from 7000)"
+    )
+    parser.add_argument(
+        "--host", default=LOCAL, metavar="ADDRESS",
+        help=f"of this machine to serve the page at (default: {LOCAL}; 0.0.0.0 lets everybody who reaches it look on)",
+    )  # fmt: skip
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Show, and wait until it is closed."""
+    """Show, wait for the first tab, and until the last one is closed."""
     from wholebody.cli.picture import viewer_of
     from wholebody.errors import InputError
 
     save: Path | None = arguments.save
     if save is not None and save.suffix.lower() not in (".html", ".png"):
         raise InputError(f"--save: {save} ends in neither .html nor .png; give it one of them")
+    if save is not None and (arguments.port or arguments.host != LOCAL):
+        raise InputError("--port and --host are for the live page; leave them out beside --save")
     problem, q, view, title = _subject(arguments.what)
     if arguments.posture is not None:
         q = problem.scene.figure.posture(arguments.posture)
-    with viewer_of(problem, view, title) as viewer:
+    with viewer_of(problem, view, title, host=arguments.host, port=arguments.port) as viewer:
         viewer.show(q, problem=problem)
         if save is None:
+            print(f"showing {title} at {viewer.url}; Ctrl-C ends it", flush=True)
             viewer.open()
+            viewer.wait(math.inf)
             viewer.wait_until_closed()
         elif save.suffix.lower() == ".html":
             print(f"wrote {viewer.save(save)}")

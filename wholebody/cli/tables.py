@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from wholebody.cli.result import goals_left
@@ -37,15 +38,15 @@ def show_solution(console: Console, task: Task, solution: Solution) -> None:
     """Print everything about a solution."""
     problem, judged = task.problem, solution.assessment
     figure = problem.scene.figure
-    console.print(f"[bold]{task.title}[/]", highlight=False)
+    console.print(escape(task.title), style="bold", highlight=False)
     console.print(
-        f"{figure.name}: {figure.model.nv} degrees of freedom, {len(problem.scene.objects)} things, "
+        f"{escape(figure.name)}: {figure.model.nv} degrees of freedom, {len(problem.scene.objects)} things, "
         f"{problem.scene.geometry.ngeoms} pieces, {len(problem.scene.geometry.collisionPairs)} pairs that can touch",
         highlight=False,
     )
     console.print(
         f"[{_COLORS[solution.status]}]{solution.status}[/] by {solution.method} in {1e3 * solution.seconds:.0f} ms, "
-        f"{solution.iterations} iterations: {solution.message}\n",
+        f"{solution.iterations} iterations: {escape(solution.message)}\n",
         highlight=False,
     )
     console.print(_goals(task, solution))
@@ -64,7 +65,7 @@ def _goals(task: Task, solution: Solution) -> Table:
     for goal in goals_left(task, solution.q):
         distance = "" if goal.distance is None else f"{1e3 * goal.distance:.3f} mm"
         angle = "" if goal.angle is None else f"{math.degrees(goal.angle):.3f} deg"
-        made.add_row(goal.name, distance, angle)
+        made.add_row(escape(goal.name), distance, angle)
     return made
 
 
@@ -77,7 +78,7 @@ def _contacts(problem: Problem, solution: Solution) -> Table:
         nearest.setdefault((owners[a], owners[b]), float(distance))
     made = table("nearest pairs", "", "distance")
     for (a, b), distance in list(nearest.items())[:CONTACTS]:
-        made.add_row(a, b, f"{round(1e3 * distance, 2) + 0.0:.2f} mm")
+        made.add_row(escape(a), escape(b), f"{round(1e3 * distance, 2) + 0.0:.2f} mm")
     if len(nearest) > CONTACTS:
         made.add_row(f"and {len(nearest) - CONTACTS} more within {1e3 * (problem.clearance + NEAR):.0f} mm", "", "")
     if not nearest:
@@ -98,8 +99,9 @@ def show_figure(console: Console, figure: Figure) -> None:
     model = figure.model
     mass = sum(inertia.mass for inertia in model.inertias)
     console.print(
-        f"[bold]{figure.name}[/]: {model.nv} degrees of freedom, {mass:.1f} kg, {figure.geometry.ngeoms} pieces "
-        f"({figure.detail}), {len(figure.geometry.collisionPairs)} pairs that can touch, {figure.root} root\n",
+        f"[bold]{escape(figure.name)}[/]: {model.nv} degrees of freedom, {mass:.1f} kg, "
+        f"{figure.geometry.ngeoms} pieces ({figure.detail}), "
+        f"{len(figure.geometry.collisionPairs)} pairs that can touch, {figure.root} root\n",
         highlight=False,
     )
     names = table("names", "")
@@ -111,7 +113,7 @@ def show_figure(console: Console, figure: Figure) -> None:
         "segments": figure.segments,
     }
     for kind, known in listed.items():
-        names.add_row(kind, ", ".join(known))
+        names.add_row(kind, escape(", ".join(known)))
     console.print(names)
     joints = table("joint", "lowest", "highest", title="")
     limits = figure.limits
@@ -124,7 +126,9 @@ def show_figure(console: Console, figure: Figure) -> None:
         joint = model.joints[figure.joint_id(name)]
         low, high = ranges.get(joint.idx_q, (-math.inf, math.inf))
         slides = joint.shortname().startswith("JointModelP")
-        joints.add_row(name, *(f"{end:.3f} m" if slides else f"{math.degrees(end):.1f} deg" for end in (low, high)))
+        joints.add_row(
+            escape(name), *(f"{end:.3f} m" if slides else f"{math.degrees(end):.1f} deg" for end in (low, high))
+        )
     console.print(joints)
     if figure.notes:
         console.print("\nnotes", style="dim")

@@ -90,7 +90,7 @@ def use_tool(name: str) -> str:
 
 def list_methods(_: str) -> str:
     """Names of the methods, separated by spaces."""
-    from wholebody.methods.solve import METHODS
+    from wholebody.methods import METHODS
 
     return " ".join(METHODS)
 

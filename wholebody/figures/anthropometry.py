@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.checks import number, shown
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.tables import keyed, table
 
@@ -94,15 +94,15 @@ def body(sex: str = "male", stature: float | None = None, mass: float | None = N
         InputError: an unknown sex, or a number that no person has.
     """
     if not isinstance(sex, str) or sex.lower() not in _SEXES:
-        raise InputError(f"sex is {sex!r}; give 'male' or 'female'")
+        raise InputError(f"sex is {shown(sex)}; give 'male' or 'female'")
     sex = sex.lower()
     column = _SEXES[sex]
     median = keyed("design_cases", "case")[f"{column}50"]
     if mass is None and stature is not None:
         factor, exponent = _EXPECTED_MASS[column]
-        mass = factor * _number("stature", stature, STATURE_RANGE, "m") ** exponent
-    height = _number("stature", float(median["stature_m"]) if stature is None else stature, STATURE_RANGE, "m")
-    weight = _number("mass", float(median["mass_kg_same_percentile"]) if mass is None else mass, MASS_RANGE, "kg")
+        mass = factor * number(stature, "stature", *STATURE_RANGE, "m") ** exponent
+    height = number(float(median["stature_m"]) if stature is None else stature, "stature", *STATURE_RANGE, "m")
+    weight = number(float(median["mass_kg_same_percentile"]) if mass is None else mass, "mass", *MASS_RANGE, "kg")
     index = weight / height**2
     if not BODY_MASS_INDEX_RANGE[0] <= index <= BODY_MASS_INDEX_RANGE[1]:
         low, high = (limit * height**2 for limit in BODY_MASS_INDEX_RANGE)
@@ -132,14 +132,3 @@ def _row(name: str, column: str, key: str) -> Mapping[str, str]:
     if key not in rows:
         raise UnknownNameError("segment" if name == "segments" else "body part", key, rows)
     return rows[key]
-
-
-def _number(name: str, value: Any, limits: tuple[float, float], unit: str) -> float:
-    low, high = limits
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not low <= number <= high:
-        raise InputError(f"{name} is {value!r}; give a number between {low:g} and {high:g} {unit}")
-    return number

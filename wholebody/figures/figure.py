@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody import checks
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.description import (
     Array,
@@ -18,7 +19,47 @@ from wholebody.figures.description import (
     limits_of,
 )
 
+LARGEST = 1e6
+"""Largest value of a joint, radians or metres, and largest tolerance: what is beyond is a slip."""
+
+HEAVIEST = 1e6
+"""Kilograms: greatest mass of what one joint carries."""
+
 ROOT_JOINT = "root_joint"
+
+
+def check_model(model: pin.Model, name: str) -> None:
+    """Refuse a model whose numbers no body has: they would come back as postures that are not numbers.
+
+    Args:
+        model: Pinocchio's model.
+        name: of the figure, for the sentence.
+
+    Raises:
+        InputError: a mass is negative or beyond `HEAVIEST`, a place, an inertia or a limit is not a number, or a lower
+            limit is above the upper one.
+    """
+    for joint in range(1, model.njoints):
+        inertia, at = model.inertias[joint], model.jointPlacements[joint]
+        where = f"{name}, joint {model.names[joint]!r}"
+        if not 0.0 <= inertia.mass <= HEAVIEST:
+            raise InputError(f"{where}: what it carries has a mass of {inertia.mass:g} kg; give 0 to {HEAVIEST:g} kg")
+        for what, values in (("centre of mass", inertia.lever), ("inertia", inertia.inertia)):
+            if not np.isfinite(values).all():
+                raise InputError(f"{where}: the {what} of what it carries is not finite; give finite numbers")
+        if not (np.isfinite(at.rotation).all() and (np.abs(at.translation) <= LARGEST).all()):
+            raise InputError(f"{where}: its origin is not finite or beyond {LARGEST:g} m; give metres")
+    low, high = model.lowerPositionLimit, model.upperPositionLimit
+    wrong = np.flatnonzero(~(low <= high))
+    if len(wrong):
+        joint = next(j for j in model.joints if j.idx_q <= wrong[0] < j.idx_q + j.nq)
+        ends = f"{low[wrong[0]]:g} and {high[wrong[0]]:g}"
+        raise InputError(f"{name}, joint {model.names[joint.id]!r}: its limits are {ends}; give the lower one first")
+    if not (model.velocityLimit >= 0.0).all():
+        wrong = np.flatnonzero(~(model.velocityLimit >= 0.0))
+        joint = next(j for j in model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
+        speed = model.velocityLimit[wrong[0]]
+        raise InputError(f"{name}, joint {model.names[joint.id]!r}: its velocity limit is {speed:g}; give 0 or more")
 
 
 class Figure:
@@ -57,7 +98,12 @@ class Figure:
         description: Description,
         visual: pin.GeometryModel | None = None,
     ) -> None:
-        """Assemble a figure; `wholebody.load` is the usual way to get one."""
+        """Assemble a figure; `wholebody.load` is the usual way to get one.
+
+        Raises:
+            InputError: a mass, a place or a limit of the model is not finite or cannot be.
+        """
+        check_model(model, name)
         self.name, self.model, self.geometry, self.detail = name, model, geometry, detail
         self.visual = geometry if visual is None else visual
         self.groups = MappingProxyType(dict(description.groups))
@@ -114,8 +160,7 @@ class Figure:
         Raises:
             UnknownNameError: with the nearest names.
         """
-        if name not in self._description.postures:
-            raise UnknownNameError("posture", name, self.postures)
+        checks.known(name, self.postures, "posture")
         if name not in self._made:
             self._made[name] = self._description.postures[name](self)
         return np.array(self._made[name])
@@ -131,9 +176,9 @@ class Figure:
         Raises:
             UnknownNameError: with the nearest names.
         """
-        if name not in self._frame_ids:
-            raise UnknownNameError("frame", name, {*self.frames, *self.segments})
-        return int(self._frame_ids[name])
+        return int(
+            self._frame_ids[checks.known(name, self._frame_ids, "frame", offered={*self.frames, *self.segments})]
+        )
 
     def joint_id(self, name: str) -> int:
         """Return the index of a joint in the model; "root" is the free root.
@@ -141,20 +186,21 @@ class Figure:
         Raises:
             UnknownNameError: with the nearest names.
         """
-        if name == "root" and self.root == "free":
+        if isinstance(name, str) and name == "root" and self.root == "free":
             return 1
-        if name not in self._joint_ids:
-            raise UnknownNameError("joint", name, self.joints)
-        return self._joint_ids[name]
+        return self._joint_ids[checks.known(name, self._joint_ids, "joint", offered=self.joints)]
 
     def joint_names(self, names: str | Iterable[str]) -> tuple[str, ...]:
         """Return joint names with groups replaced by their joints, each once, in the order given.
 
         Raises:
             UnknownNameError: neither a joint nor a group.
+            InputError: not a list of names.
         """
         found: dict[str, None] = {}
-        for name in [names] if isinstance(names, str) else names:
+        for name in [names] if isinstance(names, str) else checks.listed(names, "names", "['left_arm']"):
+            if not isinstance(name, str):
+                raise InputError(f"{checks.shown(name)} is not the name of a joint or group; give a text")
             if name in self.groups:
                 found.update(dict.fromkeys(self.groups[name]))
             elif name in self._joint_ids or (name == "root" and self.root == "free"):
@@ -205,17 +251,19 @@ class Figure:
             InputError: a value that is not finite, or a joint with more than one degree of freedom.
         """
         q = self._checked(q).copy()
-        for name, value in values.items():
+        if not isinstance(values, Mapping):
+            raise InputError(
+                f"values is {checks.shown(values)}; give values by joint, such as {{'left_elbow_flexion': 0.5}}"
+            )
+        for name, given in values.items():
             joint = self.model.joints[self.joint_id(name)]
-            number = float(value)
-            if not np.isfinite(number):
-                raise InputError(f"joint {name!r} is {value!r}; give a finite number")
+            value = checks.number(given, f"joint {name!r}", -LARGEST, LARGEST, "radians (metres for sliding joints)")
             if name in self.followers:
-                q[joint.idx_q] = self.followers[name].leading(number)
+                q[joint.idx_q] = self.followers[name].leading(value)
             elif joint.nq == 1:
-                q[joint.idx_q] = number
+                q[joint.idx_q] = value
             elif (joint.nq, joint.nv) == (2, 1):
-                q[joint.idx_q : joint.idx_q + 2] = np.cos(number), np.sin(number)
+                q[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
             else:
                 raise InputError(
                     f"joint {name!r} has {joint.nv} degrees of freedom; set its part of the posture itself"
@@ -227,6 +275,7 @@ class Figure:
 
         Infinite where there is no limit. Where q is beyond a limit, both bounds have the sign of the way back.
         """
+        q = self._checked(q)
         lower, upper = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
         idx_q, idx_v, low, high = self.limits
         lower[idx_v], upper[idx_v] = low - q[idx_q], high - q[idx_q]
@@ -234,6 +283,7 @@ class Figure:
 
     def within_limits(self, q: Array, tolerance: float = 1e-9) -> bool:
         """Whether every limited joint is within its limits, to a tolerance for rounding."""
+        tolerance = checks.number(tolerance, "tolerance", 0.0, LARGEST)
         value = self._checked(q)[self.limits.idx_q]
         return bool(((value >= self.limits.lower - tolerance) & (value <= self.limits.upper + tolerance)).all())
 
@@ -264,9 +314,4 @@ class Figure:
         return self._description
 
     def _checked(self, q: Any) -> Array:
-        posture = np.asarray(q, dtype=float)
-        if posture.shape != (self.model.nq,):
-            raise InputError(
-                f"a posture has shape ({self.model.nq},), not {posture.shape}; start from figure.posture(...)"
-            )
-        return posture
+        return checks.posture(q, self.model.nq)

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from wholebody.errors import FileFormatError, UnknownNameError
+from wholebody.checks import listed, path, shown, text, whole
+from wholebody.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.figures.figure import Figure
+from wholebody.files import check_file, is_file
+
+MOST_SAMPLES = 100_000
+"""Most random postures by which always-overlapping pairs are found: more take minutes."""
+
+LAST_SEED = 2**32 - 1
 
 
 def load(spec: str | PathLike[str], **options: Any) -> Figure:
@@ -34,15 +41,18 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
     from wholebody.figures.mjcf_figure import xml_figure
     from wholebody.figures.urdf_figure import urdf_figure
 
+    if not isinstance(spec, (str, PathLike)):
+        raise InputError(f"load: spec is {shown(spec)}; give 'human', 'avatar', 'hand', or the path of a URDF")
     builders: dict[str, Callable[..., Figure]] = {"human": human_figure, "avatar": avatar_figure, "hand": hand_figure}
-    name = fspath(spec)
+    name = str(path(spec, "load: spec"))
     if name in builders:
         _check_options(builders[name], options, f"load({name!r})")
         return builders[name](**options)
-    if Path(name).suffix == "" and not Path(name).exists():
+    if Path(name).suffix == "" and not is_file(name):
         raise UnknownNameError("figure", name, builders, "load")
     if Path(name).suffix and Path(name).suffix.lower() not in (".urdf", ".xml", ".xacro"):
         raise FileFormatError(f"{name}: a figure is a URDF or MJCF file, or 'human', 'avatar', 'hand'; convert it")
+    check_file(name, "figure")
     builder = xml_figure if Path(name).suffix.lower() == ".xml" else urdf_figure
     _check_options(builder, options, f"load({name!r})")
     return builder(name, **options)
@@ -50,6 +60,17 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
 
 def _check_options(builder: Callable[..., Figure], options: dict[str, Any], where: str) -> None:
     known = [name for name in inspect.signature(builder).parameters if name != "path"]
-    for option in options:
+    for option, value in options.items():
         if option not in known:
             raise UnknownNameError("option", option, known, where)
+        if option == "package_dirs":
+            folders = (
+                [value] if isinstance(value, (str, PathLike)) else listed(value, f"{where}: {option}", "['share']")
+            )
+            options[option] = [path(folder, f"{where}: {option}") for folder in folders]
+        elif option in ("root", "detail", "side"):
+            text(value, f"{where}: {option}")
+        elif option == "samples":
+            whole(value, f"{where}: {option}", 0, MOST_SAMPLES)
+        elif option == "seed":
+            whole(value, f"{where}: {option}", 0, LAST_SEED)

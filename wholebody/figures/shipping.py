@@ -13,6 +13,7 @@ from wholebody.figures.hand import MESH, hand_blueprint, hand_figure
 from wholebody.figures.human import blueprint
 from wholebody.figures.human_figure import figure_of, human_figure
 from wholebody.figures.urdf_extension import extension_text
+from wholebody.files import make_folder, write
 
 
 def write_human(path: str | os.PathLike[str], person: Body) -> None:
@@ -49,7 +50,5 @@ def ellipsoid_stl() -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(path.name + ".part")
-    beside.write_text(text, encoding="utf-8")
-    os.replace(beside, path)
+    make_folder(path.parent)
+    write(path, text)

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.checks import instance, posture, whole
 from wholebody.errors import InputError
 
 Array = NDArray[np.float64]
@@ -45,6 +46,7 @@ class State:
 
     def __init__(self, model: pin.Model) -> None:
         """Allocate Pinocchio's data for `model`."""
+        instance(model, pin.Model, "model", "give figure.model")
         self.model = model
         self.data = model.createData()
         self.q: Array = pin.neutral(model)
@@ -64,13 +66,7 @@ class State:
         Raises:
             InputError: q has the wrong shape, or a value that is not finite.
         """
-        q = np.asarray(q, dtype=float)
-        if q.shape != (self.model.nq,):
-            raise InputError(f"a posture has shape ({self.model.nq},), not {q.shape}; start from figure.posture(...)")
-        if not np.isfinite(q).all():
-            raise InputError(
-                f"posture entry {int(np.flatnonzero(~np.isfinite(q))[0])} is not finite; give finite numbers"
-            )
+        q = posture(q, self.model.nq)
         if not pin.isNormalized(self.model, q, UNIT_TOLERANCE):
             raise InputError(
                 "the posture's quaternion is not of unit length; normalise it with pin.normalize(model, q)"
@@ -95,8 +91,11 @@ class State:
 
     def frame(self, index: int) -> pin.SE3:
         """Placement in the world of the frame with this index."""
+        if type(index) is not int:
+            index = whole(index, "the index of a frame", 0, self.model.nframes - 1)
         placement = self._frames.get(index)
         if placement is None:
+            whole(index, "the index of a frame", 0, self.model.nframes - 1)
             placement = self._frames[index] = pin.updateFramePlacement(self.model, self.data, index)
         return placement
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.errors import FileFormatError, InputError, MissingPackageError
+from wholebody.files import check_file
 from wholebody.geometry.convex import check_mesh
 from wholebody.geometry.pieces import Array
 
@@ -42,12 +43,11 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
     except ImportError:
         raise MissingPackageError("reading meshes needs trimesh: pip install trimesh") from None
     path = Path(path)
+    check_file(path, "mesh")
     if path.suffix.lower() not in SUFFIXES:
         raise FileFormatError(
             f"mesh {path}: {path.suffix or 'no suffix'} is not among {', '.join(SUFFIXES)}; convert the file"
         )
-    if not path.is_file():
-        raise FileFormatError(f"mesh {path}: there is no such file")
     if path.stat().st_size == 0:
         raise FileFormatError(f"mesh {path}: the file is empty")
     if path.suffix.lower() == ".dae" and find_spec("collada") is None:

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.checks import array, number, shown
 from wholebody.errors import InputError
 
 Array = NDArray[np.float64]
@@ -40,13 +41,7 @@ def check_length(value: object, what: str) -> float:
     Raises:
         InputError: not a number, or not within SMALLEST ... LARGEST metres.
     """
-    try:
-        length = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise InputError(f"{what} is {value!r}; give a number in metres") from None
-    if not SMALLEST <= length <= LARGEST:
-        raise InputError(f"{what} is {length!r}; give a length between {SMALLEST} and {LARGEST:g} m")
-    return length
+    return number(value, what, SMALLEST, LARGEST, "m")
 
 
 def check_vector(value: object, what: str) -> tuple[float, float, float]:
@@ -55,10 +50,7 @@ def check_vector(value: object, what: str) -> tuple[float, float, float]:
     Raises:
         InputError: not three numbers, or one that is not finite.
     """
-    try:
-        vector = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        vector = np.empty(0)
+    vector = array(value, what, "three finite numbers")
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"{what} is {value!r}; give three finite numbers")
+        raise InputError(f"{what} is {shown(value)}; give three finite numbers")
     return float(vector[0]), float(vector[1]), float(vector[2])

@@ -9,10 +9,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.checks import array
 from wholebody.errors import InputError
 
 PlacementLike: TypeAlias = Sequence[float] | NDArray[np.float64] | pin.SE3
 """(x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 homogeneous matrix, or a ``pinocchio.SE3``."""
+
+FARTHEST = 1e6
+"""Metres from the origin beyond which nothing stands: what is placed there loses more than coal's accuracy."""
 
 ROUNDING = 1e-3
 """How far a rotation may be from exact: numbers typed with four digits are repaired, anything worse is refused."""
@@ -36,12 +40,7 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
     """
     if isinstance(at, pin.SE3):
         return _rigid(np.asarray(at.rotation), np.asarray(at.translation), what)
-    try:
-        values = np.asarray(at, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(
-            f"{what}: {at!r} is not made of numbers; give (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 or a pin.SE3"
-        ) from None
+    values = array(at, what, "(x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3")
     if values.shape == (3,):
         return _rigid(np.eye(3), values, what)
     if values.shape == (7,):
@@ -70,6 +69,8 @@ def _rigid(rotation: NDArray[np.float64], translation: NDArray[np.float64], what
     """Check both parts, and round the rotation to the nearest orthonormal matrix (polar decomposition)."""
     if not (np.isfinite(rotation).all() and np.isfinite(translation).all()):
         raise InputError(f"{what}: not every value is finite; give finite numbers")
+    if max(np.abs(translation).max(), np.abs(rotation).max()) > FARTHEST:
+        raise InputError(f"{what}: a value is beyond {FARTHEST:g}; give metres")
     error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     if error > ROUNDING:
         raise InputError(

@@ -5,19 +5,29 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from pathlib import Path
+from os import PathLike
 from typing import Literal
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from wholebody.checks import array, choice, number, path, shown, whole
 from wholebody.errors import InputError
 from wholebody.geometry.convex import check_mesh, convex_pieces
 from wholebody.geometry.hull import check_points, hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.meshes import Y_UP, read_mesh
-from wholebody.geometry.pieces import Array, Piece, check_length, check_vector
+from wholebody.geometry.pieces import LARGEST, Array, Piece, check_length, check_vector
+
+MAX_VERTICES = (8, 256)
+"""Least and greatest `Mesh.max_vertices`."""
+
+MOST_CORNERS = 2**31
+"""Greatest index of a vertex."""
+
+THRESHOLD = (0.01, 1.0)
+"""Least and greatest `Mesh.threshold`."""
 
 __all__ = ["Box", "Capsule", "Ellipsoid", "HalfSpace", "Hull", "Mesh", "Piece", "Shape", "Sphere"]
 
@@ -139,9 +149,9 @@ class HalfSpace(Shape):
         length = math.hypot(*normal)
         if not 1e-9 < length < 1e9:
             raise InputError(
-                f"HalfSpace normal is {self.normal!r}; give a direction out of the solid, such as (0, 0, 1)"
+                f"HalfSpace normal is {shown(self.normal)}; give a direction out of the solid, such as (0, 0, 1)"
             )
-        offset, _, _ = check_vector((self.offset, 0.0, 0.0), "HalfSpace offset and two zeros")
+        offset = number(self.offset, "HalfSpace offset", -LARGEST, LARGEST, "m")
         object.__setattr__(self, "normal", tuple(x / length for x in normal))
         object.__setattr__(self, "offset", offset)
 
@@ -163,7 +173,7 @@ class Hull(Shape):
     points: Array
 
     def __post_init__(self) -> None:
-        points = check_points(self.points, "Hull")
+        points = check_points(array(self.points, "Hull points", "an array of shape (n, 3)"), "Hull")
         hull_piece(points, "Hull")
         points.setflags(write=False)
         object.__setattr__(self, "points", points)
@@ -188,7 +198,7 @@ class Mesh(Shape):
         faces: (m, 3), read-only.
     """
 
-    source: str | Path | tuple[ArrayLike, ArrayLike]
+    source: str | PathLike[str] | tuple[ArrayLike, ArrayLike]
     scale: float = 1.0
     up: Literal["z", "y"] = "z"
     max_vertices: int = 32
@@ -197,21 +207,25 @@ class Mesh(Shape):
     faces: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        scale, _, _ = check_vector((self.scale, 0.0, 0.0), "Mesh scale and two zeros")
-        if scale <= 0.0:
-            raise InputError(f"Mesh scale is {self.scale!r}; give the metres of one unit of the file, such as 0.001")
-        if self.up not in ("z", "y"):
-            raise InputError(f"Mesh up is {self.up!r}; give 'z' or 'y'")
-        if isinstance(self.source, (str, Path)):
-            vertices, faces = read_mesh(self.source)
+        scale = number(self.scale, "Mesh scale", 1e-12, 1e12, "metres for each unit of the file, such as 0.001")
+        choice(self.up, ("z", "y"), "Mesh up")
+        whole(self.max_vertices, "Mesh max_vertices", *MAX_VERTICES)
+        number(self.threshold, "Mesh threshold", *THRESHOLD)
+        if isinstance(self.source, (str, PathLike)):
+            vertices, faces = read_mesh(path(self.source, "Mesh source"))
+        elif isinstance(self.source, (tuple, list)) and len(self.source) == 2:
+            vertices = array(self.source[0], "Mesh vertices", "an array of shape (n, 3)")
+            corners = array(self.source[1], "Mesh faces", "an array of shape (m, 3)")
+            if not (np.abs(corners) <= MOST_CORNERS).all():
+                raise InputError("Mesh faces: not every value is an index of a vertex; give whole numbers")
+            faces = corners  # type: ignore[assignment]
         else:
-            try:
-                vertices, faces = self.source  # type: ignore[assignment]
-            except (TypeError, ValueError):
-                raise InputError(
-                    "Mesh source: give the path of a file, or a pair of arrays (vertices, faces)"
-                ) from None
-        vertices, faces = check_mesh(np.asarray(vertices, dtype=float) * scale, faces, self._name())
+            raise InputError(
+                f"Mesh source is {shown(self.source)}; give the path of a file, or a pair of arrays (vertices, faces)"
+            )
+        with np.errstate(over="ignore"):  # what overflows is refused as not finite
+            vertices = vertices * scale
+        vertices, faces = check_mesh(vertices, faces, self._name())
         vertices = vertices @ Y_UP.T if self.up == "y" else vertices.copy()
         faces = faces.copy()
         vertices.setflags(write=False)
@@ -220,7 +234,7 @@ class Mesh(Shape):
         object.__setattr__(self, "faces", faces)
 
     def _name(self) -> str:
-        return f"mesh {self.source}" if isinstance(self.source, (str, Path)) else "mesh"
+        return f"mesh {self.source}" if isinstance(self.source, (str, PathLike)) else "mesh"
 
     def convexified(self) -> ConvexPieces:
         """Pieces, added volume, and notes on the parts that could not be kept as they are."""

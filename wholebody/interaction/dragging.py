@@ -16,6 +16,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wholebody.assessment import assess
+from wholebody.checks import array, function, instance, numbers
+from wholebody.errors import InputError
 from wholebody.geometry.sweep import Sweep
 from wholebody.interaction.judging import jerk
 from wholebody.interaction.scripts import FRAME
@@ -24,7 +26,6 @@ from wholebody.methods.moving_goals import moving_goal, own_copy, retarget
 from wholebody.methods.solve import Method
 from wholebody.problem import Problem, Solution
 from wholebody.tasks import Point
-from wholebody.tasks.inputs import numbers
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.intp]
@@ -129,7 +130,11 @@ def drag_along(
         InputError: the goal or the places are none.
         UnknownNameError: there is no such method.
     """
-    targets = numbers(places, (len(np.asarray(places)), 3), "places")
+    given = array(places, "places", "places of shape (n, 3), metres")
+    if given.ndim != 2 or given.shape[1] != 3 or not len(given):
+        raise InputError(f"places has shape {given.shape}; give places of shape (n, 3), metres, at least one")
+    targets = numbers(given, given.shape, "places")
+    function(progress, "progress")
     drag = Drag(problem, method, goal=goal, dt=dt)
     aims = [_aim(problem, goal, place) for place in targets]
     postures, left = [drag.q], [np.inf]
@@ -168,6 +173,8 @@ def _lags(left: list[float], late: int) -> bool:
 def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudgement:
     """Judge a drag of a problem's goal."""
     own, model = own_copy(problem), problem.scene.model
+    instance(dragged, Dragged, "judge_drag: dragged", "make one with drag_along(problem, places)")
+    moving_goal(problem, goal)
     errors, judged = [], []
     for frame, q in enumerate(dragged.q):
         place = dragged.targets[min(max(frame - 1, 0), len(dragged) - 1)]

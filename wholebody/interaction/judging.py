@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.checks import instance
 from wholebody.figures.state import State
 from wholebody.geometry.sweep import Sweep
 from wholebody.interaction.recording import Recording
@@ -63,6 +64,8 @@ class Judgement:
 
 def judge(scene: Scene, recording: Recording) -> Judgement:
     """Judge a recording of a scene."""
+    instance(scene, Scene, "judge: scene", "make one with wb.Scene(figure)")
+    instance(recording, Recording, "judge: recording", "make one with follow(scene, track)")
     depth, _ = overlaps(scene, recording.q)
     tracked_depth, tracked_pairs = overlaps(scene, recording.tracked)
     model = scene.model

@@ -15,13 +15,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.checks import array, flag, function, instance, known, time_step
+from wholebody.errors import InputError
 from wholebody.interaction.attraction import Attraction
 from wholebody.interaction.nearest import CLEARANCE, NearestPosture, weights
 from wholebody.interaction.recording import Frame, Recording
 from wholebody.interaction.removal import Removal, Remover
 from wholebody.interaction.scripts import FRAME
 from wholebody.interaction.tracks import UNIT_TOLERANCE, Track
+from wholebody.methods.inputs import SEED
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene import Scene
@@ -35,6 +37,15 @@ SHARES = (0.5, 0.25)
 """Of the way, tried when all of it is not free: what keeps to a surface leaves it by the square of the share."""
 
 INSIDE = 1e-5  # m: deeper than this a posture is called inside of something
+
+
+def check_scene(scene: object, what: str) -> None:
+    """Refuse what is no scene.
+
+    Raises:
+        InputError: it is none.
+    """
+    instance(scene, Scene, f"{what}: scene", "make one with wb.Scene(figure)")
 
 
 class FrameLoop:
@@ -73,12 +84,13 @@ class FrameLoop:
             UnknownNameError: another overlap.
             InputError: the start has the wrong shape, is not finite, or no posture near it is free of overlap.
         """
-        if overlap not in OVERLAPS:
-            raise UnknownNameError("way to remove overlap", overlap, OVERLAPS, "overlap")
-        if not (np.isfinite(dt) and dt > 0.0):
-            raise InputError(f"dt is {dt!r}; give seconds from frame to frame, such as 1/60")
+        check_scene(scene, "FrameLoop")
+        known(overlap, OVERLAPS, "way to remove overlap", "overlap")
+        dt = time_step(dt, "dt")
+        SEED.check(seed, "seed")
+        flag(rigid, "rigid")
         self.scene, self.overlap, self.count = scene, overlap, 0
-        q = np.array(start, dtype=float)
+        q = array(start, "start", f"a posture of {scene.figure.name}").copy()
         unreadable = _unreadable(scene, q)
         if unreadable:
             raise InputError(f"frame 0: {unreadable}; begin with a posture of {scene.figure.name}")
@@ -96,7 +108,7 @@ class FrameLoop:
             tracked: (nq,) what the tracker says.
         """
         began = _clocks()
-        goal = np.asarray(tracked, dtype=float)
+        goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
         unreadable = _unreadable(self.scene, goal)
         if unreadable:
             return self._shown(Removal((self.shown,), 0.0, 0.0, 0, 0, 0, f"{unreadable}; the figure stays"), began)
@@ -221,6 +233,9 @@ def follow(
         UnknownNameError, InputError: the track does not fit the figure, or its start cannot be freed of overlap; frame
             and place are named, before anything is computed.
     """
+    check_scene(scene, "follow")
+    instance(track, Track, "follow: track", "make one with Track.of(figure, q, dt)")
+    function(progress, "progress")
     track.check(scene.figure)
     loop = FrameLoop(scene, track.q[0], overlap=overlap, dt=track.dt, seed=seed, rigid=rigid)
     frames = []

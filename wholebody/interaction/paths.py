@@ -9,13 +9,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wholebody.checks import array, number, shown, time_step, whole
+from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, InputError
-from wholebody.tasks.inputs import direction, numbers, point
+from wholebody.files import read_text
+from wholebody.interaction.tracks import MOST_FRAMES
+from wholebody.tasks.inputs import direction, point
 
 Array = NDArray[np.float64]
 
 SPEED = 0.5  # m/s: of a hand that drags, where the number of frames is not given
 CORNERS = 72  # of a circle
+SMALLEST = 1e-6  # m: of a circle
 LARGEST = 100.0  # m: a place farther out is taken for a slip of units
 
 
@@ -38,8 +43,7 @@ def circle(center: ArrayLike, radius: float, normal: ArrayLike = (1.0, 0.0, 0.0)
         InputError: the radius is not positive, or a value is not finite.
     """
     middle, axis = point(center, "circle: center"), direction(normal, "circle: normal")
-    if not (np.isfinite(radius) and 0.0 < radius <= LARGEST):
-        raise InputError(f"a circle has a radius of {radius} m; give metres greater than zero")
+    radius = number(radius, "circle: radius", SMALLEST, LARGEST, "m")
     down = np.array((0.0, 0.0, -1.0)) if abs(axis[2]) < 0.99 else np.array((1.0, 0.0, 0.0))
     first = down - (down @ axis) * axis
     first /= np.linalg.norm(first)
@@ -59,11 +63,8 @@ def read_path(path: str | os.PathLike[str]) -> Array:
     Raises:
         FileFormatError: the file cannot be read or a line is no place; the line is named.
     """
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"{path}: cannot be read ({error}); give a text file with a place a line") from None
+    path = checked_path(path, "path")
+    text = read_text(path, "path")
     lines = [Line(number, said.partition("#")[0].strip()) for number, said in enumerate(text.splitlines(), start=1)]
     lines = [line for line in lines if line.text]
     if lines and not any(_is_number(word) for word in _words(lines[0].text)):
@@ -85,13 +86,16 @@ def spread(corners: ArrayLike, frames: int | None = None, dt: float = 1.0 / 60.0
     Raises:
         InputError: the corners are no path, or frames is not positive.
     """
-    shape = np.shape(corners)
-    if len(shape) != 2 or shape[1] != 3 or shape[0] < 2:
-        raise InputError(f"a path has shape {shape}; give at least two corners, shape (k, 3), metres")
-    places = numbers(corners, (shape[0], 3), "path")
-    if frames is not None and frames < 1:
-        raise InputError(f"frames is {frames}; give 1 or more")
+    given = array(corners, "path", "at least two corners, shape (k, 3), metres")
+    if given.ndim != 2 or given.shape[1] != 3 or len(given) < 2:
+        raise InputError(f"a path has shape {given.shape}; give at least two corners, shape (k, 3), metres")
+    places = np.array([point(corner, f"corners[{place}]") for place, corner in enumerate(given)])
+    if frames is not None:
+        whole(frames, "frames", 1, MOST_FRAMES)
+    dt = time_step(dt, "dt")
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+    if frames is None and way[-1] / (SPEED * dt) > MOST_FRAMES:
+        raise InputError(f"dt of {dt:g} s makes more than {MOST_FRAMES} frames of this path; make it larger")
     count = frames if frames is not None else max(1, int(np.ceil(way[-1] / (SPEED * dt))))
     at = way[-1] * np.arange(1, count + 1) / count
     return np.stack([np.interp(at, way, places[:, axis]) for axis in range(3)], axis=1)
@@ -112,8 +116,8 @@ def _is_number(word: str) -> bool:
 def _place(path: Path, line: Line) -> list[float]:
     words, where = _words(line.text), f"{path}, line {line.number}"
     if len(words) != 3 or not all(map(_is_number, words)):
-        raise FileFormatError(f"{where}: {line.text!r} is not a place; give x y z in metres")
+        raise FileFormatError(f"{where}: {shown(line.text)} is not a place; give x y z in metres")
     values = [float(word) for word in words]
     if not all(abs(value) <= LARGEST for value in values):
-        raise FileFormatError(f"{where}: {line.text!r} is no place within {LARGEST:g} m; give metres")
+        raise FileFormatError(f"{where}: {shown(line.text)} is no place within {LARGEST:g} m; give metres")
     return values

@@ -9,6 +9,7 @@ import numpy as np
 
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Sphere
+from wholebody.interaction.tracks import check_figure
 from wholebody.scene import Scene
 
 Color = tuple[float, float, float, float]
@@ -36,7 +37,7 @@ def gallery(figure: Figure) -> Scene:
     Walls, a door with a lintel, a niche in the east room, tables, a bench, pedestals, and sculptures on them: a torus,
     split into convex pieces, a sphere, an egg, an obelisk and a figure of capsules. All of them are fixed.
     """
-    scene = Scene(figure)
+    scene = Scene(check_figure(figure, "gallery"))
     scene.add(HalfSpace(), name="floor")
     _walls(scene)
     _furniture(scene)

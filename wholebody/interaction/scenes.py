@@ -14,17 +14,20 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.errors import UnknownNameError
+from wholebody.checks import known, number, whole
 from wholebody.figures import load
 from wholebody.figures.figure import Figure
 from wholebody.interaction import rooms
 from wholebody.interaction.scripts import FRAME, script
-from wholebody.interaction.tracks import Track
+from wholebody.interaction.tracks import MOST_FRAMES, Track
+from wholebody.methods.inputs import SEED
 from wholebody.scene import Scene
 
 Array = NDArray[np.float64]
 Place = tuple[float, float, float]
 Keys = list[tuple[float, Array]]
+
+FRAMES_OF_A_SCRIPT = (1e-3, 1.0)  # s: least and greatest time step
 
 
 @dataclass(frozen=True)
@@ -75,8 +78,11 @@ def build_scene(name: str, *, frames: int | None = None, seed: int = 0, dt: floa
         UnknownNameError: there is no such scene.
         InputError: fewer than one frame.
     """
-    if name not in _PLANS:
-        raise UnknownNameError("scene", name, _PLANS)
+    known(name, _PLANS, "scene")
+    if frames is not None:
+        whole(frames, "frames", 1, MOST_FRAMES)
+    SEED.check(seed, "seed")
+    dt = number(dt, "dt", *FRAMES_OF_A_SCRIPT, "s")
     plan = _PLANS[name]
     figure = load(plan.figure)
     track = script(figure, plan.keys(figure), dt=dt, seed=seed, name=name)

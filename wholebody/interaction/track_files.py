@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from wholebody.errors import FileFormatError, InputError, UnknownNameError
+from wholebody.checks import instance, known, shown
+from wholebody.checks import path as checked_path
+from wholebody.errors import FileFormatError, InputError
 from wholebody.figures.figure import Figure
-from wholebody.interaction.tracks import Track
+from wholebody.files import read_text, write
+from wholebody.interaction.tracks import Track, check_figure
 
 ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "root_qw")
+LARGEST = 200_000_000  # bytes: an hour of a person at 60 frames a second
+LATEST = 1e9  # s
 TIME = "time"
 EVEN = 1e-3  # share of the time step by which a line may come early or late
 
@@ -23,20 +30,15 @@ def write_track(track: Track, path: str | os.PathLike[str]) -> Path:
     Raises:
         InputError: the file cannot be written.
     """
-    path = Path(path)
+    instance(track, Track, "write_track: track", "make one with Track.of(figure, q, dt)")
+    path = checked_path(path, "path")
     root = ROOT_COLUMNS if track.q.shape[1] > len(track.joints) else ()
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        with temporary.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow([TIME, *root, *track.joints])
-            for frame, q in enumerate(track.q):
-                writer.writerow([repr(frame * track.dt), *map(repr, q.tolist())])
-        os.replace(temporary, path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise InputError(f"{path} cannot be written: {error.strerror}; make the folder first") from None
-    return path
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow([TIME, *root, *track.joints])
+    for frame, q in enumerate(track.q):
+        writer.writerow([repr(frame * track.dt), *map(repr, q.tolist())])
+    return write(path, text.getvalue())
 
 
 def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
@@ -48,36 +50,65 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
         UnknownNameError: a column that is no joint of the figure.
         InputError: joints are missing, or a value is not finite; the frame is named.
     """
-    path = Path(path)
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            lines = [line for line in csv.reader(file) if line]
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"{path}: cannot be read ({error}); give a CSV file") from None
-    if len(lines) < 3:
-        raise FileFormatError(f"{path}: a track has a line of names and at least two frames")
-    names = [name.strip() for name in lines[0]]
+    path = checked_path(path, "path")
+    check_figure(figure, "read_track")
+    text = read_text(path, "track", LARGEST)
+    lines = _lines(path, text)
+    number, first = next(lines, (1, []))
+    names = [name.strip() for name in first]
     wanted = [TIME, *(ROOT_COLUMNS if figure.root == "free" else ()), *figure.joints]
     for name in names:
-        if name not in wanted:
-            raise UnknownNameError("column", name, wanted, f"{path}, line 1")
+        known(name, wanted, "column", f"{path.name}, line {number}")
+    twice = [name for name in wanted if names.count(name) > 1]
+    if twice:
+        raise FileFormatError(f"{path.name}, line {number}: the column {twice[0]} stands there twice; leave one out")
     missing = [name for name in wanted if name not in names]
     if missing:
-        raise InputError(f"{path}, line 1: the columns lack {', '.join(missing[:4])}; {len(missing)} are missing")
-    table = np.empty((len(lines) - 1, len(names)))
-    for number, line in enumerate(lines[1:], start=2):
+        raise InputError(
+            f"{path.name}, line {number}: the columns lack {', '.join(missing[:4])}; {len(missing)} are missing"
+        )
+    rows, places = [], []
+    for number, line in lines:
         if len(line) != len(names):
-            raise FileFormatError(f"{path}, line {number}: {len(line)} values for {len(names)} columns")
+            raise FileFormatError(f"{path.name}, line {number}: {len(line)} values for {len(names)} columns")
         try:
-            table[number - 2] = [float(value) for value in line]
-        except ValueError as error:
-            raise FileFormatError(f"{path}, line {number}: {error}") from None
+            rows.append([float(value) for value in line])
+        except ValueError:
+            wrong = next(value for value in line if not _is_number(value))
+            raise FileFormatError(f"{path.name}, line {number}: {shown(wrong)} is no number") from None
+        places.append(number)
+    if len(rows) < 2:
+        raise FileFormatError(f"{path.name}: a track has a line of names and at least two frames")
+    table = np.array(rows)
     order = [names.index(name) for name in wanted]
     time = table[:, order[0]]
+    if not (np.abs(time) < LATEST).all():
+        bad = int(np.flatnonzero(~(np.abs(time) < LATEST))[0])
+        raise FileFormatError(f"{path.name}, line {places[bad]}: the time is {time[bad]:g}; give seconds")
     dt = float(time[1] - time[0])
     late = np.flatnonzero(np.abs(np.diff(time) - dt) > EVEN * abs(dt))
     if len(late):
-        raise FileFormatError(f"{path}, line {int(late[0]) + 3}: the time step changes; resample to a fixed one")
+        line_number = places[int(late[0]) + 1]
+        raise FileFormatError(f"{path.name}, line {line_number}: the time step changes; resample to a fixed one")
     track = Track.of(figure, table[:, order[1:]], dt, path.name)
     track.check(figure)
     return track
+
+
+def _lines(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
+    """Lines of a CSV file that are not empty, with their numbers."""
+    reader = csv.reader(io.StringIO(text, newline=""))
+    try:
+        for line in reader:
+            if line:
+                yield reader.line_num, line
+    except csv.Error as error:
+        raise FileFormatError(f"{path.name}, line {reader.line_num}: is no CSV ({error})") from None
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

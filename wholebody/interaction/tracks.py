@@ -10,6 +10,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from wholebody.checks import array, instance, known, listed, shown, text, time_step, whole
+from wholebody.checks import posture as checked_posture
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.placement import placement
@@ -18,6 +20,17 @@ Array = NDArray[np.float64]
 
 UNIT_TOLERANCE = 1e-3  # of a quaternion's length, beyond which it is taken for a mistake
 ROOT_SIZE = 7
+LARGEST = 1e6  # of a value, radians or metres
+MOST_FRAMES = 1_000_000  # of a track: ten hours at 30 frames a second; more is a slip, and gigabytes
+
+
+def check_figure(figure: object, what: str) -> Figure:
+    """A figure.
+
+    Raises:
+        InputError: it is something else.
+    """
+    return instance(figure, Figure, f"{what}: figure", "load one with wb.load('human')")
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,22 +56,26 @@ class Track:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        q = np.array(self.q, dtype=float)
+        text(self.name, "the name of a track")
+        q = array(self.q, f"{self.name}: q", "postures, shape (frames, nq)").copy()
         if q.ndim != 2 or not len(q):
             raise InputError(f"{self.name}: a track is (frames, nq) with at least one frame, not {q.shape}")
-        if not (np.isfinite(self.dt) and self.dt > 0.0):
-            raise InputError(f"{self.name}: dt is {self.dt!r}; give seconds from frame to frame, such as 1/60")
+        time_step(self.dt, f"{self.name}: dt")
+        joints = listed(self.joints, f"{self.name}: joints", "figure.joints")
+        if not all(isinstance(joint, str) for joint in joints):
+            raise InputError(f"{self.name}: joints is {shown(self.joints)}; give names, such as figure.joints")
+        object.__setattr__(self, "joints", tuple(joints))
         if len(self.joints) not in (q.shape[1], q.shape[1] - ROOT_SIZE):
             raise InputError(
                 f"{self.name}: {q.shape[1]} values a frame do not fit {len(self.joints)} joints; give one value "
                 "for each joint, after seven for a free root"
             )
-        bad = np.argwhere(~np.isfinite(q))
+        bad = np.argwhere(~(np.abs(q) <= LARGEST))
         if len(bad):
             frame, column = (int(k) for k in bad[0])
             raise InputError(
                 f"{self.name}: frame {frame}, {self._place(q.shape[1], column)} is {q[frame, column]}; {len(bad)} "
-                "values are not finite; mend or cut those frames"
+                f"values are not finite or beyond {LARGEST:g}; mend or cut those frames"
             )
         q.setflags(write=False)
         object.__setattr__(self, "q", q)
@@ -70,7 +87,7 @@ class Track:
     @classmethod
     def of(cls, figure: Figure, q: ArrayLike, dt: float, name: str = "track") -> Track:
         """Track of a figure's own postures, (n, nq), in its order of joints."""
-        return cls(np.asarray(q, dtype=float), dt, figure.joints, name)
+        return cls(q, dt, check_figure(figure, "Track.of").joints, name)  # type: ignore[arg-type]
 
     def part(self, first: int, last: int) -> Track:
         """Frames `first` to `last`, without the last one.
@@ -78,7 +95,9 @@ class Track:
         Raises:
             InputError: there is no frame among them.
         """
-        if not 0 <= first < last <= len(self):
+        whole(first, "first", 0, len(self))
+        whole(last, "last", 0, len(self))
+        if not first < last:
             raise InputError(f"{self.name}: frames {first} to {last} of {len(self)}; give 0 <= first < last")
         return Track(self.q[first:last], self.dt, self.joints, self.name)
 
@@ -88,8 +107,7 @@ class Track:
         Raises:
             InputError: fewer than one frame is asked for.
         """
-        if frames < 1:
-            raise InputError(f"{self.name}: {frames} frames are asked for; give 1 or more")
+        whole(frames, f"{self.name}: frames", 1, MOST_FRAMES)
         return Track(self.q[np.arange(frames) % len(self)], self.dt, self.joints, self.name)
 
     def check(self, figure: Figure) -> None:
@@ -99,6 +117,7 @@ class Track:
             UnknownNameError: it has a joint that the figure does not have.
             InputError: it lacks joints, has them in another order, or has a quaternion that is not of unit length.
         """
+        check_figure(figure, f"{self.name}: check")
         for joint in self.joints:
             if joint not in figure.joints:
                 raise UnknownNameError("joint", joint, figure.joints, self.name)
@@ -145,13 +164,19 @@ def posed(
         InputError: tracks of different length, a placement that cannot be read (the frame is named), roots for a fixed
             figure.
     """
+    check_figure(figure, "posed")
     base = _posture(figure, posture)
-    given = {joint: np.atleast_1d(np.asarray(values, dtype=float)) for joint, values in (angles or {}).items()}
+    text(name, "name")
+    if not (angles is None or isinstance(angles, Mapping)):
+        raise InputError(f"{name}: angles is {shown(angles)}; give angles by joint, such as {{'neck_flexion': [0.5]}}")
+    joints = {known(joint, figure.joints, "joint", name): values for joint, values in (angles or {}).items()}
+    given = {joint: _angles(values, joint) for joint, values in joints.items()}
+    roots = None if roots is None else listed(roots, f"{name}: roots", "placements (x, y, z)")
+    if not (roots is None or roots):
+        raise InputError(f"{name}: roots is empty; give a placement for each frame, or leave it out")
     frames = _frames(name, roots, given)
     q = np.tile(base, (frames, 1))
     for joint, values in given.items():
-        if joint not in figure.joints:
-            raise UnknownNameError("joint", joint, figure.joints, name)
         q[:, figure.model.joints[figure.joint_id(joint)].idx_q] = values
     if roots is not None:
         if figure.root != "free":
@@ -167,7 +192,16 @@ def posed(
 def _posture(figure: Figure, posture: str | ArrayLike | None) -> Array:
     if posture is None:
         return figure.neutral
-    return figure.posture(posture) if isinstance(posture, str) else np.asarray(posture, dtype=float)
+    return figure.posture(posture) if isinstance(posture, str) else checked_posture(posture, figure.model.nq)
+
+
+def _angles(values: object, joint: str) -> Array:
+    """Angles (n,) of a joint, one or more."""
+    wanted = "an angle for each frame, radians, or one for all"
+    found = np.atleast_1d(array(values, f"angles of {joint!r}", wanted))
+    if found.ndim != 1 or not len(found):
+        raise InputError(f"angles of {joint!r} have shape {found.shape}; give {wanted}")
+    return found
 
 
 def _frames(name: str, roots: Sequence[Any] | None, angles: Mapping[str, Array]) -> int:

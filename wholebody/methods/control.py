@@ -12,12 +12,16 @@ from typing import Any
 import numpy as np
 
 from wholebody.assessment import Assessment
+from wholebody.checks import a, number
 from wholebody.errors import InputError
 from wholebody.problem import Iterate
 
 LONGEST = 4.0
 """Seconds of processor time that a solve may take where no time limit is given. Few come near it, and how loaded the
 machine is does not change their answers."""
+
+LIMITS = (1e-9, 1e9)
+"""Least and greatest time limit, seconds."""
 
 Progress = Callable[[Iterate], Any]
 """Called after every iteration with its entry of the trace; where it returns True, the solve ends."""
@@ -44,7 +48,7 @@ class Control:
             InputError: `progress` cannot be called.
         """
         if progress is not None and not callable(progress):
-            raise InputError(f"progress is a {type(progress).__name__}; give a function of one trace entry")
+            raise InputError(f"progress is {a(type(progress))}; give a function of one trace entry")
         self.reason = ""
         self._time_limit, self._progress = time_limit, progress
         self._began = self._now()
@@ -106,6 +110,5 @@ def check_time_limit(value: float | None) -> None:
     Raises:
         InputError: it is neither None nor a positive number.
     """
-    number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if value is not None and not (number and value > 0.0):
-        raise InputError(f"time_limit is {value!r}; give seconds above zero, math.inf for no limit, or None")
+    if value is not None and not (isinstance(value, float) and value == np.inf):
+        number(value, "time_limit", *LIMITS, "s, math.inf for no limit, or None")

@@ -28,6 +28,7 @@ from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.contradictions import explanation
 from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.problem import Iterate, Problem, Solution, Status
 from wholebody.tasks.base import Constraint, Goal
 
@@ -67,13 +68,7 @@ class DampedLeastSquares:
         Raises:
             InputError: a setting out of range.
         """
-        if not 1e-10 <= self.tolerance <= 0.1:
-            raise InputError(f"tolerance is {self.tolerance}; give metres from 1e-10 to 0.1")
-        if self.iterations < 1:
-            raise InputError(f"iterations is {self.iterations}; give 1 or more")
-        if not 0.0 < self.damping < np.inf:
-            raise InputError(f"damping is {self.damping}; give a positive number such as 1e-3")
-
+        check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, damping=DAMPING)
         check_time_limit(self.time_limit)
 
     @property
@@ -91,6 +86,7 @@ class DampedLeastSquares:
         Raises:
             InputError: the problem has a constraint that is not an equality, or its scene changed after it was stated.
         """
+        check_problem(problem, "DampedLeastSquares.solve: problem")
         began = time.perf_counter()
         with problem.lend() as workspace, Control(self.time_limit, progress) as control:
             descent = _Descent(problem, self, workspace.state, control)

@@ -14,9 +14,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError
+from wholebody.checks import time_step
 from wholebody.methods.ccd.method import CCD
-from wholebody.methods.moving_goals import begun_at, moving_goal, own_copy, part_way, retarget
+from wholebody.methods.moving_goals import begun_at, moving_goal, own_copy, part_way, refuse_assembly, retarget
 from wholebody.methods.nearby import Nearby, for_motions
 from wholebody.methods.newton.method import Newton
 from wholebody.methods.newton.tracking import NewtonTracker
@@ -84,14 +84,11 @@ class Drag:
             InputError: there is no such goal, or it is of another kind.
             UnknownNameError: there is no such method.
         """
-        if not isinstance(problem, Problem):
-            raise InputError(f"Drag takes a Problem, not a {type(problem).__name__}")
-        if not (np.isfinite(dt) and dt > 0.0):
-            raise InputError(f"dt is {dt}; give seconds a frame, such as 0.02")
-        self.problem, self.dt = own_copy(problem), dt
+        refuse_assembly(problem, "Drag")
+        self.problem, self.dt = own_copy(problem), time_step(dt, "dt")
         self.method = for_motions(method)
         own = self.method
-        self.tracker = own.tracker(self.problem, dt) if isinstance(own, (QP, Newton)) else None
+        self.tracker = own.tracker(self.problem, self.dt) if isinstance(own, (QP, Newton)) else None
         self._workspace = self.tracker.workspace if self.tracker is not None else self.problem.workspace()
         self._alone = OneAtATime("drag")
         self._rough = replace(self.method, tolerance=ON_THE_WAY) if isinstance(self.method, CCD) else self.method

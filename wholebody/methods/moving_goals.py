@@ -10,7 +10,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.checks import whole
 from wholebody.errors import InputError
+from wholebody.methods.inputs import check_problem
+from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
 from wholebody.tasks import Frame, Point
 from wholebody.tasks.base import Goal
@@ -19,9 +22,27 @@ Array = NDArray[np.float64]
 
 
 def own_copy(problem: Problem) -> Problem:
-    """A copy whose goals can be moved without moving the caller's."""
+    """A copy whose goals can be moved without moving the caller's.
+
+    Raises:
+        InputError: it is no problem, or objects came to or left its scene.
+    """
+    check_problem(problem, "problem")
     problem.check_fresh()
     return copy.copy(problem)
+
+
+def refuse_assembly(problem: object, what: str) -> None:
+    """Refuse an assembly where a problem is taken: its goals have no numbers, and its bodies no shapes.
+
+    Raises:
+        InputError: it is an assembly.
+    """
+    if isinstance(problem, Assembly):
+        raise InputError(
+            f"{what} takes a Problem, not an Assembly; move an assembly's goal by "
+            "assembly.drop_goals().point_goal(body, target).solve(), place by place"
+        )
 
 
 def begun_at(problem: Problem, q: Array, *, nearest: bool = False) -> Problem:
@@ -45,8 +66,9 @@ def moving_goal(problem: Problem, number: int) -> Point | Frame:
     Raises:
         InputError: there is no such goal, or it is of another kind.
     """
-    if not 0 <= number < len(problem.goals):
-        raise InputError(f"the problem has {len(problem.goals)} goals, and none has the number {number}")
+    if not problem.goals:
+        raise InputError("the problem has no goals; give it a Point or a Frame")
+    whole(number, "the number of the goal", 0, len(problem.goals) - 1)
     goal = problem.goals[number]
     if not isinstance(goal, (Point, Frame)):
         raise InputError(f"goals[{number}] is a {type(goal).__name__}; only a Point or a Frame can be moved")

@@ -15,7 +15,7 @@ from wholebody.methods.newton.method import Newton
 from wholebody.methods.newton.tracking import NewtonTracker
 from wholebody.methods.passage import jumps
 from wholebody.methods.qp.method import QP
-from wholebody.methods.solve import Method, method_named
+from wholebody.methods.solve import Method, as_method
 from wholebody.problem import Problem, Solution
 
 Array = NDArray[np.float64]
@@ -30,10 +30,11 @@ def for_motions(method: str | Method) -> Method:
 
     Raises:
         UnknownNameError: there is no such method.
+        InputError: it is neither a name nor a method.
     """
+    chosen = as_method(method)
     if not isinstance(method, str):
-        return method
-    chosen = method_named(method)
+        return chosen
     if isinstance(chosen, QP):
         return replace(chosen, restarts=0)
     if isinstance(chosen, CCD):

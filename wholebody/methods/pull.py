@@ -11,17 +11,20 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wholebody import checks
 from wholebody.errors import InputError
-from wholebody.methods.moving_goals import moving_goal, own_copy, retarget
+from wholebody.methods.inputs import check_problem
+from wholebody.methods.moving_goals import moving_goal, own_copy, refuse_assembly, retarget
 from wholebody.methods.nearby import Nearby, for_motions
 from wholebody.methods.solve import Method
 from wholebody.problem import Problem, Solution
 from wholebody.tasks import Point
-from wholebody.tasks.inputs import numbers
+from wholebody.tasks.inputs import FARTHEST, point
 
 Array = NDArray[np.float64]
 
 SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from nearer
+CLOSEST = 1e-6  # m: least spacing
 MOST_GOALS = 10_000
 
 
@@ -47,6 +50,8 @@ def pull(
         InputError: the path is not one, the spacing is not positive, or the goal is not a `Point`.
         UnknownNameError: there is no such method.
     """
+    refuse_assembly(problem, "pull")
+    check_problem(problem, "pull: problem")
     places = _spaced(path, spacing)
     term = moving_goal(problem, goal)
     if not isinstance(term, Point):
@@ -64,16 +69,16 @@ def pull(
 
 def _spaced(path: ArrayLike, spacing: float) -> Sequence[Array]:
     """Places (3,) along the corners of a path, its own among them."""
-    shape = np.shape(path)
-    if len(shape) != 2 or shape[1] != 3 or shape[0] < 1:
-        raise InputError(f"path has shape {shape}; give corners of shape (k, 3), metres")
-    corners = numbers(path, (shape[0], 3), "path")
-    if not (np.isfinite(spacing) and spacing > 0.0):
-        raise InputError(f"spacing is {spacing}; give metres greater than zero")
+    corners = checks.array(path, "path", "corners of shape (k, 3), metres")
+    if corners.ndim != 2 or corners.shape[1] != 3 or len(corners) < 1:
+        raise InputError(f"path has shape {corners.shape}; give corners of shape (k, 3), metres")
+    for place, corner in enumerate(corners):
+        point(corner, f"path[{place}]")
+    spacing = checks.number(spacing, "spacing", CLOSEST, FARTHEST, "m")
     legs = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    if (legs.sum() / MOST_GOALS) > spacing:
+        raise InputError(f"a spacing of {spacing:g} m makes more than {MOST_GOALS} goals of this path; make it larger")
     counts = np.ceil(legs / spacing).astype(int)
-    if counts.sum() > MOST_GOALS:
-        raise InputError(f"a spacing of {spacing} m makes {counts.sum()} goals of this path; make it larger")
     places = [corners[0]]
     for begin, end, count in zip(corners, corners[1:], counts, strict=False):
         places += [begin + (end - begin) * k / count for k in range(1, count + 1)]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from wholebody.checks import function, shown
 from wholebody.errors import InputError, UnknownNameError
+from wholebody.methods import METHODS
 from wholebody.methods.control import Progress
+from wholebody.methods.inputs import check_problem
 from wholebody.problem import Problem, Solution
-
-METHODS = ("qp", "ccd", "newton", "placo", "dls")
 
 
 class Method(Protocol):
@@ -51,6 +52,20 @@ def method_named(name: str) -> Method:
     raise UnknownNameError("method", name, METHODS)
 
 
+def as_method(method: object) -> Method:
+    """A method from its name, or a configured one as it is.
+
+    Raises:
+        UnknownNameError: there is none of this name.
+        InputError: it is neither.
+    """
+    if isinstance(method, str):
+        return method_named(method)
+    if isinstance(method, type) or not callable(getattr(method, "solve", None)) or not hasattr(method, "name"):
+        raise InputError(f"method is {shown(method)}; give a name such as 'qp', or a method such as wb.QP()")
+    return method  # type: ignore[return-value]
+
+
 def solve(problem: Problem, method: str | Method = "qp", progress: Progress | None = None) -> Solution:
     """Find a posture that fits a problem.
 
@@ -71,7 +86,5 @@ def solve(problem: Problem, method: str | Method = "qp", progress: Progress | No
         UnknownNameError: there is no such method.
         InputError: the scene changed after the problem was stated, or the method cannot take some of its terms.
     """
-    if not isinstance(problem, Problem):
-        raise InputError(f"solve takes a Problem, not a {type(problem).__name__}")
-    chosen = method_named(method) if isinstance(method, str) else method
-    return chosen.solve(problem, progress)
+    check_problem(problem, "solve: problem")
+    return as_method(method).solve(problem, function(progress, "progress"))

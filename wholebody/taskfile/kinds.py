@@ -8,9 +8,13 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from wholebody.checks import shown
 from wholebody.errors import UnknownNameError
 from wholebody.figures.figure import Figure
 from wholebody.taskfile.where import Where
+
+FAR = 1e15
+"""Beyond this no slip of units is guessed."""
 
 FARTHEST = 100.0
 """Metres from the origin: what lies farther is taken for a slip of units."""
@@ -64,14 +68,14 @@ class Number(Kind):
     def read(self, value: Any, where: Where) -> float:
         """Return the number."""
         if isinstance(value, bool) or not isinstance(value, int if self.whole else (int, float)):
-            raise where.fault(f"{value!r} is not a {self.words}; write a plain number")
+            raise where.fault(f"{shown(value)} is not a {self.words}; write a plain number")
         if not self.low <= value <= self.high:
-            raise where.fault(f"{value!r} is not a {self.words}{self._slip(value)}")
+            raise where.fault(f"{shown(value)} is not a {self.words}{self._slip(value)}")
         return value if self.whole else float(value)
 
     def _slip(self, value: float) -> str:
         for factor, unit in _SLIPS.get(self.unit, ()):
-            if math.isfinite(value) and self.low <= value * factor <= self.high:
+            if abs(value) < FAR and self.low <= value * factor <= self.high:
                 return f"; if it is in {unit}, write {value * factor:.6g}"
         return "; change it"
 
@@ -92,7 +96,7 @@ class Vector(Kind):
     def read(self, value: Any, where: Where) -> tuple[float, ...]:
         """Return the numbers."""
         if not isinstance(value, list) or len(value) != self.count:
-            raise where.fault(f"{_short(value)} is not {self.words}; write {self.count} numbers in brackets")
+            raise where.fault(f"{shown(value)} is not {self.words}; write {self.count} numbers in brackets")
         return tuple(self.number.read(entry, where.at(f"[{i}]")) for i, entry in enumerate(value))
 
 
@@ -114,7 +118,7 @@ class Placement(Kind):
             return POSITION.read(value[:3], where) + QUATERNION.read(value[3:], where)
         if isinstance(value, list) and len(value) == 3:
             return POSITION.read(value, where)
-        raise where.fault(f"{_short(value)} is no place; write {self.words}")
+        raise where.fault(f"{shown(value)} is no place; write {self.words}")
 
 
 @dataclass(frozen=True)
@@ -129,7 +133,7 @@ class Text(Kind):
     def read(self, value: Any, where: Where) -> str:
         """Return the text."""
         if not isinstance(value, str) or not value.strip():
-            raise where.fault(f"{_short(value)} is not a text; write it in quotes")
+            raise where.fault(f"{shown(value)} is not a text; write it in quotes")
         return value
 
 
@@ -147,7 +151,7 @@ class Choice(Kind):
     def read(self, value: Any, where: Where) -> str:
         """Return the word."""
         if value not in self.options:
-            raise where.fault(f"{_short(value)} is not {self.words}; write one of them")
+            raise where.fault(f"{shown(value)} is not {self.words}; write one of them")
         return str(value)
 
 
@@ -163,7 +167,7 @@ class Flag(Kind):
     def read(self, value: Any, where: Where) -> bool:
         """Return the flag."""
         if not isinstance(value, bool):
-            raise where.fault(f"{_short(value)} is not {self.words}; write one of them, without quotes")
+            raise where.fault(f"{shown(value)} is not {self.words}; write one of them, without quotes")
         return value
 
 
@@ -204,7 +208,7 @@ class Several(Kind):
     def read(self, value: Any, where: Where) -> list[Any]:
         """Return the list."""
         if not isinstance(value, list) or len(value) < self.least:
-            raise where.fault(f"{_short(value)} is not a {self.words}; write {self.least} or more in brackets")
+            raise where.fault(f"{shown(value)} is not a {self.words}; write {self.least} or more in brackets")
         return [self.kind.read(entry, where.at(f"[{i}]")) for i, entry in enumerate(value)]
 
     def names(self, value: Any, figure: Figure, where: Where) -> None:
@@ -225,7 +229,7 @@ class Joints(Kind):
     def read(self, value: Any, where: Where) -> dict[str, float]:
         """Return the values by name."""
         if not isinstance(value, dict) or not value:
-            raise where.fault(f"{_short(value)} is not a table of joints; write {{ joint_name = 0.5 }}")
+            raise where.fault(f"{shown(value)} is not a table of joints; write {{ joint_name = 0.5 }}")
         number = Number(-2.0 * math.pi, 2.0 * math.pi, "rad")
         return {name: number.read(entry, where.at(name)) for name, entry in value.items()}
 
@@ -233,11 +237,6 @@ class Joints(Kind):
         """Look the joints up."""
         for name in value:
             JOINT.names(name, figure, where.at(name))
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 _ROOT: dict[str, tuple[str, ...]] = {"free": ("root",), "fixed": ()}

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wholebody.errors import FileFormatError, UnknownNameError
+from wholebody.checks import shown
+from wholebody.errors import FileFormatError, UnknownNameError, one_line
 from wholebody.figures.figure import Figure
+from wholebody.files import is_file, read_text
 from wholebody.taskfile.schema import TABLES, TOP
 from wholebody.taskfile.tables import Form, Key, Table
 from wholebody.taskfile.where import Where
 
-LARGEST = 10_000_000
-"""Bytes; a task file is written by hand."""
+DEEPEST = 20
+"""Parts of a dotted key beyond which a file is no task."""
+
+LONGEST = 300
+"""Characters of what the reader of TOML says that a sentence repeats."""
+
+_DEEP_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST}}}""")
+_LONG_NUMBER = re.compile(r"[\d_]{4000}")
 
 
 class Entry(NamedTuple):
@@ -90,15 +100,15 @@ def read_contents(path: Path) -> Contents:
 
 
 def _text(path: Path) -> str:
-    if path.is_dir() or not path.exists():
-        there = sorted(file.name for file in path.parent.glob("*.toml")) if path.parent.is_dir() else []
-        raise UnknownNameError("task file", path.name, there, str(path.parent))
-    if path.stat().st_size > LARGEST:
-        raise FileFormatError(f"{path}: is larger than {LARGEST // 1_000_000} MB; a task file is a short TOML file")
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"{path}: cannot be read as text ({error}); a task file is TOML in UTF-8") from None
+        return read_text(path, "task file").replace("\r\n", "\n")
+    except FileFormatError:
+        if is_file(path):
+            raise
+        if os.path.lexists(path):
+            raise
+        there = sorted(file.name for file in path.parent.glob("*.toml")) if path.parent.is_dir() else []
+        raise UnknownNameError("task file", path.name, there, one_line(str(path.parent))) from None
 
 
 def _parse(path: Path, text: str) -> dict[str, Any]:
@@ -108,11 +118,19 @@ def _parse(path: Path, text: str) -> dict[str, Any]:
         import tomllib
     else:
         import tomli as tomllib
+    name = one_line(path.name)
+    if _DEEP_KEY.search(text):  # the reader's memory grows with the square of a key's parts
+        raise FileFormatError(f"{name}: a key has more than {DEEPEST} parts; a task has at most two")
     try:
         data: dict[str, Any] = tomllib.loads(text)
         return data
     except tomllib.TOMLDecodeError as error:
-        raise FileFormatError(f"{path.name}: is not TOML: {error}") from None
+        raise FileFormatError(f"{name}: is not TOML: {one_line(str(error), LONGEST)}") from None
+    except RecursionError:
+        raise FileFormatError(f"{name}: tables or lists stand in each other too deeply; a task has three") from None
+    except ValueError:  # Python reads no whole number of more than 4300 digits
+        line = next((n for n, said in enumerate(text.splitlines(), 1) if _LONG_NUMBER.search(said)), 1)
+        raise FileFormatError(f"{name}:{line}: a number has thousands of digits; write fewer") from None
 
 
 def _entries(name: str, data: Any, table: Table, where: Where) -> list[Entry]:
@@ -136,7 +154,10 @@ def _entry(data: dict[str, Any], table: Table, where: Where) -> Entry:
             raise where.fault(f"key {table.chooser} is missing; write {table.chooser} = one of {', '.join(known)}")
         name = data.pop(table.chooser)
         if name not in known:
-            raise UnknownNameError(f"{where.table} {table.chooser}", str(name), known, str(where.at(table.chooser)))
+            raise UnknownNameError(
+                f"{where.table} {table.chooser}", name if isinstance(name, str) else shown(name), known,
+                str(where.at(table.chooser)),
+            )  # fmt: skip
         form = table.forms[name]
     keys = (*table.keys, *(form.keys if form else ()))
     return Entry(where, form, name, {key.name: key for key in keys}, _values(data, keys, where))

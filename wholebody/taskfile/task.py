@@ -12,8 +12,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.checks import path as checked_path
 from wholebody.errors import InputError, UnknownNameError, WholebodyError
 from wholebody.figures import Figure, load
+from wholebody.files import is_file, is_folder
 from wholebody.geometry.placement import placement
 from wholebody.geometry.shapes import Mesh, Shape
 from wholebody.methods.solve import Method, method_named
@@ -67,11 +69,13 @@ def read_task(path: str | PathLike[str]) -> Task:
         path: a TOML file. Paths in it are relative to its folder.
 
     Raises:
-        FileFormatError: a value of the wrong kind or out of range, with file, key and mend.
+        FileFormatError: a file that cannot be read, or a value of the wrong kind or out of range; file, key and mend
+            are named.
         UnknownNameError: an unknown key, type, joint, frame or posture, or a missing file, with the nearest names.
         InputError: values that are in order one by one but cannot go together.
     """
-    contents = read_contents(Path(path))
+    file = checked_path(path, "path")
+    contents = read_contents(file)
     figure = _figure(contents)
     for entries in contents.tables.values():
         for entry in entries:
@@ -95,8 +99,8 @@ def read_task(path: str | PathLike[str]) -> Task:
     )
     method = contents.one("method")
     return Task(
-        path=Path(path),
-        title=top.values.get("title", Path(path).stem),
+        path=file,
+        title=top.values.get("title", file.stem),
         problem=problem,
         method=method.make() if method else method_named("qp"),
         goal_names=tuple(_goal_name(entry) for entry in contents.tables.get("goal", ())),
@@ -197,9 +201,9 @@ def _color(parts: list[float], where: Where) -> tuple[float, float, float, float
 def _file(name: str, where: Where) -> Path:
     """A file that the task file names, relative to its folder."""
     path = where.file.parent / name
-    if not path.is_file():
-        folder = path.parent if path.parent.is_dir() else where.file.parent
-        raise UnknownNameError("file", name, [file.name for file in folder.iterdir() if file.is_file()], str(where))
+    if not is_file(path):
+        folder = path.parent if is_folder(path.parent) else where.file.parent
+        raise UnknownNameError("file", name, [file.name for file in folder.iterdir() if is_file(file)], str(where))
     return path
 
 

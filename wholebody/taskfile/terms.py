@@ -5,12 +5,18 @@ from __future__ import annotations
 from wholebody import tasks
 from wholebody.methods.ccd.method import CCD
 from wholebody.methods.damped_least_squares import DampedLeastSquares
+from wholebody.methods.inputs import BUDGET, CCD_TOLERANCE, DAMPING, ITERATIONS, RESTARTS, SEED, TOLERANCE, Range
 from wholebody.methods.newton.method import Newton
 from wholebody.methods.placo.method import Placo
 from wholebody.methods.qp.method import QP
 from wholebody.taskfile import kinds
 from wholebody.taskfile.kinds import DIRECTION, FRAME, PLACEMENT, POSITION, QUATERNION, WEIGHT, Number
 from wholebody.taskfile.tables import Form, Key
+
+
+def _number(allowed: Range) -> Number:
+    """The range of a method's setting."""
+    return Number(allowed.low, allowed.high, whole=allowed.whole)
 
 
 def _weight(unit: str) -> Key:
@@ -137,11 +143,11 @@ METHODS = {
         "Sequential quadratic programming.",
         (
             Key("solver", kinds.Text(), 'QP solver: "osqp" (if left out), "daqp", or what `wholebody doctor` lists'),
-            Key("tolerance", Number(1e-10, 0.1), "metres and radians to which goals are met; 1e-5 if left out"),
-            Key("iterations", Number(1, 100_000, whole=True), "of one descent"),
-            Key("budget", Number(0, 1_000_000, whole=True), "programs for further tries; 1000 if left out"),
-            Key("restarts", Number(0, 1000, whole=True), "most of those tries"),
-            Key("seed", Number(0, 2**32 - 1, whole=True), "of those tries"),
+            Key("tolerance", _number(TOLERANCE), "metres and radians to which goals are met; 1e-5 if left out"),
+            Key("iterations", _number(ITERATIONS), "of one descent"),
+            Key("budget", _number(BUDGET), "programs for further tries; 1000 if left out"),
+            Key("restarts", _number(RESTARTS), "most of those tries"),
+            Key("seed", _number(SEED), "of those tries"),
             Key("measures", kinds.Flag(), "whether the measures are to be least; false is faster, true if left out"),
         ),
         QP,
@@ -149,18 +155,18 @@ METHODS = {
     "ccd": Form(
         "Cyclic coordinate descent: points, frames and orientations, without measures.",
         (
-            Key("tolerance", Number(1e-6, 0.1), "metres and radians to which goals are met; 1e-4 if left out"),
-            Key("iterations", Number(1, 100_000, whole=True), "sweeps from one start"),
-            Key("restarts", Number(0, 1000, whole=True), "most further starts"),
-            Key("seed", Number(0, 2**32 - 1, whole=True), "of those starts"),
+            Key("tolerance", _number(CCD_TOLERANCE), "metres and radians to which goals are met; 1e-4 if left out"),
+            Key("iterations", _number(ITERATIONS), "sweeps from one start"),
+            Key("restarts", _number(RESTARTS), "most further starts"),
+            Key("seed", _number(SEED), "of those starts"),
         ),
         CCD,
     ),
     "newton": Form(
         "Sparse Newton in full coordinates; least effort.",
         (
-            Key("tolerance", Number(1e-10, 0.1), "metres and radians to which goals are met; 1e-5 if left out"),
-            Key("iterations", Number(1, 100_000, whole=True), "most of them"),
+            Key("tolerance", _number(TOLERANCE), "metres and radians to which goals are met; 1e-5 if left out"),
+            Key("iterations", _number(ITERATIONS), "most of them"),
             Key("algebra", kinds.Text(), '"auto" (if left out), "normal", "llt", "kkt", "schur", "dense" or "svd"'),
             Key(
                 "inequalities",
@@ -173,17 +179,17 @@ METHODS = {
     "placo": Form(
         "placo's differential inverse kinematics, iterated; to compare with.",
         (
-            Key("tolerance", Number(1e-10, 0.1), "metres and radians to which goals are met; 1e-5 if left out"),
-            Key("iterations", Number(1, 100_000, whole=True), "most of them"),
+            Key("tolerance", _number(TOLERANCE), "metres and radians to which goals are met; 1e-5 if left out"),
+            Key("iterations", _number(ITERATIONS), "most of them"),
         ),
         Placo,
     ),
     "dls": Form(
         "Damped least squares, the textbook baseline: it sees no contacts.",
         (
-            Key("tolerance", Number(1e-10, 0.1), "metres and radians to which goals are met; 1e-5 if left out"),
-            Key("iterations", Number(1, 100_000, whole=True), "most of them"),
-            Key("damping", Number(1e-9, 1e3), "left when the goals are met; 1e-3 if left out"),
+            Key("tolerance", _number(TOLERANCE), "metres and radians to which goals are met; 1e-5 if left out"),
+            Key("iterations", _number(ITERATIONS), "most of them"),
+            Key("damping", _number(DAMPING), "left when the goals are met; 1e-3 if left out"),
         ),
         DampedLeastSquares,
     ),

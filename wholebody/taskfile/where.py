@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from wholebody.errors import FileFormatError
+from wholebody.errors import FileFormatError, one_line
 
 _HEADER = re.compile(r"^\s*\[\[?\s*([\w.-]+)\s*\]\]?")
 
@@ -46,7 +46,8 @@ class Where:
         """Return file, line where it is known, table and key."""
         line = self._line()
         table = f"{self.table} {self.number}" if self.number else self.table
-        parts = [f"{self.file.name}:{line}" if line else self.file.name, table, f"key {self.key}" if self.key else ""]
+        file, key = one_line(self.file.name), one_line(self.key)
+        parts = [f"{file}:{line}" if line else file, table, f"key {key}" if key else ""]
         return ", ".join(part for part in parts if part)
 
     def _line(self) -> int | None:

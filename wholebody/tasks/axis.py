@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from wholebody.checks import shown
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
@@ -66,7 +67,7 @@ class Axis(Goal):
 
     def __post_init__(self) -> None:
         """Check the values."""
-        where = f"Axis({self.frame!r})"
+        where = f"Axis({shown(self.frame)})"
         if (self.direction is None) == (self.toward is None):
             raise InputError(f"{where} takes either a direction or a place to point toward; give one of the two")
         object.__setattr__(self, "_basis", _frame_about(inputs.direction(self.axis, f"{where}: axis")))
@@ -75,7 +76,7 @@ class Axis(Goal):
         else:
             wanted = inputs.direction(self.direction, f"{where}: direction")
         object.__setattr__(self, "_wanted", wanted)
-        object.__setattr__(self, "weight", inputs.positive(self.weight, f"{where}: weight"))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Axis:
         """Find the frame."""

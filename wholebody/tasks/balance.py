@@ -7,6 +7,7 @@ from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 
+from wholebody.checks import listed, number
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
@@ -37,9 +38,11 @@ class Balance(Constraint):
 
     def __post_init__(self) -> None:
         """Check the values."""
-        if isinstance(self.feet, str) or not self.feet:
-            raise InputError(f"Balance: feet is {self.feet!r}; give a list of names")
-        object.__setattr__(self, "margin", inputs.not_negative(self.margin, "Balance: margin"))
+        feet = tuple(listed(self.feet, "Balance: feet", "['left_foot', 'right_foot']"))
+        if not feet:
+            raise InputError("Balance: feet is empty; give a list of names, such as ['left_foot', 'right_foot']")
+        object.__setattr__(self, "feet", feet)
+        object.__setattr__(self, "margin", number(self.margin, "Balance: margin", 0.0, inputs.FARTHEST, "m"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Balance:
         """Find where the feet stand.

@@ -7,10 +7,13 @@ from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 
+from wholebody.checks import instance, number, shown
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Array, Bound, Surroundings, filled
+
+SLOWEST, FASTEST = 1e-9, 1e9  # rad/s, m/s: what is slower is frozen, what is faster is not bounded
 
 
 class Freeze(Bound):
@@ -30,7 +33,7 @@ class Freeze(Bound):
             InputError: nothing is named, or a name is not a string.
         """
         if not joints or not all(isinstance(name, str) for name in joints):
-            raise InputError(f"Freeze takes names, not {joints!r}; write Freeze('left_leg', 'right_leg', 'root')")
+            raise InputError(f"Freeze takes names, not {shown(joints)}; write Freeze('left_leg', 'right_leg', 'root')")
         self.joints = joints
 
     def __repr__(self) -> str:
@@ -73,7 +76,8 @@ class StepLimit(Bound):
         """Check the values."""
         for name in ("velocity", "root_velocity", "root_turn"):
             object.__setattr__(self, name, _speed(getattr(self, name), f"StepLimit: {name}"))
-        speeds = {name: _speed(speed, f"StepLimit: joints[{name!r}]") for name, speed in self.joints.items()}
+        instance(self.joints, Mapping, "StepLimit: joints", "give velocities by name, such as {'left_arm': 1.0}")
+        speeds = {name: _speed(speed, f"StepLimit: joints[{shown(name)}]") for name, speed in self.joints.items()}
         object.__setattr__(self, "joints", speeds)
 
     def resolve(self, scene: Surroundings, start: Array) -> StepLimit:
@@ -101,4 +105,6 @@ class StepLimit(Bound):
 
 def _speed(value: object, where: str) -> float:
     """Return a positive number; inf stands for no bound."""
-    return np.inf if value == np.inf else inputs.positive(value, where)
+    if isinstance(value, (float, np.floating)) and value == np.inf:
+        return np.inf
+    return number(value, where, SLOWEST, FASTEST, "or inf for no bound")

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody.errors import InputError
+from wholebody.checks import choice
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Array, Goal, Mask, Surroundings
@@ -37,11 +37,10 @@ class CenterOfMass(Goal):
 
     def __post_init__(self) -> None:
         """Check the values."""
-        if self.axes not in ("xy", "xyz"):
-            raise InputError(f"CenterOfMass: axes is {self.axes!r}; give 'xyz', or 'xy' to leave the height free")
+        choice(self.axes, ("xyz", "xy"), "CenterOfMass: axes")
         target = inputs.point(self.target, "CenterOfMass: target")
         object.__setattr__(self, "_target", target[: len(self.axes)])
-        object.__setattr__(self, "weight", inputs.positive(self.weight, "CenterOfMass: weight"))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, "CenterOfMass: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> CenterOfMass:
         """Return the goal itself.

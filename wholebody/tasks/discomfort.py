@@ -62,7 +62,7 @@ class Discomfort(Measure):
 
     def __post_init__(self) -> None:
         """Check the value."""
-        object.__setattr__(self, "weight", inputs.positive(self.weight, "Discomfort: weight"))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, "Discomfort: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Discomfort:
         """Take the limits, the neutral posture and the weights of the figure."""

@@ -26,7 +26,7 @@ class Displacement(Measure):
 
     def __post_init__(self) -> None:
         """Check the value."""
-        object.__setattr__(self, "weight", inputs.positive(self.weight, "Displacement: weight"))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, "Displacement: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Displacement:
         """Take the neutral posture and the weights of the figure."""

@@ -26,7 +26,7 @@ class Effort(Measure):
 
     def __post_init__(self) -> None:
         """Check the value."""
-        object.__setattr__(self, "weight", inputs.positive(self.weight, "Effort: weight"))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, "Effort: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Effort:
         """Remember the start."""

@@ -7,6 +7,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from wholebody.checks import shown
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
@@ -41,9 +42,9 @@ class Frame(Goal):
 
     def __post_init__(self) -> None:
         """Check the values."""
-        where = f"Frame({self.frame!r})"
+        where = f"Frame({shown(self.frame)})"
         object.__setattr__(self, "_target", inputs.target_placement(self.target, f"{where}: target"))
-        object.__setattr__(self, "weight", inputs.positive(self.weight, f"{where}: weight"))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Frame:
         """Find the frame."""
@@ -88,9 +89,9 @@ class Orientation(Goal):
 
     def __post_init__(self) -> None:
         """Check the values."""
-        where = f"Orientation({self.frame!r})"
+        where = f"Orientation({shown(self.frame)})"
         object.__setattr__(self, "_target", inputs.target_rotation(self.target, f"{where}: target"))
-        object.__setattr__(self, "weight", inputs.positive(self.weight, f"{where}: weight"))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Orientation:
         """Find the frame."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody.checks import flag, shown
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
@@ -42,8 +43,9 @@ class Hold(Constraint):
 
     def __post_init__(self) -> None:
         """Check the values."""
+        flag(self.orientation, f"Hold({shown(self.frame)}): orientation")
         if self.at is not None:
-            object.__setattr__(self, "_at", inputs.target_placement(self.at, f"Hold({self.frame!r}): at"))
+            object.__setattr__(self, "_at", inputs.target_placement(self.at, f"Hold({shown(self.frame)}): at"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Hold:
         """Find the frames, and where they are at the start."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wholebody.checks import array, number, numbers, shown
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import PlacementLike, placement
@@ -15,6 +17,12 @@ from wholebody.tasks.base import Array, Surroundings
 
 FARTHEST = 100.0
 """Distance [m] beyond which a place is taken for a slip of units: in millimetres it is a tenth of a metre."""
+
+LIGHTEST, HEAVIEST = 1e-12, 1e12
+"""Least and greatest weight: beyond them the squares of weights lose what other terms say."""
+
+LONGEST_DIRECTION = 1e9
+"""Length beyond which a vector is taken for a slip."""
 
 SHORTEST_DIRECTION = 1e-9
 """Length below which a vector has no direction: a millionth of a millimetre if it came from two points in metres."""
@@ -44,7 +52,7 @@ def find_place(scene: Surroundings, name: str, where: str) -> Place:
         InputError: the name is not a string.
     """
     if not isinstance(name, str):
-        raise InputError(f"{where} takes the name of a frame, not {name!r}")
+        raise InputError(f"{where} takes the name of a frame, not {shown(name)}")
     try:
         frame = int(scene.figure.frame_id(name))
     except UnknownNameError as error:
@@ -72,11 +80,14 @@ def find_dofs(scene: Surroundings, names: Sequence[str], where: str) -> Any:
 
     Raises:
         UnknownNameError: the figure has no such joint or group.
+        InputError: not a list of names.
     """
     try:
         return np.asarray(scene.figure.dofs(names), dtype=np.intp)
     except UnknownNameError as error:
         raise UnknownNameError(error.kind, error.name, error.known, where) from None
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
 
 
 def angular_dofs(model: Any) -> Any:
@@ -85,33 +96,15 @@ def angular_dofs(model: Any) -> Any:
     return state.folded(np.abs(state.jacobian[3:])).max(axis=0) > 0.5
 
 
-def numbers(value: object, shape: tuple[int, ...], where: str) -> Array:
-    """Read-only array of this shape with finite numbers.
-
-    Raises:
-        InputError: it is none.
-    """
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{where} takes numbers of shape {shape}, not {value!r}") from None
-    if array.shape != shape:
-        raise InputError(f"{where} has shape {shape}, not {array.shape}; give {int(np.prod(shape))} numbers")
-    if not np.isfinite(array).all():
-        raise InputError(f"{where} is {array.tolist()}; give finite numbers")
-    array.flags.writeable = False
-    return array
-
-
 def point(value: object, where: str) -> Array:
     """Place in space (3,), metres.
 
     Raises:
         InputError: not three finite numbers, or so far away that it cannot be in metres.
     """
-    array = numbers(value, (3,), where)
-    check_reachable(array, where)
-    return array
+    place = numbers(value, (3,), where)
+    check_reachable(place, where)
+    return place
 
 
 def check_reachable(place: Array, where: str) -> None:
@@ -120,9 +113,9 @@ def check_reachable(place: Array, where: str) -> None:
     Raises:
         InputError: it is farther than `FARTHEST` from the origin.
     """
-    distance = float(np.linalg.norm(place))
+    distance = math.hypot(*place)
     if distance > FARTHEST:
-        raise InputError(f"{where} is {distance:.0f} m away; lengths are in metres, so divide millimetres by 1000")
+        raise InputError(f"{where} is {distance:.4g} m away; lengths are in metres, so divide millimetres by 1000")
 
 
 def direction(value: object, where: str) -> Array:
@@ -131,37 +124,28 @@ def direction(value: object, where: str) -> Array:
     Raises:
         InputError: not three finite numbers, or all of them zero.
     """
-    array = numbers(value, (3,), where)
-    length = float(np.linalg.norm(array))
-    if length < SHORTEST_DIRECTION:
-        raise InputError(f"{where} is {array.tolist()} and has no direction; give a vector that is not zero")
-    unit = array / length
+    given = numbers(value, (3,), where)
+    length = math.hypot(*given)
+    if not SHORTEST_DIRECTION <= length <= LONGEST_DIRECTION:
+        raise InputError(
+            f"{where} is {given.tolist()} and has no direction; give a vector of a length from "
+            f"{SHORTEST_DIRECTION:g} to {LONGEST_DIRECTION:g}"
+        )
+    unit = given / length
     unit.flags.writeable = False
     return unit
 
 
-def positive(value: object, where: str) -> float:
-    """A number greater than zero.
+def weight(value: object, where: str) -> float:
+    """A factor on what a term says.
 
     Raises:
-        InputError: it is none.
+        InputError: it is no number from `LIGHTEST` to `HEAVIEST`.
     """
-    number = float(numbers(value, (), where))
-    if number <= 0.0:
-        raise InputError(f"{where} is {number:g}; give a positive number, or leave the term out")
-    return number
-
-
-def not_negative(value: object, where: str) -> float:
-    """A number that is zero or more.
-
-    Raises:
-        InputError: it is none.
-    """
-    number = float(numbers(value, (), where))
-    if number < 0.0:
-        raise InputError(f"{where} is {number:g}; give zero or more")
-    return number
+    try:
+        return number(value, where, LIGHTEST, HEAVIEST)
+    except InputError:
+        raise InputError(f"{where} is {shown(value)}; give a positive number such as 1, or leave it out") from None
 
 
 def target_placement(at: PlacementLike, where: str) -> Any:
@@ -181,14 +165,14 @@ def target_rotation(value: ArrayLike, where: str) -> Any:
     Raises:
         InputError: it is neither, or not a rotation.
     """
-    shape = np.shape(value)
-    if shape == (4,):
-        return target_placement((0.0, 0.0, 0.0, *numbers(value, (4,), where).tolist()), where)
-    if shape == (3, 3):
+    given = array(value, where, "a quaternion (x, y, z, w) or a matrix (3, 3)")
+    if given.shape == (4,):
+        return target_placement((0.0, 0.0, 0.0, *numbers(given, (4,), where).tolist()), where)
+    if given.shape == (3, 3):
         matrix = np.eye(4)
-        matrix[:3, :3] = numbers(value, (3, 3), where)
+        matrix[:3, :3] = numbers(given, (3, 3), where)
         return target_placement(matrix, where)
-    raise InputError(f"{where} takes a quaternion (x, y, z, w) or a matrix (3, 3), not something of shape {shape}")
+    raise InputError(f"{where} takes a quaternion (x, y, z, w) or a matrix (3, 3), not shape {given.shape}")
 
 
 def check_mass(scene: Surroundings, where: str) -> None:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody.errors import InputError
+from wholebody.checks import choice, shown
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Array, Constraint, Mask, Surroundings, filled
@@ -44,9 +44,8 @@ class Plane(Constraint):
 
     def __post_init__(self) -> None:
         """Check the values."""
-        where = f"Plane({self.frame!r})"
-        if self.side not in ("on", "above"):
-            raise InputError(f"{where}: side is {self.side!r}; give 'on' or 'above'")
+        where = f"Plane({shown(self.frame)})"
+        choice(self.side, ("on", "above"), f"{where}: side")
         object.__setattr__(self, "_normal", inputs.direction(self.normal, f"{where}: normal"))
         if self.point is not None:
             object.__setattr__(self, "_point", inputs.point(self.point, f"{where}: point"))

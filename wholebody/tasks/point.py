@@ -7,6 +7,7 @@ from dataclasses import KW_ONLY, dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wholebody.checks import shown
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Array, Goal, Mask, Surroundings, filled
@@ -40,10 +41,10 @@ class Point(Goal):
 
     def __post_init__(self) -> None:
         """Check the values."""
-        where = f"Point({self.frame!r})"
+        where = f"Point({shown(self.frame)})"
         object.__setattr__(self, "_target", inputs.point(self.target, f"{where}: target"))
         object.__setattr__(self, "_offset", inputs.point(self.offset, f"{where}: offset"))
-        object.__setattr__(self, "weight", inputs.positive(self.weight, f"{where}: weight"))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Point:
         """Find the frame."""

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from wholebody.checks import array, listed, numbers
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import ROUNDING
@@ -43,7 +44,11 @@ class Posture(Goal):
 
     def __post_init__(self) -> None:
         """Check the values."""
-        object.__setattr__(self, "weight", inputs.positive(self.weight, "Posture: weight"))
+        if not isinstance(self.target, str):
+            array(self.target, "Posture: target", "the name of a posture, or its numbers")
+        if self.joints is not None and not isinstance(self.joints, str):
+            object.__setattr__(self, "joints", tuple(listed(self.joints, "Posture: joints", "['left_arm']")))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, "Posture: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Posture:
         """Look up the posture and the joints."""
@@ -77,7 +82,7 @@ class Posture(Goal):
                 return np.asarray(scene.figure.posture(self.target), dtype=float)
             except UnknownNameError as error:
                 raise UnknownNameError(error.kind, error.name, error.known, "Posture") from None
-        q = inputs.numbers(self.target, (scene.model.nq,), "Posture: target")
+        q = numbers(self.target, (scene.model.nq,), "Posture: target")
         normal = np.asarray(pin.normalize(scene.model, q))
         if np.abs(normal - q).max(initial=0.0) > ROUNDING:
             raise InputError("Posture: target holds a quaternion that is not of unit length; use pin.normalize")

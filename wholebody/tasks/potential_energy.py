@@ -45,7 +45,7 @@ class PotentialEnergy(Measure):
 
     def __post_init__(self) -> None:
         """Check the value."""
-        object.__setattr__(self, "weight", inputs.positive(self.weight, "PotentialEnergy: weight"))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, "PotentialEnergy: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> PotentialEnergy:
         """Weigh the segments, and find their heights in the neutral posture."""

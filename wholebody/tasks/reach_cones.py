@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.checks import known, listed
+from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Array, Constraint, Mask, Surroundings, filled
@@ -39,6 +40,11 @@ class ReachCones(Constraint):
     _joints: NDArray[np.intp] = field(init=False, repr=False)
     _against: NDArray[np.intp] = field(init=False, repr=False)
 
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if self.names is not None:
+            object.__setattr__(self, "names", tuple(listed(self.names, "ReachCones: names", "['left_shoulder']")))
+
     def resolve(self, scene: Surroundings, start: Array) -> ReachCones:
         """Find the cones and the frames they belong to.
 
@@ -51,9 +57,7 @@ class ReachCones(Constraint):
             raise InputError("ReachCones: this figure has no reach cones; leave the constraint out")
         limbs = []
         for name in cones if self.names is None else self.names:
-            if name not in cones:
-                raise UnknownNameError("reach cone", name, cones, "ReachCones")
-            cone = cones[name]
+            cone = cones[known(name, cones, "reach cone", "ReachCones")]
             reference = inputs.find_place(scene, cone.reference, "ReachCones")
             limb = inputs.find_place(scene, cone.limb, "ReachCones")
             limbs.append(_Limb(cone.cone, reference, limb, inputs.direction(cone.axis, f"ReachCones: axis of {name}")))

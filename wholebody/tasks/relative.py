@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
+from wholebody.checks import flag, shown
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
@@ -43,10 +44,11 @@ class Relative(Goal):
 
     def __post_init__(self) -> None:
         """Check the values."""
-        where = f"Relative({self.frame!r}, {self.to!r})"
+        where = f"Relative({shown(self.frame)}, {shown(self.to)})"
+        flag(self.orientation, f"{where}: orientation")
         if self.placement is not None:
             object.__setattr__(self, "_placement", inputs.target_placement(self.placement, f"{where}: placement"))
-        object.__setattr__(self, "weight", inputs.positive(self.weight, f"{where}: weight"))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Relative:
         """Find the frames, and where they are to each other at the start."""

@@ -10,12 +10,11 @@ import os
 import select
 import shutil
 import signal
-import tempfile
 import time
-from pathlib import Path
 from typing import Any
 
 from wholebody.errors import MissingPackageError, WholebodyError
+from wholebody.files import Scratch
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "chromium-headless-shell")
 _FLAGS = (
@@ -87,7 +86,8 @@ class Browser:
         self._answers: dict[int, dict[str, Any]] = {}
         self._loaded = False
         self._pid: int | None = None
-        self._folder = Path(tempfile.mkdtemp(prefix="wholebody-browser-"))
+        self._scratch = Scratch()
+        self._folder = self._scratch.path
         self._start(executable)
         atexit.register(self.close)
         try:
@@ -197,7 +197,7 @@ class Browser:
         if not _ended(pid, 3.0):
             os.killpg(pid, signal.SIGKILL)
             _ended(pid, 3.0)
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._scratch.close()
 
     def __enter__(self) -> Browser:
         """Return the browser."""

@@ -58,7 +58,7 @@ class Composition:
         Raises:
             InputError: it has the wrong shape or is not finite.
         """
-        return np.array(self._state.update(np.asarray(q, dtype=float)).q)
+        return np.array(self._state.update(q).q)
 
     def moment(self, q: Array, problem: Any, blockers: Sequence[Any] = ()) -> Moment:
         """What is shown at a posture, with the goals of a problem if there is one, and what stands in their way."""

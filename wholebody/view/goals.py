@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.checks import a
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import placement
@@ -26,9 +27,16 @@ class Goals:
     """The goals of a problem, drawn at any posture."""
 
     def __init__(self, scene: Subject, problem: Any) -> None:
-        """Take the goals of a `wholebody.Problem`, which has resolved them on its scene."""
+        """Take the goals of a `wholebody.Problem`, which has resolved them on its scene.
+
+        Raises:
+            InputError: it is no problem.
+        """
         self.scene = scene
-        self.goals = problem.goals
+        goals = getattr(problem, "goals", None)
+        if not isinstance(goals, (tuple, list)):
+            raise InputError(f"problem is {a(type(problem))}, not a Problem; state one with wb.Problem(scene)")
+        self.goals = goals
 
     def mark(self, moment: Moment, state: State) -> None:
         """Mark each goal that has a place: target, the way to it, axes where it asks for an orientation, the error."""

@@ -8,14 +8,17 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 
+from wholebody.checks import number
+from wholebody.checks import path as checked_path
 from wholebody.errors import InputError, MissingPackageError, WholebodyError
+from wholebody.files import Scratch
 
 FASTEST = {".gif": 25.0, ".mp4": 30.0}
 """Pictures per second by default at most: GIF counts hundredths of a second, and browsers slow down beyond 50."""
+SLOWEST = 0.01  # pictures per second
 _COLORS = 96
 
 
@@ -26,7 +29,7 @@ def check_movie(path: str | os.PathLike[str]) -> Path:
         InputError: it ends neither in .gif nor in .mp4.
         MissingPackageError: it ends in .mp4 and there is no ffmpeg.
     """
-    path = Path(path)
+    path = checked_path(path, "path")
     if path.suffix.lower() not in FASTEST:
         raise InputError(f"{path}: a movie is a .gif or a .mp4; give the file one of these endings")
     if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
@@ -50,56 +53,33 @@ def frame_times(path: Path, count: int, dt: float, fps: float | None) -> tuple[l
     """
     if fps is None:
         fps = min(1 / dt, FASTEST[path.suffix.lower()])
-    if not 0 < fps <= 100:
-        raise InputError(f"fps is between 0 and 100 pictures per second, not {fps}")
+    fps = number(fps, "fps", SLOWEST, 100.0, "pictures per second")
     return [number / fps for number in range(math.floor((count - 1) * dt * fps + 1e-9) + 1)], fps
 
 
-def write_movie(path: Path, pictures: Iterable[bytes], fps: float) -> None:
-    """Write pictures (PNG) as a movie, GIF or MP4 by the ending of the path.
+def movie(suffix: str, pictures: Iterable[bytes], fps: float) -> bytes:
+    """Pictures (PNG) as a movie, GIF or MP4 by the ending of its file.
 
     Raises:
         WholebodyError: ffmpeg failed.
     """
-    if path.suffix.lower() == ".gif":
-        _write_gif(path, pictures, fps)
-    else:
-        _write_mp4(path, pictures, fps)
+    return _gif(pictures, fps) if suffix.lower() == ".gif" else _mp4(pictures, fps)
 
 
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path` that takes its place at the end, or vanishes if there is an error.
-
-    Raises:
-        InputError: the folder does not exist or cannot be written.
-    """
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-        os.close(handle)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror}; make the folder first") from None
-    try:
-        yield Path(name)
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(name, 0o666 & ~mask)
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
-
-
-def _write_gif(path: Path, pictures: Iterable[bytes], fps: float) -> None:
+def _gif(pictures: Iterable[bytes], fps: float) -> bytes:
     from PIL import Image
 
     frames = [Image.open(io.BytesIO(picture)).convert("RGB") for picture in pictures]
     middle = frames[len(frames) // 2].quantize(_COLORS, method=Image.Quantize.MEDIANCUT)
     indexed = [frame.quantize(palette=middle, dither=Image.Dither.NONE) for frame in frames]
-    indexed[0].save(path, save_all=True, append_images=indexed[1:], duration=round(1000 / fps), loop=0, optimize=False)
+    made, rest = io.BytesIO(), indexed[1:]
+    indexed[0].save(
+        made, "GIF", save_all=True, append_images=rest, duration=round(1000 / fps), loop=0, optimize=False
+    )  # fmt: skip
+    return made.getvalue()
 
 
-def _write_mp4(path: Path, pictures: Iterable[bytes], fps: float) -> None:
+def _mp4(pictures: Iterable[bytes], fps: float) -> bytes:
     command = [
         "ffmpeg",
         "-y",
@@ -115,7 +95,8 @@ def _write_mp4(path: Path, pictures: Iterable[bytes], fps: float) -> None:
         "-",
     ]
     command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p"]
-    with tempfile.TemporaryFile() as log:
+    with Scratch() as folder, tempfile.TemporaryFile() as log:
+        path = folder / "movie.mp4"  # ffmpeg puts the index first at the end, which takes a file
         process = subprocess.Popen(
             [*command, "-movflags", "+faststart", str(path)], stdin=subprocess.PIPE, stdout=log, stderr=log
         )
@@ -133,4 +114,5 @@ def _write_mp4(path: Path, pictures: Iterable[bytes], fps: float) -> None:
         if process.wait() != 0:
             log.seek(0)
             said = log.read().decode(errors="replace").strip().splitlines() or ["nothing"]
-            raise WholebodyError(f"{path}: ffmpeg failed and said: {said[-1]}")
+            raise WholebodyError(f"the movie: ffmpeg failed and said: {said[-1]}")
+        return path.read_bytes()

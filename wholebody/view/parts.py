@@ -11,8 +11,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody import checks
 from wholebody.errors import InputError, UnknownNameError
-from wholebody.geometry.placement import PlacementLike, placement
+from wholebody.geometry.placement import FARTHEST, PlacementLike, placement
 from wholebody.geometry.shapes import Shape
 from wholebody.view.style import Color
 
@@ -68,16 +69,23 @@ class Parts:
         Raises:
             InputError: there is no part, or one has no shape or a placement that cannot be read.
         """
+        if not isinstance(parts, Mapping):
+            raise InputError(
+                f"Parts: parts is {checks.shown(parts)}; give shapes by name, such as {{'board': [Part(shape)]}}"
+            )
         if not parts:
             raise InputError("there are no parts to show; give a mapping from names to shapes")
         self.figure = None
         self.model, self.geometry = pin.Model(), pin.GeometryModel()
         owners, objects = [], {}
         for name, shapes in parts.items():
-            joint = self.model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), name)
-            listed = [Part(*entry) for entry in shapes]
+            checks.text(name, "the name of a part")
+            listed = [
+                _part(entry, name) for entry in checks.listed(shapes, f"part {name!r}", "[Part(wb.Box((1, 1, 1)))]")
+            ]
             if not listed:
                 raise InputError(f"part {name!r} has no shape; give it one")
+            joint = self.model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), name)
             for number, part in enumerate(listed):
                 key = name if number == 0 else f"{name} {number + 1}"
                 base = placement(part.at, f"part {name!r}")
@@ -97,11 +105,26 @@ class Parts:
             UnknownNameError: a part has no placement.
             InputError: a placement cannot be read.
         """
+        if not isinstance(placements, Mapping):
+            raise InputError(
+                f"placements is {checks.shown(placements)}; give a placement for each of {', '.join(self.names)}"
+            )
         for name in self.names:
             if name not in placements:
-                raise UnknownNameError("placement", name, placements, "posture")
+                given = [key for key in placements if isinstance(key, str)]
+                raise UnknownNameError("placement", name, given, "posture")
         return np.concatenate([pin.SE3ToXYZQUAT(placement(placements[name], name)) for name in self.names])
 
     def contacts(self, q: Array, within: float = 0.05) -> _Nothing:
         """None: contacts are not computed here."""
+        checks.posture(q, self.model.nq)
+        checks.number(within, "within", -FARTHEST, FARTHEST, "m")
         return _Nothing()
+
+
+def _part(entry: Any, name: str) -> Part:
+    """A part from what stands in a list, with its shape and color checked."""
+    part = Part(*entry) if isinstance(entry, tuple) and 1 <= len(entry) <= len(Part._fields) else Part(entry)
+    if not isinstance(part.shape, Shape):
+        raise InputError(f"part {name!r} has {checks.shown(part.shape)} for a shape; give wb.Box, wb.Sphere or another")
+    return part if part.color is None else part._replace(color=checks.color(part.color, f"part {name!r}: color"))

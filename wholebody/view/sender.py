@@ -15,7 +15,7 @@ import time
 from collections.abc import Iterable
 from typing import Any
 
-from wholebody.errors import MissingPackageError, WholebodyError
+from wholebody.errors import InputError, MissingPackageError, WholebodyError
 from wholebody.view import server
 from wholebody.view.server import PAGE, PUSH, SYNC, Command
 
@@ -31,16 +31,19 @@ class Sender:
     """The program's end of a server process. Commands go through a pipe: nobody else can send any, nothing is awaited.
 
     Attributes:
-        url: address of the page, on 127.0.0.1.
+        url: address of the page.
     """
 
-    def __init__(self, page: str) -> None:
+    def __init__(self, page: str, host: str = "127.0.0.1", port: int = 0) -> None:
         """Start the server.
 
         Args:
             page: HTML to serve.
+            host: name or address of this machine to listen at.
+            port: where; 0 for the first free one.
 
         Raises:
+            InputError: the port is taken, or the host is no address of this machine.
             MissingPackageError: tornado is not installed.
             ViewerClosedError: the server did not start.
         """
@@ -52,7 +55,7 @@ class Sender:
         self._syncs = 0
         self.tabs = 0
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _START, server.__file__, str(os.getpid())],
+            [sys.executable, "-c", _START, server.__file__, str(os.getpid()), host, str(port)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -61,12 +64,16 @@ class Sender:
         )
         atexit.register(self.close)
         try:
-            answer = self._read("url", _STARTING)
+            answer = self._read(("url", "refused"), _STARTING)
+            if answer is not None and "refused" in answer:
+                raise InputError(
+                    f"the page cannot be served at {host}, port {port or 'any'} ({answer['refused']}); give another"
+                )
             if answer is None:
                 raise ViewerClosedError("the viewer's server did not start; run `wholebody doctor`")
             self.url = str(answer["url"])
             self._write(Command(PAGE, payload=page.encode()).pack())
-            self._read("ready", _STARTING)
+            self._read(("ready",), _STARTING)
         except BaseException:
             self.close()
             raise
@@ -96,7 +103,7 @@ class Sender:
         self._syncs += 1
         number = self._syncs
         self._write(Command(PUSH).pack() + Command(SYNC, key=str(number)).pack())
-        return self._read("sync", timeout, number) is not None
+        return self._read(("sync",), timeout, number) is not None
 
     def close(self) -> None:
         """End the server process. Doing it again does nothing."""
@@ -124,16 +131,16 @@ class Sender:
     def _until(self, true: Any, timeout: float) -> bool:
         end = time.monotonic() + timeout
         while not true():
-            if self._read("tabs", end - time.monotonic()) is None:
+            if self._read(("tabs",), end - time.monotonic()) is None:
                 return bool(true())
         return True
 
-    def _read(self, key: str, timeout: float, value: Any = None) -> dict[str, Any] | None:
-        """Next line of the server that has this key (and value); None after `timeout` seconds, or if it ended."""
+    def _read(self, keys: tuple[str, ...], timeout: float, value: Any = None) -> dict[str, Any] | None:
+        """Next line of the server with one of the keys (and value); None after `timeout` seconds, or if it ended."""
         end = time.monotonic() + timeout
         while True:
             for number, line in enumerate(self._lines):
-                if key in line and value in (None, line[key]):
+                if any(key in line and value in (None, line[key]) for key in keys):
                     return self._lines.pop(number)
             if not self._receive(end - time.monotonic()):
                 return None

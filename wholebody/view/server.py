@@ -2,16 +2,18 @@
 
 It runs apart from the program that draws, so that a long computation never freezes the page. It is started as a script
 and imports the standard library and tornado alone. Commands come in over its standard input, so nobody else can send
-any; what it has to tell goes out over its standard output, one JSON object a line. It listens on 127.0.0.1 only, and
-ends when its input ends or its parent is gone.
+any; what it has to tell goes out over its standard output, one JSON object a line. It listens on one address,
+127.0.0.1 by default, and ends when its input ends or its parent is gone.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import ipaddress
 import json
 import os
+import socket
 import struct
 import sys
 from typing import Any, NamedTuple
@@ -21,7 +23,8 @@ CAMERA, ANIMATION = b"c", b"a"
 PUSH, SYNC, PAGE = b"e", b"s", b"h"
 STOP = "stop"
 HEADER = struct.Struct("<cHHI")
-HOSTS = ("127.0.0.1", "localhost")
+LOCAL = ("127.0.0.1", "localhost", "::1")
+EVERYWHERE = ("0.0.0.0", "::")
 FIRST_PORT, PORTS = 7000, 100
 PARENT_POLL = 0.5  # s
 
@@ -201,16 +204,36 @@ class Hub:
             self.syncs.clear()
 
 
-def make_application(hub: Hub) -> Any:
+def called(host: str) -> frozenset[str]:
+    """Names under which a server that listens at `host` may be asked: a foreign one would be DNS rebinding."""
+    names = {*LOCAL, host.lower()}
+    if host not in LOCAL:
+        names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
+    return frozenset(names)
+
+
+def is_address(name: str) -> bool:
+    """Whether a name is an IP address, which nobody can rebind."""
+    try:
+        ipaddress.ip_address(name.strip("[]"))
+    except ValueError:
+        return False
+    return True
+
+
+def make_application(hub: Hub, host: str) -> Any:
     """The web side: the page at /, its socket at /socket, nothing else."""
     from tornado.web import Application, HTTPError, RequestHandler
     from tornado.websocket import WebSocketHandler
 
+    names = called(host)
+
     class LocalOnly(RequestHandler):  # type: ignore[misc]
-        """Refuses requests that reached 127.0.0.1 under a foreign name (DNS rebinding)."""
+        """Refuses requests that reached this machine under a foreign name (DNS rebinding)."""
 
         def prepare(self) -> None:
-            if self.request.host_name not in HOSTS:
+            name = self.request.host_name.lower()
+            if name not in names and not (host not in LOCAL and is_address(name)):
                 raise HTTPError(403)
 
     class Page(LocalOnly):
@@ -250,8 +273,8 @@ def make_application(hub: Hub) -> Any:
     return Application([("/", Page), ("/socket", Tab)])
 
 
-async def serve(parent: int) -> None:
-    """Serve until the input ends or the parent is gone."""
+async def serve(parent: int, host: str, port: int) -> None:
+    """Serve until the input ends or the parent is gone; port 0 takes the first free one."""
     import logging
 
     from tornado.httpserver import HTTPServer
@@ -259,16 +282,19 @@ async def serve(parent: int) -> None:
 
     logging.getLogger("tornado").setLevel(logging.CRITICAL)
     hub = Hub()
-    for port in [*range(FIRST_PORT, FIRST_PORT + PORTS), 0]:
+    candidates = [port] if port else [*range(FIRST_PORT, FIRST_PORT + PORTS), 0]
+    for candidate in candidates:
         try:
-            sockets = bind_sockets(port, "127.0.0.1")
+            sockets = bind_sockets(candidate, host)
             break
-        except OSError:
-            if port == 0:
-                raise
-    server = HTTPServer(make_application(hub))
+        except (OSError, UnicodeError) as error:
+            if candidate == candidates[-1]:
+                tell(refused=getattr(error, "strerror", None) or str(error))
+                return
+    server = HTTPServer(make_application(hub, host))
     server.add_sockets(sockets)
-    tell(url=f"http://127.0.0.1:{sockets[0].getsockname()[1]}/")
+    shown = LOCAL[0] if host in EVERYWHERE else f"[{host}]" if ":" in host else host
+    tell(url=f"http://{shown}:{sockets[0].getsockname()[1]}/")
 
     reader = asyncio.StreamReader(limit=2**20)
     await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin.buffer)
@@ -279,5 +305,5 @@ async def serve(parent: int) -> None:
 
 if __name__ == "__main__":
     with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
-        asyncio.run(serve(int(sys.argv[1])))
+        asyncio.run(serve(int(sys.argv[1]), sys.argv[2], int(sys.argv[3])))
     os._exit(0)

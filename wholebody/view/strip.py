@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from numpy.typing import ArrayLike
 
+from wholebody.checks import a, listed
+from wholebody.checks import path as checked_path
 from wholebody.errors import InputError
-from wholebody.view.movie import replacing
+from wholebody.files import Scratch, check_writable, write
+from wholebody.view.studio import check_size
 from wholebody.view.viewer import Viewer
 
 GAP = 6  # pixels between two pictures
@@ -39,15 +42,19 @@ def write_strip(
     """
     from PIL import Image
 
-    if not len(postures):
+    if not isinstance(viewer, Viewer):
+        raise InputError(f"write_strip: viewer is {a(type(viewer))}, not a Viewer; make one with wb.Viewer(scene)")
+    postures = listed(postures, "postures", "[q], each of shape (nq,)")
+    if not postures:
         raise InputError("a film strip has at least one posture; give a list of postures, each of shape (nq,)")
-    width, height = size
+    width, height = check_size(size)
     strip = Image.new("RGB", (len(postures) * (width + GAP) - GAP, height), "white")
-    with TemporaryDirectory() as folder:
+    place = check_writable(checked_path(path, "path"))
+    with Scratch() as folder:
         for number, q in enumerate(postures):
             viewer.show(q)
-            with Image.open(viewer.picture(Path(folder) / "one.png", size)) as picture:
+            with Image.open(viewer.picture(folder / "one.png", size)) as picture:
                 strip.paste(picture, (number * (width + GAP), 0))
-    with replacing(Path(path)) as temporary:
-        strip.save(temporary, format="PNG")
-    return Path(path)
+    made = io.BytesIO()
+    strip.save(made, format="PNG")
+    return write(place, made.getvalue())

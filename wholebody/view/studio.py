@@ -5,12 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-import numpy as np
-
+from wholebody.checks import listed, shown, whole
 from wholebody.errors import InputError
 from wholebody.view.browser import Browser
 
 LARGEST = 8192  # pixels: no software renderer goes beyond
+
+
+def check_size(size: Any) -> tuple[int, int]:
+    """Width and height of a picture, pixels.
+
+    Raises:
+        InputError: not two whole numbers, or out of range.
+    """
+    given = listed(size, "size", "(960, 720), pixels")
+    if len(given) != 2:
+        raise InputError(f"size is {shown(size)}; give width and height, pixels")
+    return whole(given[0], "the width of size", 16, LARGEST), whole(given[1], "the height of size", 16, LARGEST)
 
 
 class Studio:
@@ -41,10 +52,9 @@ class Studio:
         self._browser = None
 
     def _open(self, page: str, size: Any) -> Browser:
-        if np.shape(size) != (2,) or not all(isinstance(n, (int, np.integer)) and 16 <= n <= LARGEST for n in size):
-            raise InputError(f"size is width and height, whole numbers from 16 to {LARGEST} pixels, not {size}")
+        width, height = check_size(size)
         if self._browser is None:
             self._browser = Browser()
-        self._browser.resize((int(size[0]), int(size[1])))
+        self._browser.resize((width, height))
         self._browser.open_html(page)
         return self._browser

@@ -6,9 +6,33 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.checks import a
+from wholebody.errors import InputError
+
 Array = NDArray[np.float64]
+
+
+def checked_subject(scene: Any) -> Any:
+    """What a viewer shows.
+
+    Raises:
+        InputError: it is no scene; what else might have been meant is told how to be shown.
+    """
+    if isinstance(getattr(scene, "model", None), pin.Model) and callable(getattr(scene, "contacts", None)):
+        return scene
+    if hasattr(scene, "scene"):  # a problem
+        mend = f"give the scene of the {type(scene).__name__}"
+    elif hasattr(scene, "bodies"):  # an assembly
+        mend = (
+            "its bodies have no shapes; say what they look like with wholebody.view.parts.Parts, and show "
+            "parts.posture(solution.placements)"
+        )
+    else:
+        mend = "make one with wb.Scene(figure)"
+    raise InputError(f"Viewer: scene is {a(type(scene))}, not a Scene; {mend}")
 
 
 class Touching(Protocol):

@@ -13,18 +13,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from wholebody import checks
 from wholebody.assessment import assess
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.errors import InputError
+from wholebody.files import check_writable, write
+from wholebody.geometry.placement import FARTHEST
 from wholebody.view import style
 from wholebody.view.commands import look
 from wholebody.view.composition import Composition
-from wholebody.view.movie import check_movie, frame_times, replacing, write_movie
+from wholebody.view.movie import check_movie, frame_times, movie
 from wholebody.view.page import live_page, static_page
 from wholebody.view.sender import Sender
 from wholebody.view.server import ANIMATION, CAMERA, Command
 from wholebody.view.stage import Stage
 from wholebody.view.studio import Studio
-from wholebody.view.subject import Subject
+from wholebody.view.subject import Subject, checked_subject
 
 Array = NDArray[np.float64]
 
@@ -57,6 +60,8 @@ class Viewer:
         see_through: Collection[str] = (),
         names: bool = False,
         title: str = "wholebody",
+        host: str = "127.0.0.1",
+        port: int = 0,
     ) -> None:
         """Prepare to show a scene.
 
@@ -66,16 +71,22 @@ class Viewer:
             see_through: names of things to draw transparent because they would hide the figure.
             names: write the names of things beside them.
             title: of the browser's tab.
+            host: name or address of this machine at which the live page is served. Any other than 127.0.0.1 lets
+                whoever reaches it look on.
+            port: at which it is served; 0 for the first free one from 7000.
 
         Raises:
-            InputError: the distance is not a finite number.
+            InputError: not a scene, or a value of the wrong kind or out of range.
             UnknownNameError: there is no thing of a name in `see_through`.
         """
-        if not math.isfinite(contact_distance):
-            raise InputError(f"contact_distance is a finite distance in metres, not {contact_distance}")
+        scene = checked_subject(scene)
+        contact_distance = checks.number(contact_distance, "contact_distance", -FARTHEST, FARTHEST, "m")
+        see_through = checks.listed(see_through, "see_through", "['table']")
         for name in see_through:
-            if name not in scene.objects:
-                raise UnknownNameError("object", name, scene.objects, "see_through")
+            checks.known(name, scene.objects, "object", "see_through")
+        checks.flag(names, "names")
+        checks.text(title, "title")
+        self._host, self._port = checks.text(host, "host"), checks.whole(port, "port", 0, 65535)
         self.title = title
         self._stage = Stage()
         self._composition = Composition(scene, self._stage, contact_distance, tuple(see_through), names)
@@ -122,15 +133,17 @@ class Viewer:
         Raises:
             InputError: there is no posture, one has the wrong shape, or the time step or the repeats are not positive.
         """
-        postures = [self._composition.checked(q) for q in getattr(motion, "q", motion)]
-        step = float(getattr(motion, "dt", DEFAULT_DT) if dt is None else dt)
+        given = checks.listed(getattr(motion, "q", motion), "motion", "postures, each of shape (nq,)")
+        postures = [self._composition.checked(q) for q in given]
         if not postures:
             raise InputError("a motion has at least one posture; give a list of postures, each of shape (nq,)")
-        if not (math.isfinite(step) and step > 0 and repeat > 0):
-            raise InputError(f"dt and repeat are positive, not {step} s and {repeat}")
+        step = checks.time_step(getattr(motion, "dt", DEFAULT_DT) if dt is None else dt, "dt")
+        if not (isinstance(repeat, float) and math.isinf(repeat) and repeat > 0.0):
+            repeat = checks.number(repeat, "repeat", 1e-3, 1e9, "times, or math.inf")
         moments = [self._composition.moment(q, problem) for q in postures]
         if ghost is not None:
-            self._ghosts = self._composition.moving_ghost(moments, getattr(ghost, "q", ghost), style.GHOST)
+            followed = checks.listed(getattr(ghost, "q", ghost), "ghost", "postures, each of shape (nq,)")
+            self._ghosts = self._composition.moving_ghost(moments, followed, style.GHOST)
         self._motion = (len(postures), step)
         chosen = np.unique(np.linspace(0, len(postures) - 1, AIMED_AT).astype(int))
         self._seen = [postures[index] for index in chosen]
@@ -142,13 +155,15 @@ class Viewer:
 
         Args:
             postures: each (nq,); none removes the ghosts.
-            color: red, green, blue, alpha from 0 to 1.
+            color: red, green, blue and, if wanted, alpha, each from 0 to 1.
 
         Raises:
             InputError: a posture has the wrong shape or is not finite.
         """
-        self._ghosts = [self._composition.checked(q) for q in postures]
-        self._composition.ghosts(self._ghosts, color)
+        given = checks.listed(postures, "postures", "[q], each of shape (nq,)")
+        painted = checks.color(color, "color")
+        self._ghosts = [self._composition.checked(q) for q in given]
+        self._composition.ghosts(self._ghosts, painted)
         self._stage.flush()
 
     def look(self, eye: ArrayLike | None = None, target: ArrayLike | None = None) -> None:
@@ -163,12 +178,13 @@ class Viewer:
         """
         if (eye is None) != (target is None):
             raise InputError("look takes an eye and a target, or neither; give both")
-        self._camera = None
+        camera = None
         if eye is not None and target is not None:
-            here, there = np.asarray(eye, dtype=float), np.asarray(target, dtype=float)
-            if not (here.shape == there.shape == (3,) and 1e-6 < np.linalg.norm(here - there) < math.inf):
-                raise InputError(f"look takes two different places of three finite numbers, not {eye} and {target}")
-            self._camera = look(there, style.FIELD_OF_VIEW, eye=here)
+            here, there = checks.numbers(eye, (3,), "eye"), checks.numbers(target, (3,), "target")
+            if max(np.abs(here).max(), np.abs(there).max()) > FARTHEST or np.linalg.norm(here - there) < 1e-6:
+                raise InputError("look takes two different places; give an eye and a target, metres")
+            camera = look(there, style.FIELD_OF_VIEW, eye=here)
+        self._camera = camera
         if self._seen:
             self._stage.do(self._aim())
             self._stage.flush()
@@ -177,9 +193,10 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Address of the live page, on this machine only; starts its server when first asked for.
+        """Address of the live page; starts its server when first asked for.
 
         Raises:
+            InputError: the port is taken, or the host is no address of this machine.
             ViewerClosedError: the server could not be started.
         """
         return self._live().url
@@ -191,16 +208,16 @@ class Viewer:
         return self
 
     def wait(self, timeout: float = 60.0) -> bool:
-        """Wait up to `timeout` seconds until a browser shows the live page; return whether one does."""
-        return self._live().wait(timeout)
+        """Wait up to `timeout` seconds (`math.inf` for ever) until a browser shows the live page; whether one does."""
+        return self._live().wait(_seconds(timeout))
 
     def wait_until_closed(self, timeout: float = math.inf) -> bool:
         """Wait up to `timeout` seconds until no browser shows the live page any more; return whether that is so."""
-        return self._live().wait_until_closed(timeout)
+        return self._live().wait_until_closed(_seconds(timeout))
 
     def sync(self, timeout: float = 10.0) -> bool:
         """Wait up to `timeout` seconds until every open tab has drawn all that was shown; return whether they have."""
-        return self._live().sync(timeout)
+        return self._live().sync(_seconds(timeout))
 
     # ---- files
 
@@ -213,10 +230,8 @@ class Viewer:
         Raises:
             InputError: nothing is shown yet, or the file cannot be written.
         """
-        page = static_page(self._commands(), self.title)
-        with replacing(Path(path)) as temporary:
-            temporary.write_text(page, encoding="utf-8")
-        return Path(path)
+        place = checks.path(path, "path")
+        return write(place, static_page(self._commands(), self.title))
 
     def picture(self, path: str | os.PathLike[str], size: tuple[int, int] = (960, 720)) -> Path:
         """Write what is shown as a PNG, drawn by a headless Chromium. A motion is shown at its beginning.
@@ -232,10 +247,9 @@ class Viewer:
             InputError: nothing is shown yet, the size is out of range, or the file cannot be written.
             MissingPackageError: there is no Chromium.
         """
+        place = check_writable(checks.path(path, "path"))
         page = static_page([command for command in self._commands() if command.op != ANIMATION])
-        with replacing(Path(path)) as temporary:
-            temporary.write_bytes(self._studio.picture(page, size))
-        return Path(path)
+        return write(place, self._studio.picture(page, size))
 
     def movie(self, path: str | os.PathLike[str], size: tuple[int, int] = (640, 480), fps: float | None = None) -> Path:
         """Write the motion that was played last as a GIF or an MP4, by the ending of the path.
@@ -256,11 +270,9 @@ class Viewer:
         if self._motion is None:
             raise InputError("a movie needs a motion; call play() before movie()")
         count, dt = self._motion
-        path = check_movie(path)
-        times, fps = frame_times(path, count, dt, fps)
-        with replacing(path) as temporary:
-            write_movie(temporary, self._studio.pictures(page, size, times), fps)
-        return path
+        place = check_writable(check_movie(path))
+        times, fps = frame_times(place, count, dt, fps)
+        return write(place, movie(place.suffix, self._studio.pictures(page, size, times), fps))
 
     def close(self) -> None:
         """End the live page's server and the headless browser. Doing it again does nothing."""
@@ -282,7 +294,7 @@ class Viewer:
 
     def _live(self) -> Sender:
         if self._sender is None:
-            self._sender = Sender(live_page(self.title))
+            self._sender = Sender(live_page(self.title), self._host, self._port)
             self._stage.connect(self._sender)
         return self._sender
 
@@ -295,3 +307,10 @@ class Viewer:
         if not self._seen:
             raise InputError("nothing is shown yet; call show(q) or play(motion) first")
         return [self._aim() if command.op == CAMERA else command for command in self._stage.store.commands()]
+
+
+def _seconds(timeout: object) -> float:
+    """Seconds to wait, perhaps for ever."""
+    if isinstance(timeout, float) and math.isinf(timeout) and timeout > 0.0:
+        return timeout
+    return checks.number(timeout, "timeout", 0.0, 1e9, "s, or math.inf")

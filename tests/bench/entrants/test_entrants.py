@@ -132,6 +132,9 @@ def test_unknown_and_missing_entrants_are_named() -> None:
     with pytest.raises(UnknownNameError, match="qp/osqp"):
         entrants(["qp/osqq"])
     assert [entrant.name for entrant in entrants(["ccd", "qp/daqp"])] == ["ccd", "qp/daqp"]
+    assert [entrant.name for entrant in entrants(["newton", "newton/kkt"])] == [
+        "newton/slack", "newton/barrier", "newton/kkt",
+    ]  # fmt: skip
     assert {entrant.name for entrant in INSTALLED} | set(missing()) == set(names())
     for name, command in missing().items():
         assert command.startswith("pip install")

@@ -163,7 +163,7 @@ def test_bad_input_names_the_bodies() -> None:
     made = Assembly().body("a").body("b", (1, 0, 0))
     with pytest.raises(InputError, match="'a'"):
         made.body("a")
-    with pytest.raises(InputError, match=r"'c' has size 0"):
+    with pytest.raises(InputError, match="body 'c': size is 0"):
         made.body("c", size=0.0)
     with pytest.raises(InputError, match=r"'c'.*length"):
         made.body("c", (0, 0, 0, 0, 0, 0, 2.0))

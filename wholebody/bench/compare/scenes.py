@@ -5,8 +5,6 @@ from __future__ import annotations
 import base64
 import gzip
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
 from wholebody.bench.compare.cases import Shown
@@ -15,6 +13,7 @@ from wholebody.bench.compare.record import DEFAULT
 from wholebody.bench.compare.worker import EndedError, Worker
 from wholebody.bench.entrants.base import Entrant
 from wholebody.bench.problem_sets.case import ProblemSet
+from wholebody.files import Scratch
 
 if TYPE_CHECKING:
     from wholebody.bench.compare.solving import Ready
@@ -68,5 +67,5 @@ def page(good: Entrant, bad: Entrant, made: Ready) -> str:
     with Viewer(problem.scene, title=f"{made.case.set} {made.case.number}") as viewer:
         viewer.ghosts([right])
         viewer.show(wrong, problem=problem)
-        with TemporaryDirectory() as folder:
-            return viewer.save(Path(folder) / "scene.html").read_text(encoding="utf-8")
+        with Scratch() as folder:
+            return viewer.save(folder / "scene.html").read_text(encoding="utf-8")

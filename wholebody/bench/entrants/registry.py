@@ -30,6 +30,8 @@ class _Row(NamedTuple):
 def entrants(names: Iterable[str] | None = None) -> tuple[Entrant, ...]:
     """The entrants of these names, in the order given; all installed ones where None.
 
+    The name of a method with several entrants, "qp" or "newton", means all of them that are installed.
+
     Raises:
         UnknownNameError: there is no such entrant.
         MissingPackageError: what it needs is not installed.
@@ -37,10 +39,16 @@ def entrants(names: Iterable[str] | None = None) -> tuple[Entrant, ...]:
     rows = _rows()
     if names is None:
         return tuple(row.build() for row in rows.values() if row.installed())
-    chosen = tuple(names)
+    families = {name.partition("/")[0] for name in rows}
+    chosen: dict[str, None] = {}
+    for name in names:
+        if name in rows:
+            chosen[name] = None
+        elif name in families:
+            chosen.update(dict.fromkeys(key for key in rows if key.startswith(f"{name}/") and rows[key].installed()))
+        else:
+            raise UnknownNameError("method", name, {*rows, *families})
     for name in chosen:
-        if name not in rows:
-            raise UnknownNameError("method", name, rows)
         if not rows[name].installed():
             raise MissingPackageError(f"{name} is not installed; install it with: {_command(rows[name])}")
     return tuple(rows[name].build() for name in chosen)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 import wholebody as wb
+from wholebody.files import Scratch
 
 KINDS = ("seven axes", "industrial", "parallel")
 RADII = (0.065, 0.030)  # m: of the first link and of the last one
@@ -68,8 +67,8 @@ def arm(kind: str, rng: np.random.Generator) -> tuple[wb.Figure, dict[str, float
             Axis("0 1 0", (0.0, 0.09, 0.0), 3.1, 0.0),
         ]
         tool = (0.0, hand, 0.0)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{kind.replace(' ', '_')}.urdf"
+    with Scratch() as folder:
+        path = folder / f"{kind.replace(' ', '_')}.urdf"
         path.write_text(_urdf(kind.replace(" ", "_"), axes, tool), encoding="utf-8")
         figure = wb.load(path)
     return figure, {f"axis{number}": axis.ready for number, axis in enumerate(axes, start=1)}

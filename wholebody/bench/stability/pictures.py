@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from wholebody.bench.stability.answering import Answer
 from wholebody.bench.stability.case import HardCase, Nonsense, Stream
 from wholebody.bench.stability.rows import Result
+from wholebody.files import Scratch
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 from wholebody.view import Viewer
@@ -127,11 +127,11 @@ def _set_scene(problem: Problem, question: Stream, index: int) -> None:
 def _page(case: HardCase, problem: Problem, q: Array, before: Array) -> str:
     """The page that shows a posture, with another one transparent."""
     shown = [q] if np.abs(q - before).max() <= SAME else [q, before]
-    with Viewer(problem.scene, see_through=case.see_through) as viewer, tempfile.TemporaryDirectory() as folder:
+    with Viewer(problem.scene, see_through=case.see_through) as viewer, Scratch() as folder:
         viewer.ghosts(shown[1:])
         viewer.look(*_camera(problem, shown, np.array(case.eye)))
         viewer.show(q, problem=problem)
-        return viewer.save(Path(folder) / "scene.html").read_text(encoding="utf-8")
+        return viewer.save(folder / "scene.html").read_text(encoding="utf-8")
 
 
 def _camera(problem: Problem, shown: list[Array], way: Array) -> tuple[Array, Array]:

@@ -23,7 +23,9 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser = commands.add_parser("compare", help="every method on every problem set", description=DESCRIPTION)
     parser.add_argument("--quick", action="store_true", help="20 problems a set, within three minutes on two cores")
     parser.add_argument("--sets", nargs="+", metavar="NAME", help="problem sets (default: all)")
-    parser.add_argument("--methods", nargs="+", metavar="NAME", help="methods (default: all that are installed)")
+    parser.add_argument(
+        "--methods", nargs="+", metavar="NAME", help="methods, such as qp, newton or qp/daqp (default: all)"
+    )
     parser.add_argument("--cases", type=int, metavar="N", help="problems of each set (default: 200)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all problems (default: 0)")
     parser.add_argument(

@@ -32,7 +32,9 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         description="Ask every method every hard case, each in a process of its own, and judge the answers: solved, an "
         "honest best effort, a clear refusal, or WRONG.",
     )
-    parser.add_argument("--methods", nargs="+", metavar="NAME", help="methods (default: all that are installed)")
+    parser.add_argument(
+        "--methods", nargs="+", metavar="NAME", help="methods, such as qp, newton or qp/daqp (default: all)"
+    )
     parser.add_argument("--cases", nargs="+", metavar="NAME", help="cases (default: all; with --quick a few)")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes at a time (default: 1)")
     parser.set_defaults(run=run)

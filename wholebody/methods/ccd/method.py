@@ -11,19 +11,19 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
-from wholebody.errors import InputError
+from wholebody.checks import posture
 from wholebody.methods.ccd.overlap import SHAKES
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.remover import TOUCH, Remover
 from wholebody.methods.ccd.terms import read
 from wholebody.methods.contradictions import Contradiction, contradictions, in_words, proven
 from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, check_problem, check_settings
 from wholebody.problem import Iterate, Problem, Solution, Status
 from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
-LEAST_TOLERANCE = 1e-6
 DISTURBANCES = (0.0, 0.05, 0.2, 0.6)  # rad: of the first starts, from the posture at hand; later ones begin anywhere
 ROUNDS = 6  # reaching and leaving overlap by turns, from one start
 HALVINGS = 12  # of the way back to the start, which ends within a 4000th of it
@@ -80,10 +80,7 @@ class CCD:
         Raises:
             InputError: a setting out of range.
         """
-        if not LEAST_TOLERANCE <= self.tolerance <= 0.1:
-            raise InputError(f"tolerance is {self.tolerance}; give metres from {LEAST_TOLERANCE} to 0.1")
-        if self.iterations < 1 or self.restarts < 0:
-            raise InputError("iterations are at least 1, restarts at least 0")
+        check_settings(self, tolerance=CCD_TOLERANCE, iterations=ITERATIONS, restarts=RESTARTS, seed=SEED)
         check_time_limit(self.time_limit)
 
     @property
@@ -104,6 +101,7 @@ class CCD:
             UnsupportedTermError: the problem has terms that this method cannot take.
             InputError: the scene changed after the problem was stated.
         """
+        check_problem(problem, "CCD.solve: problem")
         began = time.perf_counter()
         with problem.lend() as workspace, Control(self.time_limit, progress) as control:
             search = _Search(self, problem, workspace, control)
@@ -136,6 +134,8 @@ class CCD:
             UnsupportedTermError: the problem has terms that this method cannot take.
             InputError: the scene changed after the problem was stated.
         """
+        check_problem(problem, "CCD.pushed_out: problem")
+        q = posture(q, problem.scene.model.nq)
         with problem.lend() as workspace:
             return _Search(self, problem, workspace, Control()).pushed_out(q)
 

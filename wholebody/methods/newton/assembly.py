@@ -10,22 +10,26 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wholebody.errors import InputError, UnknownNameError
-from wholebody.geometry.placement import PlacementLike, placement
+from wholebody.checks import choice, flag, known, number, numbers, shown, text, whole
+from wholebody.errors import InputError
+from wholebody.geometry.pieces import check_length
+from wholebody.geometry.placement import PlacementLike
+from wholebody.methods.inputs import ITERATIONS, TOLERANCE
 from wholebody.methods.newton.assembly_solution import AssemblySolution, solved
 from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.equations import EquationSet, axes_along
-from wholebody.methods.newton.inequalities import Kind
+from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.joint_register import JointRegister
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
-from wholebody.methods.newton.linear_algebra.choice import linear_algebra
+from wholebody.methods.newton.linear_algebra.choice import NAMES, linear_algebra
 from wholebody.methods.newton.system import System
 from wholebody.pool import OneAtATime
-from wholebody.tasks.inputs import direction, numbers, point
+from wholebody.tasks.inputs import direction, point, target_placement
 
 Array = NDArray[np.float64]
 
 WORLD = "world"
+FINEST = 1e-12  # m, rad: least tolerance, where all is exact but for rounding
 
 
 class Assembly:
@@ -72,12 +76,10 @@ class Assembly:
         Raises:
             InputError: the name is taken, the size is not positive, or the placement cannot be read.
         """
-        if not isinstance(name, str) or not name or name == WORLD or name in self._names:
-            raise InputError(f"body {name!r}: the name is taken or not a name; give another one")
-        length = float(numbers(size, (), f"body {name!r}: size"))
-        if length <= 0.0:
-            raise InputError(f"body {name!r} has size {length:g}; give metres greater than zero")
-        placed = pin.SE3ToXYZQUAT(placement(at, f"body {name!r}"))
+        if text(name, "the name of a body") == WORLD or name in self._names:
+            raise InputError(f"body {name!r}: the name is taken; give another one")
+        length = check_length(size, f"body {name!r}: size")
+        placed = pin.SE3ToXYZQUAT(target_placement(at, f"body {name!r}"))
         self._names[name] = len(self._places)
         self._places.append(np.array(placed))
         self._sizes.append(length)
@@ -122,33 +124,33 @@ class Assembly:
             axis_second: (3,) the direction in the second body's frame.
             where: `at`, or `at_first` and `at_second`.
         """
-        what = f"the revolute joint of {first!r} and {second!r}"
+        what = f"the revolute joint of {shown(first)} and {shown(second)}"
         a, b = self._pair(first, second, "revolute joint")
-        ends = self._ends(a, b, "revolute joint", first, second, **where)
         along = direction(axis, f"{what}: axis")
         turn_a, turn_b = pin.Quaternion(self._place(a)[3:]), pin.Quaternion(self._place(b)[3:])
         if axis_second is None:
             ours, theirs = turn_a.inverse() * along, turn_b.inverse() * along
         else:
             ours, theirs = along, direction(axis_second, f"{what}: axis_second")
+        low, high = (-np.inf, np.inf) if limits is None else numbers(limits, (2,), f"{what}: limits").tolist()
+        if low >= high:
+            raise InputError(f"{what}: limits {low:g} and {high:g} leave no room; give the lower one first")
+        ends = self._ends(a, b, "revolute joint", first, second, **where)  # remembers the joint, when all else is right
         basis_a = axes_along(ours)
         # the second body's axes agree with the first's at the present placements, so that the angle is zero now
         basis_b = (turn_b.inverse() * turn_a * basis_a) if axis_second is None else axes_along(theirs)
         self._equations.coincide(a, b, what, *ends)
         self._equations.turn(a, b, what, basis_a, basis_b, 2)
         if limits is not None:
-            low, high = numbers(limits, (2,), f"{what}: limits").tolist()
-            if low >= high:
-                raise InputError(f"{what}: limits {low:g} and {high:g} leave no room; give the lower one first")
             self._equations.limit(a, b, f"the limit of {what[4:]}", basis_a, basis_b, low, high)
         return self._changed()
 
     def prismatic(self, first: str, second: str, *, axis: ArrayLike) -> Assembly:
         """Two bodies slide along one direction (3,) in the world, without turning."""
-        what = f"the prismatic joint of {first!r} and {second!r}"
+        what = f"the prismatic joint of {shown(first)} and {shown(second)}"
         a, b = self._pair(first, second, "prismatic joint")
-        self._joints.add("prismatic joint", first, second)
         along = direction(axis, f"{what}: axis")
+        self._joints.add("prismatic joint", first, second)
         turn_a, turn_b = pin.Quaternion(self._place(a)[3:]), pin.Quaternion(self._place(b)[3:])
         basis = axes_along(turn_a.inverse() * along)
         self._equations.turn(a, b, what, basis, turn_b.inverse() * turn_a * basis, 3)
@@ -159,11 +161,11 @@ class Assembly:
 
     def fixed(self, first: str, second: str, *, placement_second: PlacementLike | None = None) -> Assembly:
         """Two bodies keep their placement to each other: the present one, or the second's in the first's frame."""
-        what = f"the fixed joint of {first!r} and {second!r}"
+        what = f"the fixed joint of {shown(first)} and {shown(second)}"
         a, b = self._pair(first, second, "fixed joint")
-        self._joints.add("fixed joint", first, second)
         here = pin.XYZQUATToSE3(self._place(a)).actInv(pin.XYZQUATToSE3(self._place(b)))
-        wanted = here if placement_second is None else placement(placement_second, what)
+        wanted = here if placement_second is None else target_placement(placement_second, what)
+        self._joints.add("fixed joint", first, second)
         self._equations.coincide(a, b, what, np.array(wanted.translation), np.zeros(3))
         self._equations.turn(a, b, what, pin.Quaternion(wanted.rotation), pin.Quaternion.Identity(), 3)
         return self._changed()
@@ -181,9 +183,8 @@ class Assembly:
             of: which body carries the plane.
             side: "on", or "above" where the point may leave along the normal.
         """
-        what = f"the plane of {body!r} and {of!r}"
-        if side not in ("on", "above"):
-            raise InputError(f"{what}: side is {side!r}; give 'on' or 'above'")
+        what = f"the plane of {shown(body)} and {shown(of)}"
+        choice(side, ("on", "above"), f"{what}: side")
         a, b = self._index(of, what), self._index(body, what)
         if a == b:
             raise InputError(f"{what}: a body cannot stay on a plane of its own; name another one")
@@ -196,15 +197,15 @@ class Assembly:
 
     def point_goal(self, body: str, target: ArrayLike, *, place: ArrayLike = (0.0, 0.0, 0.0)) -> Assembly:
         """Bring a point of a body, (3,) in its frame, to a place in the world (3,), if it can be."""
-        what = f"the goal of {body!r}"
+        what = f"the goal of {shown(body)}"
         ends = point(place, f"{what}: place"), point(target, f"{what}: target")
-        self._equations.coincide(self._index(body, what), -1, what, *ends, goal=True)
+        self._equations.coincide(self._moved(body, what), -1, what, *ends, goal=True)
         return self._changed()
 
     def frame_goal(self, body: str, target: PlacementLike) -> Assembly:
         """Bring a body to a placement in the world, if it can be."""
-        what = f"the goal of {body!r}"
-        wanted, index = placement(target, what), self._index(body, what)
+        what = f"the goal of {shown(body)}"
+        wanted, index = target_placement(target, what), self._moved(body, what)
         self._equations.coincide(index, -1, what, np.zeros(3), np.array(wanted.translation), goal=True)
         identity = pin.Quaternion.Identity()
         self._equations.turn(index, -1, what, identity, pin.Quaternion(wanted.rotation), 3, goal=True)
@@ -252,10 +253,11 @@ class Assembly:
             InputError: there are no bodies, a setting is out of range, or another thread solves this assembly.
             UnknownNameError: no such linear algebra.
         """
-        if not 1e-12 <= tolerance <= 0.1 or iterations < 1:
-            raise InputError(f"tolerance {tolerance:g} and iterations {iterations}; give 1e-12 to 0.1 m and at least 1")
-        if inequalities not in ("slack", "barrier"):
-            raise InputError(f"inequalities is {inequalities!r}; give 'slack' or 'barrier'")
+        number(tolerance, "tolerance", FINEST, TOLERANCE.high)
+        whole(iterations, "iterations", int(ITERATIONS.low), int(ITERATIONS.high))
+        known(algebra, NAMES, "linear algebra")
+        choice(inequalities, KINDS, "inequalities")
+        flag(nearest, "nearest")
         with self._alone:
             if self._prepared is None or self._prepared[0] != algebra:
                 system = self.system()
@@ -276,11 +278,14 @@ class Assembly:
         return self
 
     def _index(self, name: str, where: str) -> int:
-        if name == WORLD:
-            return -1
-        if name not in self._names:
-            raise UnknownNameError("body", name, [*self._names, WORLD], where)
-        return self._names[name]
+        found = known(name, [*self._names, WORLD], "body", where)
+        return -1 if found == WORLD else self._names[found]
+
+    def _moved(self, name: str, where: str) -> int:
+        index = self._index(name, where)
+        if index < 0:
+            raise InputError(f"{where}: the world does not move; name a body")
+        return index
 
     def _place(self, index: int) -> Array:
         return self._places[index] if index >= 0 else np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))

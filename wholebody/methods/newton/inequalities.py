@@ -26,6 +26,7 @@ FRACTION = 0.95  # of the way to the edge that a barrier step may go; larger = f
 LEAST_BARRIER = 1e-11  # m: product of slack and multiplier at which the barrier has done its work
 BARRIER_FALL = 0.15  # factor of the barrier from step to step; smaller = fewer steps, less centred
 Kind = Literal["slack", "barrier"]
+KINDS = ("slack", "barrier")
 
 
 class Inequalities(Protocol):

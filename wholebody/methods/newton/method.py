@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.checks import choice, known
 from wholebody.methods.contradictions import in_words, proven
 from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.inputs import ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.newton.figure_course import FigureCourse
-from wholebody.methods.newton.inequalities import Kind
+from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.linear_algebra.choice import NAMES
 from wholebody.methods.newton.search import Found, Search, Settings
 from wholebody.problem import Iterate, Problem, Solution, Status
@@ -58,14 +59,9 @@ class Newton:
             InputError: a setting out of range.
             UnknownNameError: no such linear algebra.
         """
-        if not 1e-10 <= self.tolerance <= 0.1:
-            raise InputError(f"tolerance is {self.tolerance}; give metres from 1e-10 to 0.1")
-        if self.iterations < 1 or self.restarts < 0:
-            raise InputError(f"iterations {self.iterations} and restarts {self.restarts}; give at least 1 and 0")
-        if self.algebra not in NAMES:
-            raise UnknownNameError("linear algebra", self.algebra, NAMES)
-        if self.inequalities not in ("slack", "barrier"):
-            raise InputError(f"inequalities is {self.inequalities!r}; give 'slack' or 'barrier'")
+        check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, restarts=RESTARTS, seed=SEED)
+        known(self.algebra, NAMES, "linear algebra")
+        choice(self.inequalities, KINDS, "inequalities")
         check_time_limit(self.time_limit)
 
     @property
@@ -83,6 +79,7 @@ class Newton:
         Raises:
             InputError: the problem has a term that this method has no equations for.
         """
+        check_problem(problem, "Newton.solve: problem")
         began = time.perf_counter()
         with problem.lend() as workspace, Control(self.time_limit, progress) as control:
             course = FigureCourse(problem, workspace, self.algebra)

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError
+from wholebody.checks import number, posture, time_step
+from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.linear_algebra.base import Pattern
 from wholebody.methods.newton.method import answer
@@ -58,9 +59,8 @@ class NewtonTracker:
         Raises:
             InputError: the problem has a term that this method has no equations for, or dt is not positive and finite.
         """
-        if dt is not None and not (np.isfinite(dt) and dt > 0.0):
-            raise InputError(f"dt is {dt}; give seconds a frame, such as 0.02, or None")
-        self.problem, self.dt = problem, dt
+        self.problem = check_problem(problem, "tracker: problem")
+        self.dt = None if dt is None else time_step(dt, "dt")
         self._algebra, self._settings = algebra, settings
         self.workspace = problem.workspace()
         self._alone = OneAtATime("tracker")
@@ -77,6 +77,8 @@ class NewtonTracker:
             InputError: objects came to or left the scene, a new term has no equations, or another thread is within a
                 call of this tracker.
         """
+        q = posture(q, self.workspace.model.nq)
+        tolerance = number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
         with self._alone:
             course = self._renewed()
             course.objective.anchor(q)
@@ -102,6 +104,7 @@ class NewtonTracker:
             InputError: as for `step`.
         """
         began = time.perf_counter()
+        q = posture(q, self.workspace.model.nq)
         with self._alone:
             search = Search(self._renewed(), self._settings)
             return answer(search, search.from_here(q), began)

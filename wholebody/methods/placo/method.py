@@ -11,10 +11,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
-from wholebody.errors import InputError
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.methods.contradictions import explanation
 from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, check, named_frames
 from wholebody.problem import Iterate, Problem, Solution, Status
@@ -64,11 +64,7 @@ class Placo:
         Raises:
             InputError: a setting out of range.
         """
-        if not 1e-10 <= self.tolerance <= 0.1:
-            raise InputError(f"tolerance is {self.tolerance}; give metres from 1e-10 to 0.1")
-        if self.iterations < 1:
-            raise InputError(f"iterations is {self.iterations}; give 1 or more")
-
+        check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS)
         check_time_limit(self.time_limit)
 
     @property
@@ -83,6 +79,7 @@ class Placo:
             InputError: placo cannot express the problem, or its scene changed after it was stated.
             MissingPackageError: placo is not installed.
         """
+        check_problem(problem, "Placo.prepare: problem")
         with problem.lend() as workspace, problem.scene.built.pool(_Room, _Room).lend() as room:
             room.robot(problem, workspace)
 
@@ -97,6 +94,7 @@ class Placo:
             InputError: placo cannot express the problem, or its scene changed after it was stated.
             MissingPackageError: placo is not installed.
         """
+        check_problem(problem, "Placo.solve: problem")
         began = time.perf_counter()
         with (
             problem.lend() as workspace,

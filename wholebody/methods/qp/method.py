@@ -8,16 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from wholebody.assessment import Assessment, assess
-from wholebody.errors import InputError
+from wholebody.checks import flag
 from wholebody.methods.contradictions import in_words, proven
 from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.qp.search import Search, Settings
 from wholebody.methods.qp.solvers.base import make_solver
 from wholebody.methods.qp.tracking import Tracker
 from wholebody.methods.qp.visit import Local
 from wholebody.problem import Problem, Solution, Status
-
-LEAST_TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -56,10 +55,8 @@ class QP:
             InputError: a setting out of range.
             UnknownNameError: no such QP solver.
         """
-        if not LEAST_TOLERANCE <= self.tolerance <= 0.1:
-            raise InputError(f"tolerance is {self.tolerance}; give metres from {LEAST_TOLERANCE} to 0.1")
-        if self.iterations < 1 or self.restarts < 0 or self.budget < 0:
-            raise InputError("iterations are at least 1, restarts and budget at least 0")
+        check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, budget=BUDGET, restarts=RESTARTS, seed=SEED)
+        flag(self.measures, "measures")
         check_time_limit(self.time_limit)
         make_solver(self.solver)
 
@@ -81,6 +78,7 @@ class QP:
         Raises:
             InputError: the scene changed after the problem was stated.
         """
+        check_problem(problem, "QP.solve: problem")
         began = time.perf_counter()
         settings = Settings(self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures)
         with problem.lend() as workspace, Control(self.time_limit, progress) as control:

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.errors import InputError
+from wholebody.checks import flag, time_step
 from wholebody.linearisation import Linearisation
+from wholebody.methods.inputs import check_problem
 from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem
@@ -78,9 +79,8 @@ class Tracker:
         Raises:
             InputError: dt is not a positive finite number.
         """
-        if not (np.isfinite(dt) and dt > 0.0):
-            raise InputError(f"dt is {dt}; give a step in seconds, such as 0.01")
-        self.problem, self.dt = problem, dt
+        self.problem = check_problem(problem, "tracker: problem")
+        self.dt = time_step(dt, "dt")
         self._working_set = WorkingSet(solver)
         self._within = LEAST_WITHIN
         self._alone = OneAtATime("tracker")
@@ -101,6 +101,7 @@ class Tracker:
             InputError: q is no posture, objects came to or left the scene, or another thread is within a step of this
                 tracker.
         """
+        flag(measures, "measures")
         with self._alone:
             return self._step(q, measures)
 

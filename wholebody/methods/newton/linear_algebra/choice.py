@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.errors import UnknownNameError
+from wholebody.checks import known
 from wholebody.methods.newton.linear_algebra.base import Indices, LinearAlgebra, Pattern
 from wholebody.methods.newton.linear_algebra.dense_columns import DenseColumns
 from wholebody.methods.newton.linear_algebra.normal import NormalEquations
@@ -27,8 +27,7 @@ def linear_algebra(pattern: Pattern, name: str = "auto") -> LinearAlgebra:
     Raises:
         UnknownNameError: there is none.
     """
-    if name not in NAMES:
-        raise UnknownNameError("linear algebra", name, NAMES)
+    known(name, NAMES, "linear algebra")
     dense = dense_columns(pattern)
     if name == "schur" or (name == "auto" and 0 < len(dense) <= MOST_DENSE):
         return DenseColumns(pattern, dense)

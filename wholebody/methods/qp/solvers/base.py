@@ -7,7 +7,8 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from wholebody.errors import MissingPackageError, UnknownNameError
+from wholebody.checks import shown
+from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.methods.qp.active_set import compiled_kernel, guess_active_set, lacking, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, Array, QPSolution, QuadraticProgram
 from wholebody.methods.qp.semismooth_newton import minimise
@@ -108,10 +109,13 @@ def make_solver(name: str) -> QPSolver:
     """A QP solver by name.
 
     Raises:
+        InputError: not a text.
         UnknownNameError: no installed solver has this name.
         MissingPackageError: it exists but its package is not installed.
     """
     compiled_kernel()  # not in the middle of a solve
+    if not isinstance(name, str):
+        raise InputError(f"solver is {shown(name)}; give the name of a QP solver, such as 'osqp'")
     if name == "osqp":
         from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
 

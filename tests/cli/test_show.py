@@ -1,0 +1,123 @@
+"""`wholebody show`: it waits for a browser, at the address that was asked for, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from wholebody.cli import main
+from wholebody.view.browser import Browser, find_chromium
+
+
+def free_port() -> int:
+    with socket.socket() as made:
+        made.bind(("127.0.0.1", 0))
+        return int(made.getsockname()[1])
+
+
+def showing(*arguments: str) -> tuple[subprocess.Popen[str], str]:
+    """A process that shows a hand, and the address it says; no browser of the desktop is opened."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "wholebody", "show", "hand", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "BROWSER": "true %s"},
+    )
+    assert process.stdout is not None
+    found = re.search(r"http://\S+/", process.stdout.readline())
+    assert found, process.communicate()
+    return process, found[0]
+
+
+def ended(process: subprocess.Popen[str], how: int = signal.SIGINT) -> int:
+    process.send_signal(how)
+    process.communicate(timeout=20)
+    return int(process.returncode)
+
+
+def status(url: str, host: str | None = None) -> int:
+    request = urllib.request.Request(url, headers={} if host is None else {"Host": host})
+    try:
+        with urllib.request.urlopen(request, timeout=10) as answer:
+            return int(answer.status)
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+@pytest.mark.browser
+def test_it_waits_for_the_first_tab_however_late_and_ends_with_the_last(tmp_path: Path) -> None:
+    if find_chromium() is None:
+        (pytest.fail if os.environ.get("WHOLEBODY_REQUIRE_BROWSER") else pytest.skip)("there is no Chromium")
+    port = free_port()
+    process, url = showing("--port", str(port))
+    try:
+        assert url == f"http://127.0.0.1:{port}/"
+        time.sleep(5.0)  # longer than a tab may be away while it loads again
+        assert process.poll() is None
+        with Browser((320, 240)) as browser:
+            browser.open(url)
+            assert browser.evaluate("document.title") == "hand"
+            assert process.poll() is None
+        process.communicate(timeout=30)
+        assert process.returncode == 0
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_every_address_of_this_machine_can_be_served_and_no_foreign_name() -> None:
+    process, url = showing("--host", "0.0.0.0")
+    try:
+        assert status(url) == 200
+        assert status(url, "192.168.7.7:7000") == 200
+        assert status(url, socket.gethostname()) == 200
+        assert status(url, "evil.example") == 403
+        assert ended(process) == 130
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--port", "70000"], "port is 70000; give a whole number between 0 and 65535"),
+        (["--port", "-1"], "port is -1"),
+        (["--host", "192.0.2.1"], "cannot be served at 192.0.2.1"),
+        (["--host", "no such host"], "cannot be served at no such host"),
+        (["--host", "x" * 500], "host is 'xxx"),
+        (["--save", "a.html", "--port", "7777"], "leave them out beside --save"),
+    ],
+)
+def test_an_address_that_cannot_be_served_is_named(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["show", "hand", *arguments]) == 2
+    captured = capsys.readouterr()
+    assert said in captured.err
+    assert captured.err.count("\n") == 1
+
+
+def test_a_port_that_is_taken_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        assert main(["show", "hand", "--port", str(port)]) == 2
+    assert f"port {port} (" in capsys.readouterr().err
+
+
+def test_the_package_is_a_command_too() -> None:
+    done = subprocess.run([sys.executable, "-m", "wholebody", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("wholebody ")

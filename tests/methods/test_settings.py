@@ -1,0 +1,69 @@
+"""Settings of methods are refused when they are given, and not when something is solved long after."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+from typing import Any
+
+import pytest
+
+import wholebody as wb
+from wholebody import InputError
+
+METHODS = (wb.QP, wb.CCD, wb.Newton, wb.Placo, wb.DampedLeastSquares)
+NO_NUMBER = (None, "x", "1", math.nan, math.inf, -math.inf, True, 1j, [], [1], {}, object(), 10**400, 10**5000, -1)
+WHOLE = ("iterations", "budget", "restarts", "seed")
+REAL = ("tolerance", "damping")
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_setting_that_is_a_number_is_checked(method: Any) -> None:
+    settings = {field.name for field in fields(method) if field.init} - {"solver", "algebra", "inequalities"}
+    assert settings - {"measures"} <= {*WHOLE, *REAL, "time_limit"}
+    for name in settings & {*WHOLE, *REAL}:
+        for wrong in (*NO_NUMBER, *((1.5, 2.0) if name in WHOLE else (0.0, 1e9))):
+            with pytest.raises(InputError, match=f"^{name} is "):
+                method(**{name: wrong})
+
+
+@pytest.mark.parametrize("wrong", [None, 0, 1, "yes", [], math.nan])
+def test_flags_are_true_or_false(wrong: Any) -> None:
+    with pytest.raises(InputError, match=r"measures is .*; give True or False"):
+        wb.QP(measures=wrong)
+
+
+@pytest.mark.parametrize("wrong", [None, 3, [], object(), ("slack",)])
+def test_names_are_texts(wrong: Any) -> None:
+    with pytest.raises(InputError, match="solver is"):
+        wb.QP(solver=wrong)
+    with pytest.raises(InputError, match="is not the name of a linear algebra"):
+        wb.Newton(algebra=wrong)
+    with pytest.raises(InputError, match=r"inequalities is .*'slack' or 'barrier'"):
+        wb.Newton(inequalities=wrong)
+
+
+def test_assemblies_are_told_where_they_are_taken() -> None:
+    assembly = wb.Assembly().body("rod")
+    for call in (
+        lambda: wb.pull(assembly, [(0, 0, 0)]),  # type: ignore[arg-type]
+        lambda: wb.Drag(assembly),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(InputError, match=r"takes a Problem, not an Assembly; .*point_goal"):
+            call()
+    with pytest.raises(InputError, match=r"scene is an Assembly, not a Scene; .*view\.parts\.Parts"):
+        wb.Viewer(assembly)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="problem is an Assembly, not a Problem"):
+        wb.solve(assembly)  # type: ignore[arg-type]
+
+
+def test_a_joint_that_was_refused_can_be_added_again() -> None:
+    assembly = wb.Assembly().body("rod")
+    with pytest.raises(InputError, match="axis"):
+        assembly.revolute("world", "rod", at=(0, 0, 0), axis=(0, 0, 0))
+    with pytest.raises(InputError, match="leave no room"):
+        assembly.revolute("world", "rod", at=(0, 0, 0), axis=(0, 0, 1), limits=(1, 0))
+    assembly.revolute("world", "rod", at=(0, 0, 0), axis=(0, 0, 1))
+    with pytest.raises(InputError, match="axis"):
+        assembly.prismatic("world", "rod", axis="up")  # type: ignore[arg-type]
+    assembly.prismatic("world", "rod", axis=(0, 0, 1))

@@ -1,0 +1,531 @@
+"""Every public callable, fed with odd values: what is wrong is a WholebodyError, never a raw one, and nothing hangs.
+
+Each callable has one call that works; each of its arguments is replaced by each odd value in turn. A call may succeed
+(an odd value may be a right one), and what it makes is then used, so that nothing wrong is kept for later.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import math
+import re
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody import interaction
+from wholebody.figures.state import State
+from wholebody.view import Viewer
+from wholebody.view.parts import Part, Parts
+
+ROOT = Path(__file__).resolve().parent.parent
+CIRCLE: list[Any] = []
+CIRCLE.append(CIRCLE)
+
+
+class Unshowable:
+    """A value that cannot be shown."""
+
+    def __repr__(self) -> str:
+        raise RuntimeError("no words for it")
+
+
+ODD: dict[str, Any] = {
+    "None": None,
+    "True": True,
+    "zero": 0,
+    "three": 3,
+    "minus one": -1,
+    "a half": 0.5,
+    "nan": math.nan,
+    "inf": math.inf,
+    "minus inf": -math.inf,
+    "beyond int64": 2**63,
+    "beyond float": 10**400,
+    "beyond printing": 10**5000,
+    "largest float": 1.7e308,
+    "smallest float": 5e-324,
+    "complex": 1j,
+    "text": "x",
+    "empty text": "",
+    "null in text": "a\0b",
+    "surrogate": "\ud800",
+    "long text": "x" * 5000,
+    "markup": "[/red]{0}%s",
+    "bytes": b"x",
+    "list": [],
+    "tuple": (),
+    "dict": {},
+    "set": set(),
+    "list of None": [None],
+    "list of text": ["x"],
+    "list in itself": CIRCLE,
+    "ragged": [[1.0, 2.0], [3.0]],
+    "dict of text": {"x": "y"},
+    "dict of numbers": {1: 2},
+    "dict of None": {"x": None},
+    "object": object(),
+    "unshowable": Unshowable(),
+    "function": lambda *_: None,
+    "type": str,
+    "module": math,
+    "iterator": iter(()),
+    "three numbers": (1.0, 2.0, 3.0),
+    "three nan": (math.nan,) * 3,
+    "three huge": (1e300, -1e300, 1e300),
+    "seven zeros": (0.0,) * 7,
+    "array 0-d": np.array(1.0),
+    "array empty": np.zeros((0, 3)),
+    "array 3-d": np.zeros((2, 2, 2)),
+    "array of nan": np.full((4, 4), math.nan),
+    "array of text": np.array(["a", "b"]),
+    "array of objects": np.array([object()]),
+    "array of complex": np.zeros(3, dtype=complex),
+    "numpy nan": np.float64("nan"),
+    "numpy int": np.int64(-5),
+    "path": Path("x"),
+    "SE3 of nan": pin.SE3(np.eye(3), np.full(3, math.nan)),
+    "namespace": SimpleNamespace(q=None, dt=None, model=None),
+}
+
+
+class Call(NamedTuple):
+    """A call that works.
+
+    Attributes:
+        function: what is called.
+        arguments: by name; each is replaced in turn.
+        use: what is done with the answer.
+    """
+
+    function: Callable[..., Any]
+    arguments: dict[str, Any]
+    use: Callable[[Any], Any] = lambda answer: None
+
+
+ARM = """<robot name="arm">
+  <link name="base"><collision><geometry><sphere radius="0.05"/></geometry></collision></link>
+  {links}
+</robot>"""
+LINK = """<link name="link{n}"><inertial><mass value="1"/>
+  <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+  <collision><origin xyz="0 0 0.2"/><geometry><sphere radius="0.05"/></geometry></collision></link>
+  <joint name="joint{n}" type="revolute"><parent link="{before}"/><child link="link{n}"/><origin xyz="0 0 0.3"/>
+  <axis xyz="{axis}"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with an arm, a task, a track and a path."""
+    made = tmp_path_factory.mktemp("odd")
+    chain = [("base", 1, "0 0 1"), ("link1", 2, "0 1 0"), ("link2", 3, "0 1 0"), ("link3", 4, "1 0 0")]
+    links = "\n".join(LINK.format(n=n, before=before, axis=axis) for before, n, axis in chain)
+    (made / "arm.urdf").write_text(ARM.format(links=links))
+    (made / "task.toml").write_text('[figure]\npath = "arm.urdf"\n')
+    (made / "path.txt").write_text("0.1 0.2 0.3\n0.2 0.2 0.3\n")
+    return made
+
+
+@cache
+def figure(path: Path) -> wb.Figure:
+    return wb.load(path / "arm.urdf")
+
+
+def scene(path: Path) -> wb.Scene:
+    made = wb.Scene(figure(path))
+    made.add(wb.Sphere(0.1), name="ball", at=(0.6, 0.0, 0.9))
+    return made
+
+
+def problem(path: Path, **terms: Any) -> wb.Problem:
+    terms = {"goals": [wb.Point("link4", (0.2, 0.1, 1.0))], **terms}
+    return wb.Problem(scene(path), **terms)
+
+
+def solvable(path: Path, term: Any) -> None:
+    """State and solve a problem with a term."""
+    kind = {wb.Goal: "goals", wb.Measure: "measures"}
+    key = next((key for base, key in kind.items() if isinstance(term, base)), "constraints")
+    wb.solve(problem(path, **{key: [term]}), wb.QP(budget=0, restarts=0))
+
+
+def assembly() -> wb.Assembly:
+    made = wb.Assembly()
+    made.body("crank", size=0.1).body("rod", (0.06, 0.0, 0.08), size=0.3)
+    return made.revolute("world", "crank", at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+
+
+def easily(path: Path, method: Any) -> None:
+    """Solve something that needs restarts, with few of them."""
+    far = problem(path, goals=[wb.Point("link4", (9.0, 0.0, 0.0))])
+    method.solve(far)
+
+
+def calls(path: Path) -> Iterator[tuple[str, Call]]:
+    """Every public callable with a call that works; made anew at each use, since some of them change things."""
+    arm, there, ask = figure(path), scene(path), problem(path)
+    q = arm.neutral
+    state = State(arm.model)
+    places = [(0.2, 0.1, 1.0), (0.2, 0.12, 1.0)]
+    track = interaction.Track.of(arm, np.array([q, q, q, q]), 0.1)
+    solve_it = partial(solvable, path)
+    person = wb.Scene(human())
+
+    def on_a_person(term: Any) -> Any:
+        return term.resolve(person, person.figure.neutral)
+
+    yield "load", Call(lambda spec, **options: wb.load(spec, **options), {"spec": path / "arm.urdf"})
+    for option, value in {"root": "fixed", "package_dirs": [path]}.items():
+        yield f"load({option})", Call(wb.load, {"spec": path / "arm.urdf", option: value})
+    for option, value in {"sex": "male", "stature": 1.7, "mass": 70.0, "detail": "spheres"}.items():
+        yield f"load({option})", Call(lambda _option=option, **given: wb.load("human", **given), {option: value})
+    yield "load(side)", Call(lambda **given: wb.load("hand", **given), {"side": "left", "stature": 1.7})
+    yield "Figure.clamp", Call(arm.clamp, {"q": q})
+    yield "Figure.describe", Call(arm.describe, {})
+    yield "Figure.dofs", Call(arm.dofs, {"names": ["joint1"]})
+    yield "Figure.frame_id", Call(arm.frame_id, {"name": "link1"})
+    yield "Figure.joint_id", Call(arm.joint_id, {"name": "joint1"})
+    yield "Figure.joint_names", Call(arm.joint_names, {"names": ["joint1"]})
+    yield "Figure.joint_values", Call(arm.joint_values, {"q": q})
+    yield "Figure.posture", Call(arm.posture, {"name": arm.postures[0]})
+    yield "Figure.reduced", Call(arm.reduced, {"joints": ["joint1"], "posture": q})
+    yield "Figure.tangent_bounds", Call(arm.tangent_bounds, {"q": q})
+    yield "Figure.with_joints", Call(arm.with_joints, {"q": q, "values": {"joint1": 0.1}}, arm.clamp)
+    yield "Figure.with_joints(value)", Call(lambda v: arm.with_joints(q, {"joint1": v}), {"v": 0.1}, arm.clamp)
+    yield "Figure.within_limits", Call(arm.within_limits, {"q": q, "tolerance": 0.1})
+
+    yield "Scene", Call(wb.Scene, {"figure": arm}, lambda made: made.geometry)
+    thing = {"shape": wb.Sphere(0.1), "name": "thing", "at": (0.0, 0.5, 0.5), "color": (1.0, 0.0, 0.0, 1.0)}
+    yield "Scene.add", Call(lambda **given: scene(path).add(**given), thing, lambda made: Viewer(made).show(q))
+    carried = {**thing, "to": "link2", "rests_on": ["link1"]}
+    yield "Scene.attach", Call(lambda **given: scene(path).attach(**given), carried, lambda made: Viewer(made).show(q))
+    yield "Scene.contacts", Call(there.contacts, {"q": q, "within": 0.1})
+    yield "Scene.frame_id", Call(there.frame_id, {"name": "link1"})
+    yield (
+        "Scene.move",
+        Call(
+            lambda **given: scene(path).move(**given),
+            {"name": "ball", "at": (1.0, 1.0, 1.0)},
+            lambda made: made.contacts(q),
+        ),
+    )
+    near = there.contacts(q, within=1.0)
+    yield "Contacts.nearest_first", Call(near.nearest_first, {})
+    yield "Scene.penetration", Call(there.penetration, {"q": q})
+    yield "Scene.lend", Call(there.lend, {})
+    yield "Scene.workspace", Call(there.workspace, {})
+    yield "Scene.remove", Call(lambda **given: scene(path).remove(**given), {"name": "ball"})
+    yield "Scene.simplified", Call(ask.scene.simplified, {"problem": ask, "lock": True})
+    yield "Scene.state", Call(there.state, {"q": q})
+    yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4})
+
+    def put(shape: Any) -> Any:
+        return wb.Scene(arm).add(shape, name="it").contacts(q)
+
+    yield "Box", Call(wb.Box, {"size": (1.0, 1.0, 1.0)}, put)
+    yield "Sphere", Call(wb.Sphere, {"radius": 1.0}, put)
+    yield "Capsule", Call(wb.Capsule, {"radius": 1.0, "length": 1.0}, put)
+    yield "Ellipsoid", Call(wb.Ellipsoid, {"semi_axes": (1.0, 1.0, 1.0)}, put)
+    yield "HalfSpace", Call(wb.HalfSpace, {"normal": (0.0, 0.0, 1.0), "offset": 0.0}, put)
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    yield "Hull", Call(wb.Hull, {"points": corners}, put)
+    mesh = {"source": (corners, faces), "scale": 1.0, "up": "z", "max_vertices": 32, "threshold": 0.05}
+    yield "Mesh", Call(wb.Mesh, mesh, put)
+    yield "Mesh(vertices)", Call(lambda vertices: wb.Mesh((vertices, faces)), {"vertices": corners}, put)
+    yield "Mesh(faces)", Call(lambda faces: wb.Mesh((corners, faces)), {"faces": faces}, put)
+    for shape in (wb.Box((1, 1, 1)), wb.Sphere(1), wb.Capsule(1, 1), wb.Ellipsoid((1, 1, 1)), wb.HalfSpace()):
+        yield f"{type(shape).__name__}.pieces", Call(shape.pieces, {})
+    yield "Hull.pieces", Call(wb.Hull(corners).pieces, {})
+    yield "Mesh.pieces", Call(wb.Mesh((corners, faces)).pieces, {})
+    yield "Mesh.convexified", Call(wb.Mesh((corners, faces)).convexified, {})
+
+    at, turned = (0.2, 0.1, 1.0), (0.0, 0.0, 0.0, 1.0)
+    yield "Point", Call(wb.Point, {"frame": "link4", "target": at, "offset": at, "weight": 1.0}, solve_it)
+    yield "Frame", Call(wb.Frame, {"frame": "link4", "target": at, "weight": 1.0}, solve_it)
+    yield "Orientation", Call(wb.Orientation, {"frame": "link4", "target": turned, "weight": 1.0}, solve_it)
+    axis = {"frame": "link4", "axis": at, "direction": at, "weight": 1.0}
+    yield "Axis", Call(wb.Axis, axis, solve_it)
+    yield "Axis(toward)", Call(wb.Axis, {"frame": "link4", "axis": at, "toward": at}, solve_it)
+    yield "CenterOfMass", Call(wb.CenterOfMass, {"target": at, "axes": "xyz", "weight": 1.0}, solve_it)
+    relative = {"frame": "link4", "to": "link1", "placement": at, "orientation": False, "weight": 1.0}
+    yield "Relative", Call(wb.Relative, relative, solve_it)
+    yield "Posture", Call(wb.Posture, {"target": q, "joints": ["joint1"], "weight": 1.0}, solve_it)
+    hold = {"frame": "link4", "at": at, "orientation": False, "relative_to": "link1"}
+    yield "Hold", Call(wb.Hold, hold, solve_it)
+    plane = {"frame": "link4", "normal": at, "point": at, "side": "above"}
+    yield "Plane", Call(wb.Plane, plane, solve_it)
+    yield "Balance", Call(wb.Balance, {"feet": ["left_foot"], "margin": 0.0}, on_a_person)
+    yield "ReachCones", Call(wb.ReachCones, {"names": ["left_shoulder"]}, on_a_person)
+    yield "Freeze", Call(lambda name: wb.Freeze(name), {"name": "joint1"}, solve_it)
+    limit = {"velocity": 1.0, "joints": {"joint1": 1.0}, "root_velocity": math.inf, "root_turn": math.inf}
+    yield "StepLimit", Call(wb.StepLimit, limit, solve_it)
+    yield "StepLimit(joint)", Call(lambda v: wb.StepLimit(joints={"joint1": v}), {"v": 1.0}, solve_it)
+    for kind in (wb.Effort, wb.Discomfort, wb.Displacement, wb.PotentialEnergy):
+        yield kind.__name__, Call(kind, {"weight": 1.0}, solve_it)
+    yield "State", Call(State, {"model": arm.model})
+    yield "State.update", Call(state.update, {"q": q})
+    yield "State.frame", Call(state.frame, {"index": 1})
+    for method in ("center_of_mass", "center_of_mass_jacobian"):
+        yield f"State.{method}", Call(getattr(state, method), {})
+
+    moving = problem(path)
+
+    def retarget(goals: Any) -> None:
+        moving.retarget(goals)
+        wb.solve(moving)
+
+    stated = {
+        "scene": there, "start": q, "goals": [wb.Point("link4", at)], "constraints": [wb.Freeze("joint1")],
+        "measures": [wb.Effort()], "clearance": 0.01, "touching": [("link4", "ball")],
+    }  # fmt: skip
+    yield "Problem", Call(wb.Problem, stated, wb.solve)
+    yield "Problem(touching)", Call(lambda pair: wb.Problem(there, touching=[pair]), {"pair": ("link4", "ball")})
+    yield "Problem.check_fresh", Call(ask.check_fresh, {})
+    lent = ask.workspace()
+    yield "Problem.lineariser", Call(lambda dt: ask.lineariser(lent, dt), {"dt": 0.1})
+    yield "Problem.lend", Call(ask.lend, {})
+    yield "Problem.workspace", Call(ask.workspace, {})
+    yield "Problem.retarget", Call(retarget, {"goals": [wb.Point("link4", at)]})
+    yield "solve", Call(wb.solve, {"problem": ask, "method": "qp", "progress": print})
+    yield "assess", Call(wb.assess, {"problem": ask, "q": q})
+    judged = wb.assess(ask, q)
+    yield "Assessment.holds", Call(judged.holds, {"tolerance": 0.1})
+    yield "Assessment.met", Call(judged.met, {"tolerance": 0.1})
+    yield "read_task", Call(wb.read_task, {"path": path / "task.toml"})
+
+    used = partial(easily, path)
+    settings = {
+        "tolerance": 1e-4,
+        "iterations": 30,
+        "budget": 20,
+        "restarts": 1,
+        "seed": 0,
+        "measures": True,
+        "time_limit": 4.0,
+    }
+    yield "QP", Call(wb.QP, {"solver": "osqp", **settings}, used)
+    yield "QP.solve", Call(wb.QP().solve, {"problem": ask, "progress": print})
+    yield "QP.tracker", Call(wb.QP().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
+    yield "Tracker.step", Call(wb.QP().tracker(ask, 0.1).step, {"q": q, "measures": True})
+    yield "CCD", Call(wb.CCD, {"tolerance": 1e-4, "iterations": 5, "restarts": 1, "seed": 0, "time_limit": None}, used)
+    yield "CCD.solve", Call(wb.CCD().solve, {"problem": ask, "progress": print})
+    yield "CCD.pushed_out", Call(wb.CCD().pushed_out, {"problem": ask, "q": q})
+    newton = {"algebra": "auto", "inequalities": "slack", "restarts": 1, "seed": 0, "time_limit": 1.0}
+    yield "Newton", Call(wb.Newton, {"tolerance": 1e-4, "iterations": 5, **newton}, used)
+    yield "Newton.solve", Call(wb.Newton().solve, {"problem": ask, "progress": print})
+    yield "Newton.tracker", Call(wb.Newton().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
+    yield "NewtonTracker.step", Call(wb.Newton().tracker(ask).step, {"q": q, "tolerance": 1e-4})
+    yield "NewtonTracker.solve", Call(wb.Newton().tracker(ask).solve, {"q": q})
+    yield "Placo", Call(wb.Placo, {"tolerance": 1e-4, "iterations": 5, "time_limit": 1.0}, used)
+    yield "Placo.solve", Call(wb.Placo().solve, {"problem": ask, "progress": print})
+    yield "Placo.prepare", Call(wb.Placo().prepare, {"problem": ask})
+    damped = {"tolerance": 1e-4, "iterations": 5, "damping": 1e-3, "time_limit": 1.0}
+    yield "DampedLeastSquares", Call(wb.DampedLeastSquares, damped, used)
+    yield "DampedLeastSquares.solve", Call(wb.DampedLeastSquares().solve, {"problem": ask, "progress": print})
+
+    dragged = {"problem": ask, "method": "qp", "goal": 0, "dt": 0.1}
+    yield "Drag", Call(wb.Drag, dragged, lambda drag: drag.to(at))
+    yield "Drag.to", Call(wb.Drag(ask).to, {"target": at})
+    yield "Drag.finish", Call(wb.Drag(ask).finish, {})
+    yield "pull", Call(wb.pull, {"problem": ask, "path": places, "method": "qp", "goal": 0, "spacing": 0.05})
+
+    def solve_parts(made: Any) -> Any:
+        return made.solve(iterations=3)
+
+    yield "Assembly", Call(wb.Assembly, {})
+    yield "Assembly.body", Call(assembly().body, {"name": "third", "at": at, "size": 0.1}, solve_parts)
+    yield "Assembly.drop_goals", Call(assembly().drop_goals, {})
+    fixed = {"first": "crank", "second": "rod", "placement_second": at}
+    yield "Assembly.fixed", Call(assembly().fixed, fixed, solve_parts)
+    yield "Assembly.frame_goal", Call(assembly().frame_goal, {"body": "rod", "target": at}, solve_parts)
+    flat = {"body": "rod", "place": at, "normal": at, "through": at, "of": "world", "side": "on"}
+    yield "Assembly.on_plane", Call(assembly().on_plane, flat, solve_parts)
+    yield "Assembly.placement", Call(assembly().placement, {"name": "rod"})
+    yield "Assembly.point_goal", Call(assembly().point_goal, {"body": "rod", "target": at, "place": at}, solve_parts)
+    slid = {"first": "crank", "second": "rod", "axis": at}
+    yield "Assembly.prismatic", Call(assembly().prismatic, slid, solve_parts)
+    turn = {"axis": at, "limits": (-1.0, 1.0), "axis_second": at, "at_first": at, "at_second": at}
+    yield "Assembly.revolute", Call(assembly().revolute, {"first": "crank", "second": "rod", **turn}, solve_parts)
+    ball = {"first": "crank", "second": "rod", "at": at}
+    yield "Assembly.spherical", Call(assembly().spherical, ball, solve_parts)
+    solving = {"tolerance": 1e-4, "iterations": 5, "algebra": "auto", "inequalities": "slack", "nearest": False}
+    yield "Assembly.solve", Call(assembly().solve, solving)
+    for method in ("system", "variables"):
+        yield f"Assembly.{method}", Call(getattr(assembly(), method), {})
+
+    looked = {"scene": there, "contact_distance": 0.01, "see_through": ["ball"], "names": True, "title": "x"}
+    yield "Viewer", Call(Viewer, looked, lambda viewer: (viewer.show(q), viewer.save(path / "x.html")))
+    viewer = Viewer(ask.scene)
+    viewer.play([q, q + 0.1], 0.1)
+    yield "Viewer.show", Call(viewer.show, {"q": q, "problem": ask})
+    motion = {"motion": [q, q], "dt": 0.1, "problem": ask, "ghost": [q, q], "repeat": 1}
+    yield "Viewer.play", Call(viewer.play, motion)
+    yield "Viewer.ghosts", Call(viewer.ghosts, {"postures": [q], "color": (1.0, 0.0, 0.0, 1.0)})
+    yield "Viewer.look", Call(viewer.look, {"eye": at, "target": (0.0, 0.0, 0.0)}, lambda _: viewer.show(q))
+    yield "Viewer.save", Call(viewer.save, {"path": path / "x.html"})
+    yield "Parts", Call(Parts, {"parts": {"one": [Part(wb.Sphere(0.1))]}}, Viewer)
+    yield "Parts(part)", Call(lambda part: Parts({"one": [part]}), {"part": Part(wb.Sphere(0.1))}, Viewer)
+    part = {"shape": wb.Sphere(0.1), "at": at, "color": (1.0, 0.0, 0.0, 1.0)}
+    yield "Part", Call(Part, part, lambda made: shown(Parts({"one": [made]})))
+    one = Parts({"one": [Part(wb.Sphere(0.1))]})
+    yield "Parts.posture", Call(one.posture, {"placements": {"one": at}})
+    yield "Parts.posture(at)", Call(lambda at: one.posture({"one": at}), {"at": at})
+    yield "Parts.contacts", Call(one.contacts, {"q": one.posture({"one": at}), "within": 0.1})
+
+    followed = {"scene": there, "track": track, "overlap": "qp", "seed": 0, "rigid": False, "progress": print}
+    yield "follow", Call(interaction.follow, followed)
+    loop = {"scene": there, "start": q, "overlap": "qp", "dt": 0.1, "seed": 0, "rigid": False}
+    yield "FrameLoop", Call(interaction.FrameLoop, loop, lambda made: made.frame(q))
+    yield "FrameLoop.frame", Call(interaction.FrameLoop(there, q).frame, {"tracked": q})
+    recording = interaction.follow(there, track)
+    yield "judge", Call(interaction.judge, {"scene": there, "recording": recording})
+    tracked = {"q": [q, q], "dt": 0.1, "joints": arm.joints, "name": "it"}
+    yield "Track", Call(interaction.Track, tracked, lambda made: made.check(arm))
+    yield "Track.check", Call(track.check, {"figure": arm})
+    yield "Track.of", Call(interaction.Track.of, {"figure": arm, "q": [q, q], "dt": 0.1, "name": "it"})
+    yield "Track.part", Call(track.part, {"first": 0, "last": 2})
+    yield "Track.repeated", Call(track.repeated, {"frames": 2})
+    moved = {"figure": arm, "roots": None, "angles": {"joint1": [0.1]}, "posture": q, "dt": 0.1, "name": "it"}
+    yield "posed", Call(interaction.posed, moved)
+    yield "posed(angle)", Call(lambda v: interaction.posed(arm, angles={"joint1": v}, dt=0.1), {"v": [0.1, 0.2]})
+    hand = human()
+    yield "posed(roots)", Call(lambda v: interaction.posed(hand, roots=v, dt=0.1), {"v": [at, at]})
+    yield "read_track", Call(interaction.read_track, {"path": path / "track.csv", "figure": arm})
+    yield "write_track", Call(interaction.write_track, {"track": track, "path": path / "track.csv"})
+    yield "gallery", Call(interaction.gallery, {"figure": hand})
+    yield "build_scene", Call(interaction.build_scene, {"name": "hand_on_table", "frames": 3, "seed": 0, "dt": 0.1})
+    along = {"problem": ask, "places": places, "method": "qp", "goal": 0, "dt": 0.1, "progress": print}
+    yield "drag_along", Call(interaction.drag_along, along)
+    done = interaction.drag_along(ask, places, "qp")
+    yield "judge_drag", Call(interaction.judge_drag, {"problem": ask, "dragged": done, "goal": 0})
+    yield "spread", Call(interaction.spread, {"corners": places, "frames": 3, "dt": 0.1})
+    yield "circle", Call(interaction.circle, {"center": at, "radius": 0.1, "normal": at})
+    yield "read_path", Call(interaction.read_path, {"path": path / "path.txt"})
+
+
+@cache
+def human() -> wb.Figure:
+    return wb.load("human")
+
+
+def shown(parts: Parts) -> None:
+    with Viewer(parts) as viewer:
+        viewer.show(np.array(pin.neutral(parts.model)))
+
+
+def public() -> Iterator[tuple[str, Any]]:
+    """Names and objects of the reference page, of `wholebody.__all__` and of `wholebody.interaction.__all__`."""
+    for entry in re.findall(r"^::: ([\w.]+)$", (ROOT / "docs" / "reference.md").read_text(), re.MULTILINE):
+        module, _, name = entry.rpartition(".")
+        try:
+            found = importlib.import_module(entry)
+            yield from ((name, getattr(found, name)) for name in getattr(found, "__all__", ()))
+        except ImportError:
+            yield name, getattr(importlib.import_module(module), name)
+    yield from ((name, getattr(wb, name)) for name in wb.__all__)
+    yield from ((name, getattr(interaction, name)) for name in interaction.__all__)
+
+
+def surface() -> list[str]:
+    """Every public function, class and method of a class."""
+    found: dict[str, None] = {}
+    for name, value in public():
+        if not callable(value) or (inspect.isclass(value) and issubclass(value, Exception)):
+            continue
+        found[name] = None
+        for attribute in dir(value) if inspect.isclass(value) else ():
+            static = inspect.getattr_static(value, attribute)
+            function = getattr(static, "__func__", static)
+            if not attribute.startswith("_") and inspect.isfunction(function) and "wholebody" in function.__module__:
+                found[f"{name}.{attribute}"] = None
+    return list(found)
+
+
+ANSWERS = (
+    "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "Iterate", "Assessment",
+    "Task", "Step", "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
+    "Scene.of_parts",
+)  # fmt: skip
+"""What calls return: nobody builds it, so its constructor is not fed."""
+
+OF_METHODS = ("Tracker", "NewtonTracker")
+"""What `tracker` of a method builds; and workspaces, which a run has to itself, are for methods of one's own."""
+
+DERIVATIVES = (
+    "companion",
+    "resolve",
+    "error",
+    "jacobian",
+    "value",
+    "gradient",
+    "curvature",
+    "bounds",
+    "rows",
+    "wrench_jacobian",
+)
+"""What problems and methods, not people, ask of terms and states; at every posture, which is too often for checks."""
+
+ABSTRACT = ("Shape", "Goal", "Constraint", "Bound", "Measure", "Figure")
+"""Classes to derive from, and the figure, which `load` builds."""
+
+BROWSER = ["open", "wait", "wait_until_closed", "sync", "picture", "movie", "close"]
+"""Methods of the viewer that need a browser or a server: see tests/view."""
+
+
+def fed(name: str) -> bool:
+    """Whether a name of the surface is fed here."""
+    owner, _, method = name.partition(".")
+    if name in ANSWERS or (owner == "Viewer" and method in BROWSER) or name == "write_strip":
+        return False
+    if name in OF_METHODS or owner == "Workspace":
+        return False
+    if method in DERIVATIVES and owner != "Assembly":
+        return False
+    return owner not in ABSTRACT or (owner == "Figure" and bool(method))
+
+
+NAMES = [name for name in surface() if fed(name)]
+
+
+@pytest.fixture(scope="module")
+def every(folder: Path) -> dict[str, list[tuple[str, Call]]]:
+    """Return all calls by the name of what is called; variants have the same name with something in brackets."""
+    q = figure(folder).neutral
+    interaction.write_track(interaction.Track.of(figure(folder), np.array([q, q]), 0.1), folder / "track.csv")
+    found: dict[str, list[tuple[str, Call]]] = {}
+    for name, call in calls(folder):
+        found.setdefault(name.partition("(")[0], []).append((name, call))
+    return found
+
+
+def test_every_public_callable_is_fed(every: dict[str, list[tuple[str, Call]]]) -> None:
+    assert sorted(every) == sorted(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_odd_arguments_are_refused_in_one_sentence(
+    name: str, every: dict[str, list[tuple[str, Call]]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # an odd path may be a right one
+    raw = []
+    for variant, call in every[name]:
+        call.use(call.function(**call.arguments))
+        for argument in call.arguments:
+            for label, odd in ODD.items():
+                try:
+                    call.use(call.function(**{**call.arguments, argument: odd}))
+                except wb.WholebodyError as error:
+                    if "\n" in str(error) or len(str(error)) > 600:
+                        raw.append(f"{variant}, {argument} = {label}: not one short sentence: {error!s:.300}")
+                except Exception as error:
+                    raw.append(f"{variant}, {argument} = {label}: {type(error).__name__}: {str(error)!r:.100}")
+    assert not raw, "\n" + "\n".join(raw[:40])

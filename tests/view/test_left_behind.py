@@ -1,0 +1,57 @@
+"""What is left of a headless browser whose program was killed: nothing, once the next one starts."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import pytest
+
+from wholebody.view.browser import Browser
+
+BROWSING = """
+import time
+from wholebody.view.browser import Browser
+browser = Browser((64, 64))
+print(browser._pid, browser._folder, flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.mark.browser
+@pytest.mark.usefixtures("chromium")
+def test_a_killed_programs_browser_ends_and_its_folder_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    program = subprocess.Popen([sys.executable, "-c", BROWSING], stdout=subprocess.PIPE, text=True, env=environment)
+    try:
+        assert program.stdout is not None
+        pid, _, folder = program.stdout.readline().strip().partition(" ")
+        with Browser((64, 64)):
+            assert (Path(folder) / "profile").is_dir()  # of a program that lives
+        program.kill()
+        program.wait()
+        end = time.monotonic() + 20.0
+        while time.monotonic() < end and running(int(pid)):
+            time.sleep(0.1)
+        assert not running(int(pid))
+        with Browser((64, 64)):
+            assert not Path(folder).exists()
+        assert not list(tmp_path.glob("wholebody-*"))
+    finally:
+        program.kill()
+        program.wait()
+        if program.stdout is not None:
+            program.stdout.close()
+
+
+def running(pid: int) -> bool:
+    """Whether a process runs; one that nobody has waited for has ended."""
+    try:
+        return ") Z " not in Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False

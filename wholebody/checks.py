@@ -1,0 +1,282 @@
+"""Checks of what people give: each returns the value as it is used, or raises one sentence with the argument's name.
+
+`what` is what the sentence calls the value: the argument's name, with the callable in front where that is not plain.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Collection, Iterable
+from operator import index
+from pathlib import Path
+from reprlib import Repr
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.errors import InputError, UnknownNameError
+
+Array = NDArray[np.float64]
+
+_T = TypeVar("_T")
+
+NUMERIC = "fiu"
+"""Kinds of numpy arrays that hold real numbers: floating, signed and unsigned."""
+
+TIME_STEP = (1e-6, 1e6)
+"""Least and greatest step, seconds: beyond them velocities have no digits left."""
+
+LONGEST = 200
+"""Characters of a name or a title."""
+
+_SHORT = Repr()
+_SHORT.maxstring = _SHORT.maxother = 60
+
+
+def shown(value: object) -> str:
+    """What a sentence says of a value: its representation in one line, shortened, or its type where it has none."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    try:
+        return " ".join(_SHORT.repr(value).split())
+    except Exception:  # a representation may be anybody's code; that of an int beyond 4300 digits is refused by Python
+        return f"a {type(value).__name__} that cannot be shown"
+
+
+def a(kind: object) -> str:
+    """The name of a type with its article."""
+    name = getattr(kind, "__name__", str(kind))
+    return f"an {name}" if name[:1].lower() in "aeio" else f"a {name}"
+
+
+def instance(value: object, kind: type[_T] | tuple[type[_T], ...], what: str, mend: str) -> _T:
+    """A value of a type, or of one of several.
+
+    Args:
+        value: what was given.
+        kind: the type.
+        what: what the sentence calls it.
+        mend: what to give, such as "load one with wb.load('human')".
+
+    Raises:
+        InputError: it is of another type.
+    """
+    if not isinstance(value, kind):
+        wanted = " or ".join(a(one) for one in (kind if isinstance(kind, tuple) else (kind,)))
+        raise InputError(f"{what} is {a(type(value))}, not {wanted}; {mend}")
+    return value
+
+
+def number(value: object, what: str, low: float, high: float, unit: str = "") -> float:
+    """A finite number within a range, both ends included.
+
+    Raises:
+        InputError: it is none.
+    """
+    found = _real(value)
+    if found is None or not low <= found <= high:
+        if math.isinf(high):
+            wanted = f"a finite number of {low:g} or more" if math.isfinite(low) else "a finite number"
+        else:
+            odd = isinstance(value, float) and not math.isfinite(value)
+            wanted = f"a {'finite ' if odd else ''}number between {low:g} and {high:g}"
+        raise InputError(f"{what} is {shown(value)}; give {wanted}{f' {unit}' if unit else ''}")
+    return found
+
+
+def time_step(value: object, what: str) -> float:
+    """Seconds of a step or a frame.
+
+    Raises:
+        InputError: no number within `TIME_STEP`.
+    """
+    return number(value, what, *TIME_STEP, "s, such as 0.02")
+
+
+def whole(value: object, what: str, low: int, high: int) -> int:
+    """A whole number within a range, both ends included.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        found = None if isinstance(value, (bool, np.bool_)) else index(value)  # type: ignore[arg-type]
+    except TypeError:
+        found = None
+    if found is None or not low <= found <= high:
+        raise InputError(f"{what} is {shown(value)}; give a whole number between {low} and {high}")
+    return found
+
+
+def flag(value: object, what: str) -> bool:
+    """True or false.
+
+    Raises:
+        InputError: it is neither.
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{what} is {shown(value)}; give True or False")
+    return bool(value)
+
+
+def text(value: object, what: str) -> str:
+    """A line of text: not empty, at most `LONGEST` characters, all of which can be shown.
+
+    Raises:
+        InputError: it is none.
+    """
+    if not isinstance(value, str) or not value.strip() or len(value) > LONGEST or not value.isprintable():
+        raise InputError(f"{what} is {shown(value)}; give a line of text, at most {LONGEST} characters")
+    return value
+
+
+def choice(value: object, options: Collection[str], what: str) -> str:
+    """One of a few words.
+
+    Raises:
+        InputError: it is another value.
+    """
+    if not isinstance(value, str) or value not in options:
+        raise InputError(f"{what} is {shown(value)}; give {' or '.join(map(repr, options))}")
+    return value
+
+
+def known(
+    value: object, names: Collection[str], kind: str, where: str = "", offered: Collection[str] | None = None
+) -> str:
+    """A name among those that there are.
+
+    Args:
+        value: what was given.
+        names: every name that would be right.
+        kind: what is named, singular: "frame", "posture".
+        where: the place, for the sentence.
+        offered: the names that the sentence may offer, where not all of them.
+
+    Raises:
+        UnknownNameError: there is none of this name.
+        InputError: it is not a text.
+    """
+    if not isinstance(value, str):
+        raise InputError(f"{f'{where}: ' if where else ''}{shown(value)} is not the name of {a(kind)}; give a text")
+    if value not in names:
+        raise UnknownNameError(kind, value, names if offered is None else offered, where)
+    return value
+
+
+def listed(value: object, what: str, example: str) -> list[Any]:
+    """The entries of a list, a tuple or another iterable that is no text.
+
+    Raises:
+        InputError: it cannot be gone through.
+    """
+    if isinstance(value, Iterable) and not isinstance(value, (str, bytes)):
+        try:
+            return list(value)
+        except TypeError:  # an array without dimensions
+            pass
+    raise InputError(f"{what} is {shown(value)}, not a list; give one, such as {example}")
+
+
+def function(value: _T, what: str) -> _T:
+    """Something that can be called, or None.
+
+    Raises:
+        InputError: it is neither.
+    """
+    if value is not None and not callable(value):
+        raise InputError(f"{what} is {shown(value)}; give a function, or leave it out")
+    return value
+
+
+def path(value: object, what: str) -> Path:
+    """The path of a file.
+
+    Raises:
+        InputError: it is neither text nor a path, or no file system takes it.
+    """
+    given = value.__fspath__() if isinstance(value, os.PathLike) else value
+    if not isinstance(given, str) or not given or "\0" in given:
+        raise InputError(f"{what} is {shown(value)}; give the path of a file")
+    return Path(given)
+
+
+def array(value: object, what: str, wanted: str) -> Array:
+    """Real numbers as an array of any shape; not a copy where it is one already.
+
+    Args:
+        value: what was given.
+        what: what the sentence calls it.
+        wanted: what it takes, such as "corners, shape (k, 3), metres".
+
+    Raises:
+        InputError: it is not made of real numbers; they may still be infinite or NaN.
+    """
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
+    try:
+        found = np.asarray(value)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        found = np.empty(0, dtype=object)
+    if found.dtype.kind not in NUMERIC:
+        raise InputError(f"{what} is {shown(value)}, not numbers; give {wanted}")
+    real: Array = found if found.dtype == np.float64 else found.astype(np.float64)
+    return real
+
+
+def numbers(value: object, shape: tuple[int, ...], what: str) -> Array:
+    """Read-only copy with finite numbers of this shape.
+
+    Raises:
+        InputError: it is none.
+    """
+    plain = "one number" if not shape else f"numbers of shape {shape}"
+    found: Array = array(value, what, plain).copy()
+    if found.shape != shape:
+        raise InputError(f"{what} has shape {shape}, not {found.shape}; give {math.prod(shape)} numbers")
+    if not np.isfinite(found).all():
+        raise InputError(f"{what} is {shown(found.tolist())}; give finite numbers")
+    found.flags.writeable = False
+    return found
+
+
+def posture(value: object, size: int, what: str = "a posture") -> Array:
+    """A posture (size,) of finite numbers; not a copy where it is an array of floats already.
+
+    Raises:
+        InputError: it has another shape, or a value that is not finite.
+    """
+    found = array(value, what, f"{size} numbers; start from figure.posture(...)")
+    if found.shape != (size,):
+        raise InputError(f"{what} has shape ({size},), not {found.shape}; start from figure.posture(...)")
+    if np.count_nonzero(np.isfinite(found)) != size:  # asked at every step: a third of the time of all()
+        wrong = int(np.flatnonzero(~np.isfinite(found))[0])
+        raise InputError(f"{what} entry {wrong} is not finite; give finite numbers")
+    return found
+
+
+def color(value: object, what: str) -> tuple[float, float, float, float]:
+    """Red, green, blue and alpha, each from 0 to 1; alpha is 1 where three are given.
+
+    Raises:
+        InputError: it is neither three nor four such numbers.
+    """
+    wanted = "red, green, blue and, if wanted, alpha, each from 0 to 1, such as (1.0, 0.0, 0.0)"
+    found = array(value, what, wanted)
+    if found.shape not in ((3,), (4,)) or not ((found >= 0.0) & (found <= 1.0)).all():
+        raise InputError(f"{what} is {shown(value)}; give {wanted}")
+    red, green, blue, alpha = (*found.tolist(), 1.0)[:4]
+    return red, green, blue, alpha
+
+
+def _real(value: object) -> float | None:
+    """A finite number as a float; None for anything else: True, texts, and arrays of one number too."""
+    if isinstance(value, (bool, np.bool_, str, bytes, bytearray)) or getattr(value, "shape", ()) != ():
+        return None
+    try:
+        found = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return found if math.isfinite(found) else None

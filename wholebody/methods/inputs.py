@@ -1,0 +1,61 @@
+"""What methods take: the range of each setting, for the classes and for task files alike, and problems."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from wholebody.checks import instance, number, whole
+from wholebody.problem import Problem
+
+
+class Range(NamedTuple):
+    """Numbers that a setting may have, both ends included.
+
+    Attributes:
+        low: the least.
+        high: the greatest.
+        whole: whether it is a whole number.
+    """
+
+    low: float
+    high: float
+    whole: bool = False
+
+    def check(self, value: object, name: str) -> None:
+        """Raise InputError if a setting's value is none of these."""
+        if self.whole:
+            whole(value, name, int(self.low), int(self.high))
+        else:
+            number(value, name, self.low, self.high)
+
+
+TOLERANCE = Range(1e-10, 0.1)
+"""Metres and radians to which goals are met: finer is lost in rounding, coarser meets nothing."""
+
+CCD_TOLERANCE = Range(1e-6, 0.1)
+"""The same for cyclic coordinate descent, which comes near slowly."""
+
+ITERATIONS = Range(1, 100_000, whole=True)
+BUDGET = Range(0, 1_000_000, whole=True)
+RESTARTS = Range(0, 1000, whole=True)
+SEED = Range(0, 2**32 - 1, whole=True)
+DAMPING = Range(1e-9, 1e3)
+
+
+def check_problem(problem: object, what: str) -> Problem:
+    """A problem.
+
+    Raises:
+        InputError: it is something else.
+    """
+    return instance(problem, Problem, what, "state one with wb.Problem(scene, goals=[...])")
+
+
+def check_settings(method: object, **ranges: Range) -> None:
+    """Check settings of a method by their names.
+
+    Raises:
+        InputError: one is not a number of its range.
+    """
+    for name, allowed in ranges.items():
+        allowed.check(getattr(method, name), name)
