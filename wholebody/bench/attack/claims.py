@@ -9,7 +9,8 @@ import numpy as np
 
 from wholebody.bench.attack.case import Verdict
 from wholebody.bench.attack.judging import Judged, Pairs, judge
-from wholebody.methods import METHODS, method_named
+from wholebody.methods import METHODS
+from wholebody.methods.solve import method_named
 from wholebody.problem import Problem, Solution, Status
 
 ROUNDING = 2e-6  # m, rad: by which two ways of measuring may differ for pieces of up to a metre
