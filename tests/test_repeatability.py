@@ -35,7 +35,11 @@ PLACES = {"within reach": (0.4, -0.25, 1.15), "out of reach": (1.1, 0.3, 1.5), "
 @pytest.mark.parametrize("place", ["within reach", "out of reach"])
 @pytest.mark.parametrize(
     "method",
-    [wb.QP(budget=60, restarts=3), wb.QP(solver="daqp", budget=60, restarts=3), wb.DampedLeastSquares(iterations=30)],
+    [
+        wb.QP(budget=60, restarts=3, time_limit=None),
+        wb.QP(solver="daqp", budget=60, restarts=3, time_limit=None),
+        wb.DampedLeastSquares(iterations=30, time_limit=None),
+    ],
     ids=lambda method: method.name,
 )
 def test_a_solve_after_others_is_the_solve_before_them(scene: wb.Scene, method: Any, place: str) -> None:
@@ -59,9 +63,9 @@ def test_so_it_is_for_the_other_methods(scene: wb.Scene, name: str) -> None:
         return wb.Problem(scene, goals=[wb.Point("right_index_tip", PLACES[place])], constraints=holds)
 
     methods = {
-        "ccd": wb.CCD(restarts=1, iterations=40),
-        "newton": wb.Newton(restarts=0, iterations=10),
-        "placo": wb.Placo(iterations=10),
+        "ccd": wb.CCD(restarts=1, iterations=40, time_limit=None),
+        "newton": wb.Newton(restarts=0, iterations=10, time_limit=None),
+        "placo": wb.Placo(iterations=10, time_limit=None),
     }
     method, problems = methods[name], [asked(place) for place in PLACES]
     before = [method.solve(one).q for one in problems]
@@ -99,7 +103,7 @@ def test_contacts_and_sweeps_do_not_depend_on_those_before(scene: wb.Scene) -> N
 
 
 def test_a_new_tracker_steps_as_the_first_one_did(scene: wb.Scene) -> None:
-    asked, method = problem(scene, PLACES["within reach"]), wb.QP()
+    asked, method = problem(scene, PLACES["within reach"]), wb.QP(time_limit=None)
 
     def way() -> list[np.ndarray]:
         tracker, q, found = method.tracker(asked, 0.02), asked.start, []

@@ -73,12 +73,12 @@ def same(one: wb.Solution, other: wb.Solution) -> bool:
 
 
 METHODS = {
-    "qp/osqp": (wb.QP(budget=40, restarts=2), 4),
-    "qp/daqp": (wb.QP(solver="daqp", budget=40, restarts=2), 4),
-    "dls": (wb.DampedLeastSquares(iterations=40), 6),
-    "newton": (wb.Newton(restarts=0, iterations=12), 1),
-    "placo": (wb.Placo(iterations=20), 1),
-    "ccd": (wb.CCD(restarts=0, iterations=40), 2),
+    "qp/osqp": (wb.QP(budget=40, restarts=2, time_limit=None), 4),
+    "qp/daqp": (wb.QP(solver="daqp", budget=40, restarts=2, time_limit=None), 4),
+    "dls": (wb.DampedLeastSquares(iterations=40, time_limit=None), 6),
+    "newton": (wb.Newton(restarts=0, iterations=12, time_limit=None), 1),
+    "placo": (wb.Placo(iterations=20, time_limit=None), 1),
+    "ccd": (wb.CCD(restarts=0, iterations=40, time_limit=None), 2),
 }
 
 
@@ -99,7 +99,7 @@ def test_threads_with_one_method_problem_and_scene_answer_as_one_alone(scene: wb
 
 
 def test_trackers_of_one_method_and_problem_step_as_one_alone(scene: wb.Scene) -> None:
-    problem, method = problems(scene)[0], wb.QP()
+    problem, method = problems(scene)[0], wb.QP(time_limit=None)
 
     def way(wait: Callable[[], object] = lambda: None) -> list[np.ndarray]:
         tracker, q, found = method.tracker(problem, 0.02), problem.start, []
@@ -147,7 +147,7 @@ def test_a_simplified_problem_is_solved_by_threads_as_by_one(scene: wb.Scene) ->
         scene, goals=[wb.Point("right_index_tip", (0.45, -0.25, 1.15))], constraints=[wb.Hold(foot) for foot in FEET],
         measures=[wb.PotentialEnergy(), wb.Displacement()],
     )  # fmt: skip
-    small, method = scene.simplified(whole).problem, wb.QP(budget=0)
+    small, method = scene.simplified(whole).problem, wb.QP(budget=0, time_limit=None)
     alone = method.solve(small)
 
     def work(number: int) -> None:
@@ -161,7 +161,7 @@ def test_a_solve_sees_things_where_they_were_when_it_began(scene: wb.Scene) -> N
     """A board is moved to and fro all the time: every posture is one of two, as if nobody had moved it meanwhile."""
     moving = wb.Scene(scene.figure).add(wb.Box((0.3, 0.8, 0.03)), name="board", at=(0.45, -0.2, 1.05))
     places = ((0.45, -0.2, 1.05), (0.45, -0.2, 1.3))
-    problem, method = reaching(moving, (0.45, -0.25, 1.15)), wb.QP(budget=0)
+    problem, method = reaching(moving, (0.45, -0.25, 1.15)), wb.QP(budget=0, time_limit=None)
     alone = []
     for place in places:
         moving.move("board", at=place)
@@ -207,7 +207,7 @@ def test_things_that_come_during_a_solve_are_refused_by_one_sentence(scene: wb.S
 def test_a_tracker_refuses_a_second_thread(scene: wb.Scene) -> None:
     """A goal that asks the tracker for a step, within a step of it: what a second thread would do."""
     problem = problems(scene)[0]
-    tracker = wb.QP().tracker(problem, 0.02)
+    tracker = wb.QP(time_limit=None).tracker(problem, 0.02)
 
     class Asking(wb.Displacement):
         def value(self, state: State) -> float:
@@ -248,7 +248,16 @@ def test_a_pool_lends_nothing_twice_and_forgets_what_broke() -> None:
     assert len(made) == 3
 
 
-@pytest.mark.parametrize("method", [wb.QP(), wb.CCD(), wb.Newton(), wb.Placo(), wb.DampedLeastSquares()])
+@pytest.mark.parametrize(
+    "method",
+    [
+        wb.QP(time_limit=None),
+        wb.CCD(time_limit=None),
+        wb.Newton(time_limit=None),
+        wb.Placo(time_limit=None),
+        wb.DampedLeastSquares(time_limit=None),
+    ],
+)
 def test_settings_of_methods_cannot_be_changed_and_hold_no_run(method: Any, scene: wb.Scene) -> None:
     before = dict(vars(method))
     with pytest.raises(AttributeError):

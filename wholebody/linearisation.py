@@ -105,7 +105,7 @@ class Lineariser:
             count = len(self.workspace.table.pairs)
             raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
         self.goals, self.clearances = goals, clearances
-        self._largest_clearance = float(np.maximum.reduce(clearances, initial=0.0))
+        self._largest_clearance = float(clearances.max()) if len(clearances) else 0.0
 
     def at(self, q: Array, within: float) -> Linearisation:
         """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance."""

@@ -283,3 +283,21 @@ def test_a_wrong_option_is_code_2() -> None:
     with pytest.raises(SystemExit) as ended:
         main(["pose"])
     assert ended.value.code == 2
+
+
+def test_what_takes_long_is_told_on_stderr_once_and_the_cache_is_cleared(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, root: Path
+) -> None:
+    monkeypatch.setenv("WHOLEBODY_CACHE", str(tmp_path))
+    arm = str(root / "tests" / "data" / "arm" / "arm.urdf")
+    command = [sys.executable, "-c", "import sys; from wholebody.cli import main; sys.exit(main(sys.argv[1:]))"]
+    first, again = (
+        subprocess.run([*command, "figure", arm], capture_output=True, text=True, check=True) for _ in range(2)
+    )
+    assert "bracket.stl" in first.stderr
+    assert not again.stderr
+    assert first.stdout == again.stdout
+    assert "more volume" in first.stdout
+    cleared = subprocess.run([*command, "doctor", "--clear-cache"], capture_output=True, text=True, check=True)
+    assert "threw away 1 meshes" in cleared.stdout
+    assert not list(tmp_path.iterdir())

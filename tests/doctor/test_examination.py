@@ -38,7 +38,7 @@ def test_a_sound_installation_has_no_faults(fake: Fake) -> None:
     fake()
     report = examination.examine({})
     assert report.healthy
-    assert {entry.kind for entry in report.entries} == {"package", "QP solver", "method", "tool"}
+    assert {entry.kind for entry in report.entries} == {"package", "QP solver", "method", "tool", "cache"}
     assert all(entry.state == "works" for entry in report.entries)
 
 

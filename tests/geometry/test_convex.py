@@ -13,7 +13,8 @@ from scipy.spatial import ConvexHull
 
 from wholebody import FileFormatError, InputError
 from wholebody.geometry.components import split_components
-from wholebody.geometry.convex import ConvexPieces, convex_pieces
+from wholebody.geometry.convex import convex_pieces
+from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.meshes import read_mesh
 from wholebody.geometry.outer_hull import outer_hull
 from wholebody.geometry.pieces import Array, Piece

@@ -53,7 +53,8 @@ def test_the_rigid_hand_is_displaced_by_its_global_depth(hand: wb.Figure, scene:
     np.testing.assert_allclose(recording.q[-1, :2], q[-1, :2], atol=1e-3)
     assert 0.0 <= recording.q[-1, 2] - hand.posture("relaxed")[2] < 2e-3
     assert recording.pairs[-1] > 0
-    assert (recording.joints[recording.pairs > 0] == 6).all()
+    assert recording.iterations[-1] > 0
+    assert not recording.joints.any()  # as a whole, by no joint
 
 
 def test_opposed_normals_cancel_and_the_last_free_place_is_kept(hand: wb.Figure, least: Any) -> None:

@@ -33,7 +33,7 @@ def listening(port: int) -> list[str]:
 
 def status(url: str, **headers: str) -> int:
     try:
-        with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=10) as answer:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=60) as answer:
             return int(answer.status)
     except urllib.error.HTTPError as error:
         return error.code
@@ -42,7 +42,7 @@ def status(url: str, **headers: str) -> int:
 def handshake(url: str, origin: str) -> int:
     """Answer to a page of this origin that opens the socket."""
     upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13"}
-    connection = http.client.HTTPConnection(urlsplit(url).netloc, timeout=10)
+    connection = http.client.HTTPConnection(urlsplit(url).netloc, timeout=60)
     try:
         connection.request(
             "GET", "/socket", headers={**upgrade, "Sec-WebSocket-Key": "A" * 22 + "==", "Origin": origin}
@@ -114,14 +114,14 @@ from wholebody.view.sender import Sender
 sender = Sender(live_page())
 child = os.fork()  # holds the pipe to the server open, as a worker process would
 if child == 0:
-    time.sleep(60)
+    time.sleep(300)
     os._exit(0)
 print(sender._process.pid, child, flush=True)
-time.sleep(60)
+time.sleep(300)
 """
 
 
-def gone(pid: int, within: float = 10.0) -> bool:
+def gone(pid: int, within: float = 60.0) -> bool:
     """Whether a process ends in time; one that is dead but not yet waited for counts as ended."""
     end = time.monotonic() + within
     while time.monotonic() < end:

@@ -112,7 +112,7 @@ def summary(scene: str, recording: Recording, judged: Judgement) -> InteractionR
         cpu_mean_ms=1e3 * float(recording.cpu_seconds.mean()),
         cpu_p99_ms=1e3 * float(np.quantile(recording.cpu_seconds, 0.99)),
         joints=float(recording.joints.mean()),
-        iterations=float(recording.iterations.mean()),
+        iterations=float(np.where(recording.pairs > 0, recording.iterations, 0).mean()),
         ik_percent=100.0 * float(recording.solve_seconds.sum()) / spent,
         tracked_pairs=float(judged.tracked_pairs.mean()),
         query_percent=100.0 * float(recording.contact_seconds.sum()) / spent,
@@ -205,8 +205,11 @@ def report(rows: Sequence[InteractionRow], facts: Mapping[str, str]) -> str:
         [
             markdown(columns, [*costs, *paper]),
             markdown(quality, [_quality(row) for row in rows]),
-            "Pairs/frame are the overlapping pairs of pieces of the tracked posture. A program moves all degrees of "
-            "freedom at once: they count once for every program of a frame in contact. \"Joints off\" is the root mean "
+            "Joints and iterations are counted as the paper does: iterations are the goals of CCD, made anew each time "
+            "(or programs, or displacements of a rigid hand, which moves no joint) of frames in contact, and a joint "
+            "counts once for each iteration that moves it, so that a program counts all joints. The paper's frames "
+            "include rendering, ours do not; and its shares are shares of such frames. Pairs/frame are the overlapping "
+            "pairs of pieces of the tracked posture. \"Joints off\" is the root mean "
             "square over the joints of the angle between shown and tracked posture, mean over the frames; jerk is the "
             "third difference of the joint angles, rad/s³. CPU is time that the processor worked on a frame, on a "
             "shared machine, and what is missed goes by it. Asked of every scene: mean frame under "

@@ -44,10 +44,6 @@ def shipped_tasks() -> dict[str, Path]:
     Raises:
         WholebodyError: the installation lacks them.
     """
-    from wholebody.errors import WholebodyError
+    from wholebody.figures.shipped import task_paths
 
-    package = Path(__file__).resolve().parents[1]
-    for folder in (package / "examples", package.parent / "examples" / "tasks"):
-        if (folder / "shelf.toml").is_file():
-            return {path.stem: path for path in sorted(folder.glob("*.toml"))}
-    raise WholebodyError(f"there are no examples in or beside {package}; install wholebody again")
+    return task_paths()

@@ -7,7 +7,8 @@ import argparse
 HELP = "check this installation: versions, methods, QP solvers, tools"
 DESCRIPTION = """\
 Print the versions of all packages, use every method and QP solver once, and name wrong combinations and search paths
-with what mends them. Ends with exit code 1 when something is wrong; what is absent but not needed is no fault."""
+with what mends them; and say what is kept on disk of the convex pieces of meshes. Ends with exit code 1 when something
+is wrong; what is absent but not needed is no fault."""
 
 _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[red]broken[/]"}
 
@@ -15,11 +16,19 @@ _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[re
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
-    commands.add_parser("doctor", help=HELP, description=DESCRIPTION, formatter_class=shape).set_defaults(run=run)
+    parser = commands.add_parser("doctor", help=HELP, description=DESCRIPTION, formatter_class=shape)
+    parser.add_argument(
+        "--clear-cache",
+        action="store_true",
+        help="throw away the pieces of meshes that are kept on disk, and end",
+    )
+    parser.set_defaults(run=run)
 
 
-def run(_: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> int:
     """Examine and print; 1 where there are faults."""
+    if arguments.clear_cache:
+        return _clear_cache()
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
@@ -45,3 +54,11 @@ def run(_: argparse.Namespace) -> int:
     if report.healthy:
         console.print("[green]nothing is wrong[/]")
     return 0 if report.healthy else 1
+
+
+def _clear_cache() -> int:
+    from wholebody.geometry.mesh_cache import clear_cache
+
+    state = clear_cache()
+    print(f"threw away {state.entries} meshes, {state.size / 2**20:.1f} MB, in {state.folder}")
+    return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -45,6 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code: 0, 1 or 2 (see `EXIT_CODES`), 130 after Ctrl-C.
     """
     arguments = parser().parse_args(argv)
+    _tell_progress()
     try:
         return int(arguments.run(arguments))
     except WholebodyError as error:
@@ -55,3 +57,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output, such as head, has had enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+
+
+def _tell_progress() -> None:
+    """Write to stderr what takes seconds, such as the decomposition of a mesh; the library itself only logs it."""
+    told = logging.getLogger("wholebody")
+    if not any(isinstance(handler, logging.StreamHandler) for handler in told.handlers):
+        told.addHandler(logging.StreamHandler())
+    told.setLevel(logging.INFO)

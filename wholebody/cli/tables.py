@@ -119,6 +119,10 @@ def show_figure(console: Console, figure: Figure) -> None:
     limits = figure.limits
     ranges = dict(zip(limits.idx_q.tolist(), zip(limits.lower, limits.upper, strict=True), strict=True))
     for name in figure.joints:
+        if name in figure.followers:
+            law = figure.followers[name]
+            joints.add_row(name, f"{law.slope:g} x {law.joint}", f"+ {law.offset:g}")
+            continue
         joint = model.joints[figure.joint_id(name)]
         low, high = ranges.get(joint.idx_q, (-math.inf, math.inf))
         slides = joint.shortname().startswith("JointModelP")
@@ -126,3 +130,7 @@ def show_figure(console: Console, figure: Figure) -> None:
             escape(name), *(f"{end:.3f} m" if slides else f"{math.degrees(end):.1f} deg" for end in (low, high))
         )
     console.print(joints)
+    if figure.notes:
+        console.print("\nnotes", style="dim")
+    for note in figure.notes:
+        console.print(f"- {note}", markup=False, highlight=False)

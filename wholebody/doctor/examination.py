@@ -30,7 +30,7 @@ class Entry:
     """One thing that was looked at.
 
     Attributes:
-        kind: "package", "QP solver", "method" or "tool".
+        kind: "package", "QP solver", "method", "tool" or "cache".
         name: its name.
         state: "works", "absent" or "broken".
         detail: version, time, place or reason.
@@ -73,7 +73,7 @@ def examine(environ: Mapping[str, str] = os.environ) -> Report:
         environ: the environment variables to judge.
     """
     have = packages.installed(["wholebody", *MODULES, *EXTRAS])
-    entries = [*_packages(have), *_solvers(have), *_methods(), *_tools()]
+    entries = [*_packages(have), *_solvers(have), *_methods(), *_tools(), _cache()]
     faults = [*_python(), *_conflicts(have), *_paths(environ)]
     faults += [
         (f"the {entry.kind} {entry.name} is {entry.state}: {entry.detail}", entry.mend)
@@ -139,6 +139,17 @@ def _tools() -> Iterator[Entry]:
             yield Entry("tool", name, "absent", use, False, mend)
         else:
             yield Entry("tool", name, "broken", outcome.detail, False, mend)
+
+
+def _cache() -> Entry:
+    from wholebody.geometry.mesh_cache import LARGEST_CACHE, VARIABLE, cache_state
+
+    state = cache_state()
+    held = f"{state.entries} meshes, {state.size / 2**20:.1f} of at most {LARGEST_CACHE // 2**20} MB, in {state.folder}"
+    if state.writable:
+        return Entry("cache", "convex pieces", "works", held, False)
+    detail = f"{held}, which cannot be written: pieces of meshes are made anew each time"
+    return Entry("cache", "convex pieces", "absent", detail, False, f"let {VARIABLE} name a folder that can be written")
 
 
 def _python() -> Iterator[tuple[str, str]]:

@@ -21,6 +21,8 @@ MODULES = {
     "pillow": "PIL",
     "trimesh": "trimesh",
     "coacd": "coacd",
+    "pycollada": "collada",
+    "platformdirs": "platformdirs",
     "rich": "rich",
 }
 """What wholebody needs: distribution -> the module it brings."""

@@ -93,26 +93,58 @@ def place(x: float = 0.0, y: float = 0.0, z: float = 0.0, rotation: Array | None
     return pin.SE3(np.eye(3) if rotation is None else rotation, np.array([x, y, z], dtype=float))
 
 
-def urdf_text(blueprint: Blueprint) -> str:
+VIRTUAL_MASS = 1e-6
+"""Kilograms of a link between two joints of a ball joint: simulators refuse moving links without mass. It is taken from
+the next link outwards, so that the total is right."""
+
+VIRTUAL_INERTIA = 1e-9
+"""Its moment of inertia about any axis, kg m^2."""
+
+
+def urdf_text(blueprint: Blueprint, extension: str = "") -> str:
     """Return the URDF of a blueprint: metres, radians (degrees in comments), capsules marked for Pinocchio.
 
     URDF has no capsule: a cylinder is written, with Pinocchio's ``collision_checking`` tag that makes it a capsule of
     that length between the centres of its caps.
+
+    Args:
+        blueprint: the body.
+        extension: text of an element to stand at the end, see `wholebody.figures.urdf_extension`.
     """
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
         f"<!-- {blueprint.title} -->",
         f'<robot name="{blueprint.name}">',
     ]
-    for link in blueprint.links:
+    for link in _with_virtual_masses(blueprint):
         lines += _link(link, [solid for solid in blueprint.solids if solid.segment == link.name])
     for joint in blueprint.joints:
         lines += _joint(joint)
     for mark in blueprint.landmarks:
         lines.append(f'  <link name="{mark.name}"/>')
         lines += _joint(Joint(f"{mark.name}_mount", mark.segment, mark.name, mark.placement, None))
-    lines.append("</robot>")
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n" + extension + "</robot>\n"
+
+
+def _with_virtual_masses(blueprint: Blueprint) -> list[Link]:
+    """The links, those without mass between two joints of a ball joint with `VIRTUAL_MASS` of the next one."""
+    outwards = {joint.parent: joint.child for joint in blueprint.joints}
+    moving = {joint.child for joint in blueprint.joints}
+    masses = {link.name: link.mass for link in blueprint.links}
+    taken = dict.fromkeys(masses, 0.0)
+    for link in blueprint.links:
+        heavy = link.name
+        while not masses[heavy] and heavy in outwards:
+            heavy = outwards[heavy]
+        if not link.mass and link.name in moving and masses[heavy]:
+            taken[heavy] += VIRTUAL_MASS
+    made = []
+    for link in blueprint.links:
+        if not link.mass and link.name in moving:
+            made.append(link._replace(mass=VIRTUAL_MASS, inertia=(VIRTUAL_INERTIA,) * 3))
+        else:
+            made.append(link._replace(mass=link.mass - taken[link.name]) if link.mass else link)
+    return made
 
 
 def _link(link: Link, solids: Sequence[Solid]) -> list[str]:

@@ -66,6 +66,30 @@ class Limits(NamedTuple):
     upper: Array
 
 
+class Follower(NamedTuple):
+    """A joint whose value is that of another times a slope plus an offset (mimic).
+
+    Attributes:
+        joint: name of the other one.
+        idx_q: its place in the posture.
+        slope: never zero.
+        offset: radians or metres.
+    """
+
+    joint: str
+    idx_q: int
+    slope: float
+    offset: float
+
+    def value(self, q: Array) -> float:
+        """Value of the joint at a posture."""
+        return self.slope * float(q[self.idx_q]) + self.offset
+
+    def leading(self, value: float) -> float:
+        """Value of the other joint at which this one has a value."""
+        return (value - self.offset) / self.slope
+
+
 class Description(NamedTuple):
     """What a figure knows beyond its model and geometry; all of it by name.
 
@@ -104,3 +128,17 @@ def limits_of(model: pin.Model) -> Limits:
                 rows.append((joint.idx_q, joint.idx_v, low, high))
     columns = np.array(rows).reshape(-1, 4).T
     return Limits(columns[0].astype(np.intp), columns[1].astype(np.intp), columns[2].copy(), columns[3].copy())
+
+
+def followers_of(model: pin.Model) -> dict[str, Follower]:
+    """Return the joints of a model that follow another one."""
+    found: dict[str, Follower] = {}
+    leader: dict[int, str] = {}
+    for name, joint in list(zip(model.names, model.joints, strict=True))[1:]:
+        if joint.shortname() == "JointModelMimic":
+            law = joint.extract()
+            place = int(joint.idx_q)
+            found[name] = Follower(leader[place], place, float(law.scaling), float(law.offset))
+        else:
+            leader[int(joint.idx_q)] = name
+    return found

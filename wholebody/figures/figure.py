@@ -15,6 +15,7 @@ from wholebody.figures.description import (
     Array,
     Description,
     Indices,
+    followers_of,
     limits_of,
 )
 
@@ -83,6 +84,7 @@ class Figure:
         excluded_pairs: pairs of pieces that are never tested, with the reason.
         notes: sentences on what had to be changed about the geometry of a file.
         limits: joint limits as arrays.
+        followers: joint to the law by which it follows another (mimic).
         effort_weights: (nv,) weight of each degree of freedom in the effort; 0 for the root.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
     """
@@ -117,6 +119,7 @@ class Figure:
         self._frame_ids = {frame.name: index for index, frame in reversed(list(enumerate(model.frames)))}
         self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
         self.limits = limits_of(model)
+        self.followers = MappingProxyType(followers_of(model))
         root = slice(0, 6 if self.root == "free" else 0)
         self.effort_weights = np.ones(model.nv)
         for joint, weight in description.effort.items():
@@ -209,13 +212,15 @@ class Figure:
     def dofs(self, names: str | Iterable[str]) -> Indices:
         """Return the places in the tangent, ascending, of joints and groups; "root" is the six of a free root.
 
+        The place of a joint that follows another (mimic) is that of the one it follows.
+
         Raises:
             UnknownNameError: neither a joint nor a group.
         """
         places: set[int] = set()
         for name in self.joint_names(names):
             joint = self.model.joints[self.joint_id(name)]
-            places.update(range(joint.idx_v, joint.idx_v + joint.nv))
+            places.update(range(joint.idx_v, joint.idx_v + joint.nvExtended))
         return np.array(sorted(places), dtype=np.intp)
 
     def joint_values(self, q: Array) -> dict[str, float]:
@@ -224,7 +229,9 @@ class Figure:
         values = {}
         for name in self.joints:
             joint = self.model.joints[self._joint_ids[name]]
-            if joint.nq == 1:
+            if name in self.followers:
+                values[name] = self.followers[name].value(q)
+            elif joint.nq == 1:
                 values[name] = float(q[joint.idx_q])
             elif (joint.nq, joint.nv) == (2, 1):
                 values[name] = float(np.arctan2(q[joint.idx_q + 1], q[joint.idx_q]))
@@ -232,6 +239,8 @@ class Figure:
 
     def with_joints(self, q: Array, values: Mapping[str, float]) -> Array:
         """Return a copy of the posture q with some joints at other values.
+
+        A joint that follows another (mimic) moves that one.
 
         Args:
             q: (nq,).
@@ -249,7 +258,9 @@ class Figure:
         for name, given in values.items():
             joint = self.model.joints[self.joint_id(name)]
             value = checks.number(given, f"joint {name!r}", -LARGEST, LARGEST, "radians (metres for sliding joints)")
-            if joint.nq == 1:
+            if name in self.followers:
+                q[joint.idx_q] = self.followers[name].leading(value)
+            elif joint.nq == 1:
                 q[joint.idx_q] = value
             elif (joint.nq, joint.nv) == (2, 1):
                 q[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)

@@ -23,19 +23,22 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
     """Return a figure.
 
     Args:
-        spec: "human", "avatar", "hand", or the path of a URDF file.
+        spec: "human", "avatar", "hand", or the path of a URDF or MJCF file.
         **options: for "human" and "avatar": `sex` ("male", "female"), `stature` in metres, `mass` in kilograms and
             `detail` ("spheres", "capsules", "hulls"); for "hand": `side` ("left", "right"), `sex`, `stature`, `mass`;
-            for a URDF: `root` ("fixed", "free"), `package_dirs`, folders for ``package://`` names, and `concavity`.
+            for a file: `root` ("fixed", "free"), `package_dirs`, folders for ``package://`` names, and `concavity`,
+            a number or a mapping from link to number, which asks for the decomposition of meshes into convex pieces
+            (0.01 is close, 1 is a hull); without it every mesh becomes its convex hull.
 
     Raises:
         UnknownNameError: an unknown name or option.
         InputError: a value that no body has.
-        FileFormatError: a URDF that cannot be read.
+        FileFormatError: a file that cannot be read.
     """
     from wholebody.figures.avatar import avatar_figure
     from wholebody.figures.hand import hand_figure
     from wholebody.figures.human_figure import human_figure
+    from wholebody.figures.mjcf_figure import xml_figure
     from wholebody.figures.urdf_figure import urdf_figure
 
     if not isinstance(spec, (str, PathLike)):
@@ -48,10 +51,11 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
     if Path(name).suffix == "" and not is_file(name):
         raise UnknownNameError("figure", name, builders, "load")
     if Path(name).suffix and Path(name).suffix.lower() not in (".urdf", ".xml", ".xacro"):
-        raise FileFormatError(f"{name}: a figure is a URDF file, or 'human', 'avatar', 'hand'; convert it to URDF")
+        raise FileFormatError(f"{name}: a figure is a URDF or MJCF file, or 'human', 'avatar', 'hand'; convert it")
     check_file(name, "figure")
-    _check_options(urdf_figure, options, f"load({name!r})")
-    return urdf_figure(name, **options)
+    builder = xml_figure if Path(name).suffix.lower() == ".xml" else urdf_figure
+    _check_options(builder, options, f"load({name!r})")
+    return builder(name, **options)
 
 
 def _check_options(builder: Callable[..., Figure], options: dict[str, Any], where: str) -> None:
@@ -64,7 +68,7 @@ def _check_options(builder: Callable[..., Figure], options: dict[str, Any], wher
                 [value] if isinstance(value, (str, PathLike)) else listed(value, f"{where}: {option}", "['share']")
             )
             options[option] = [path(folder, f"{where}: {option}") for folder in folders]
-        elif option in ("root", "detail", "side"):
+        elif option in ("detail", "side") or (option == "root" and value is not None):
             text(value, f"{where}: {option}")
         elif option == "samples":
             whole(value, f"{where}: {option}", 0, MOST_SAMPLES)

@@ -25,6 +25,8 @@ def reduce_figure(figure: Figure, keep: tuple[str, ...], q: Array) -> Figure:
         raise InputError("a reduced figure needs at least one joint; name joints, groups or 'root'")
     model = figure.model
     kept = {figure.joint_id(name) for name in keep}
+    leads = {int(model.joints[joint].idx_q) for joint in kept}
+    kept |= {joint for joint in range(1, model.njoints) if int(model.joints[joint].idx_q) in leads}
     locked = [joint for joint in range(1, model.njoints) if joint not in kept]
     small, geometries = pin.buildReducedModel(model, [figure.geometry, figure.visual], locked, q)
     geometry = geometries[0]

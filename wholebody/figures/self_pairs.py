@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from collections.abc import Iterable
 
 import numpy as np
 import pinocchio as pin
@@ -11,6 +11,13 @@ from numpy.typing import NDArray
 from wholebody.figures.description import ExcludedPair
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+SELDOM = 0.02
+"""Share of the sampled postures: pairs that are free in no more of them are shells in shells, and are left out."""
+
+TOUCHING = 2e-4
+"""Metres: pieces nearer than this touch. The phalanges of some hands come no farther apart in any posture."""
 
 UNLIMITED = np.pi
 """Range, each way, in which joints without limits are sampled: radians, or metres for sliding joints."""
@@ -20,7 +27,8 @@ def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int, se
     """Put the pairs that can touch into the geometry.
 
     Left out are pieces on one link or joint, pieces of neighbours (no piece on any joint between them), and pairs that
-    overlap in every one of a number of random postures within the limits: shells in shells, which nothing could free.
+    touch or overlap in all but a few of a number of random postures within the limits: shells in shells, which next to
+    nothing could free.
 
     Args:
         model: Pinocchio's model.
@@ -32,18 +40,45 @@ def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int, se
         The pairs left out, with the reason.
     """
     geometry.removeAllCollisionPairs()
-    pieces, excluded = geometry.geometryObjects, []
-    carriers = {piece.parentJoint for piece in pieces}
-    above = {joint: _carrier_above(model, joint, carriers) for joint in carriers}
-    for i, j in combinations(range(geometry.ngeoms), 2):
-        a, b = pieces[i].parentJoint, pieces[j].parentJoint
-        if a == b:
-            excluded.append(ExcludedPair(pieces[i].name, pieces[j].name, "on one joint"))
-        elif above[a] == b or above[b] == a:
-            excluded.append(ExcludedPair(pieces[i].name, pieces[j].name, "neighbours"))
-        else:
-            geometry.addCollisionPair(pin.CollisionPair(i, j))
-    return (*excluded, *_drop_always_overlapping(model, geometry, samples, seed))
+    joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
+    above = _carriers_above(model, joint)
+    first, second = np.triu_indices(geometry.ngeoms, 1)
+    a, b = joint[first], joint[second]
+    together, neighbours = a == b, (above[a] == b) | (above[b] == a)
+    gone: list[int] = []
+    tested = np.flatnonzero(~together & ~neighbours)
+    names = [piece.name for piece in geometry.geometryObjects]
+    excluded = [
+        ExcludedPair(names[first[k]], names[second[k]], "on one joint" if together[k] else "neighbours")
+        for k in np.flatnonzero(together | neighbours)
+    ]
+    for i, j in zip(first[tested].tolist(), second[tested].tolist(), strict=True):
+        geometry.addCollisionPair(pin.CollisionPair(i, j))
+    postures = random_postures(model, samples, seed)
+    for number, seldom in _seldom_free(model, geometry, postures).items():
+        reason = "touch or overlap in every sampled posture"
+        if seldom:
+            reason = f"touch or overlap in all but {seldom} of {samples} sampled postures"
+        pair = geometry.collisionPairs[number]
+        excluded.append(ExcludedPair(names[pair.first], names[pair.second], reason))
+        gone.append(number)
+    drop_pairs(geometry, gone, "")
+    return tuple(excluded)
+
+
+def drop_pairs(geometry: pin.GeometryModel, numbers: Iterable[int], reason: str) -> list[ExcludedPair]:
+    """Remove pairs, given by their places among the collision pairs, and return them with a reason."""
+    gone = set(numbers)
+    if not gone:
+        return []
+    # Read all pairs first: Pinocchio's list hands out references, which move when an entry is removed.
+    pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
+    names = [piece.name for piece in geometry.geometryObjects]
+    geometry.removeAllCollisionPairs()
+    for number, (first, second) in enumerate(pairs):
+        if number not in gone:
+            geometry.addCollisionPair(pin.CollisionPair(first, second))
+    return [ExcludedPair(names[pairs[number][0]], names[pairs[number][1]], reason) for number in sorted(gone)]
 
 
 def random_postures(model: pin.Model, count: int, seed: int) -> Array:
@@ -54,7 +89,8 @@ def random_postures(model: pin.Model, count: int, seed: int) -> Array:
     for joint in list(model.joints)[1:]:
         if joint.nq == joint.nv == 1:
             low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
-            low, high = (low if np.isfinite(low) else -UNLIMITED), (high if np.isfinite(high) else UNLIMITED)
+            low = low if np.isfinite(low) else min(-UNLIMITED, high)
+            high = high if np.isfinite(high) else max(UNLIMITED, low)
             postures[:, joint.idx_q] = rng.uniform(low, high, count)
         elif (joint.nq, joint.nv) == (2, 1):
             angle = rng.uniform(-UNLIMITED, UNLIMITED, count)
@@ -62,36 +98,35 @@ def random_postures(model: pin.Model, count: int, seed: int) -> Array:
     return postures
 
 
-def _carrier_above(model: pin.Model, joint: int, carriers: set[int]) -> int:
-    """Nearest joint towards the root that carries a piece; -1 if there is none."""
-    while joint > 0:
-        joint = model.parents[joint]
-        if joint in carriers:
-            return int(joint)
-    return -1
+def _carriers_above(model: pin.Model, joint: Indices) -> Indices:
+    """For every joint the nearest one towards the root that carries a piece; -1 if there is none."""
+    carries = np.zeros(model.njoints, dtype=bool)
+    carries[joint] = True
+    above = np.full(model.njoints, -1, dtype=np.intp)
+    for k in range(1, model.njoints):
+        parent = int(model.parents[k])
+        above[k] = parent if carries[parent] else above[parent]
+    return above
 
 
-def _drop_always_overlapping(
-    model: pin.Model, geometry: pin.GeometryModel, samples: int, seed: int
-) -> list[ExcludedPair]:
-    if not len(geometry.collisionPairs) or not samples:
-        return []
-    data, geometry_data = model.createData(), pin.GeometryData(geometry)
-    always = np.ones(len(geometry.collisionPairs), dtype=bool)
-    for q in random_postures(model, samples, seed):
-        pin.updateGeometryPlacements(model, data, geometry, geometry_data, q)
-        for k in np.flatnonzero(always):
-            always[k] = pin.computeCollision(geometry, geometry_data, int(k))
-        if not always.any():
+def _seldom_free(model: pin.Model, geometry: pin.GeometryModel, postures: Array) -> dict[int, int]:
+    """Pairs that touch or overlap in all but `SELDOM` of these postures, and in how many they do not.
+
+    A pair is asked about until it was free too often, which of most is at once.
+    """
+    if not len(geometry.collisionPairs) or not len(postures):
+        return {}
+    data, results = model.createData(), pin.GeometryData(geometry)
+    for request in results.collisionRequests:
+        request.security_margin = TOUCHING
+    free = dict.fromkeys(range(len(geometry.collisionPairs)), 0)
+    most = int(SELDOM * len(postures))
+    for q in postures:
+        pin.updateGeometryPlacements(model, data, geometry, results, q)
+        for k in [k for k in free if not pin.computeCollision(geometry, results, k)]:
+            free[k] += 1
+            if free[k] > most:
+                del free[k]
+        if not free:
             break
-    dropped = []
-    pieces = geometry.geometryObjects
-    for pair in [geometry.collisionPairs[int(k)] for k in np.flatnonzero(always)]:
-        dropped.append(
-            ExcludedPair(pieces[pair.first].name, pieces[pair.second].name, "overlap in every sampled posture")
-        )
-    for entry in dropped:
-        geometry.removeCollisionPair(
-            pin.CollisionPair(geometry.getGeometryId(entry.a), geometry.getGeometryId(entry.b))
-        )
-    return dropped
+    return free

@@ -1,4 +1,4 @@
-"""Where the URDF files that come with the package are."""
+"""Where the URDF files and tasks that come with the package are."""
 
 from __future__ import annotations
 
@@ -31,3 +31,16 @@ def urdf_path(name: str) -> Path:
     if not path.is_file():
         raise UnknownNameError("shipped URDF", name, [file.stem for file in folder.glob("*.urdf")])
     return path
+
+
+def task_paths() -> dict[str, Path]:
+    """Return the shipped task files by name: inside an installed package, or among the examples of a checkout.
+
+    Raises:
+        WholebodyError: the installation lacks them.
+    """
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package / "examples", package.parent / "examples" / "tasks"):
+        if (folder / "shelf.toml").is_file():
+            return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    raise WholebodyError(f"there are no examples in or beside {package}; install wholebody again")

@@ -7,24 +7,27 @@ from pathlib import Path
 
 from wholebody.figures import hulls
 from wholebody.figures.anthropometry import Body
-from wholebody.figures.avatar import avatar_blueprint
+from wholebody.figures.avatar import avatar_blueprint, avatar_figure
 from wholebody.figures.blueprint import urdf_text
-from wholebody.figures.hand import MESH, hand_blueprint
+from wholebody.figures.hand import MESH, hand_blueprint, hand_figure
 from wholebody.figures.human import blueprint
+from wholebody.figures.human_figure import figure_of, human_figure
+from wholebody.figures.urdf_extension import extension_text
 from wholebody.files import make_folder, write
 
 
 def write_human(path: str | os.PathLike[str], person: Body) -> None:
     """Write the URDF of a person, pieces as capsules and boxes."""
-    _write(Path(path), urdf_text(blueprint(person)))
+    plan = blueprint(person)
+    _write(Path(path), urdf_text(plan, extension_text(figure_of(plan, "capsules"))))
 
 
 def shipped_files() -> dict[str, str]:
     """Return the text of every shipped file below ``urdf/``: the median man, his avatar and his right hand."""
     return {
-        "human.urdf": urdf_text(blueprint()),
-        "avatar.urdf": urdf_text(avatar_blueprint()),
-        "hand.urdf": urdf_text(hand_blueprint()),
+        "human.urdf": urdf_text(blueprint(), extension_text(human_figure())),
+        "avatar.urdf": urdf_text(avatar_blueprint(), extension_text(avatar_figure())),
+        "hand.urdf": urdf_text(hand_blueprint(), extension_text(hand_figure())),
         MESH: ellipsoid_stl(),
     }
 

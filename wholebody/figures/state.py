@@ -37,6 +37,11 @@ class State:
     """Placements and Jacobians of a model at one posture, from a single pass of Pinocchio.
 
     The object is re-used: `update` overwrites everything that was read from it before.
+
+    Attributes:
+        jacobian: (6, n) columns of the joints, world frame. n is nv, and one more for each degree of freedom of a joint
+            that follows another (mimic): `folded` and `spread` translate.
+        support: (njoints, n) 1 where a column moves a joint, else 0.
     """
 
     def __init__(self, model: pin.Model) -> None:
@@ -46,7 +51,10 @@ class State:
         self.data = model.createData()
         self.q: Array = pin.neutral(model)
         self.support = joint_support(model)
-        self.jacobian: Array = np.zeros((6, model.nv), order="F")
+        self._columns = extended_columns(model)
+        if self._columns is not None:
+            self._fold = np.eye(model.nv)[self._columns]
+        self.jacobian: Array = np.zeros((6, self.support.shape[1]), order="F")
         self._frames: dict[int, pin.SE3] = {}
         self._center_of_mass: Array | None = None
         self._companions: dict[object, State] = {}
@@ -102,13 +110,21 @@ class State:
         Returns:
             (k, nv) rows for the tangent displacement of the posture.
         """
-        result: Array = (wrenches @ self.jacobian) * (self.support[joint] - self.support[against])
-        return result
+        return self.folded((wrenches @ self.jacobian) * (self.support[joint] - self.support[against]))
 
     def wrench_jacobian(self, wrench: Wrench) -> Array:
         """Jacobian (m, nv) of one `Wrench`."""
-        result: Array = (wrench.rows @ self.jacobian) * (self.support[wrench.joint] - self.support[wrench.against])
-        return result
+        return self.folded((wrench.rows @ self.jacobian) * (self.support[wrench.joint] - self.support[wrench.against]))
+
+    def folded(self, rows: Array) -> Array:
+        """Rows (k, nv) of rows (k, n) over the columns of `jacobian`: joints that follow another move with it."""
+        if self._columns is None:
+            return rows
+        return np.asarray(rows @ self._fold)
+
+    def spread(self, displacement: Array) -> Array:
+        """A tangent displacement (nv,) over the columns of `jacobian`, (n,): the transpose of `folded`."""
+        return displacement if self._columns is None else displacement[self._columns]
 
     def center_of_mass(self) -> Array:
         """Centre of mass in the world, shape (3,), metres."""
@@ -135,10 +151,22 @@ def _restored(model: pin.Model, q: Array) -> State:
 
 
 def joint_support(model: pin.Model) -> Array:
-    """Which degrees of freedom move which joint: 0/1 array of shape (njoints, nv); the world's row is zero."""
-    support = np.zeros((model.njoints, model.nv))
+    """Which columns of the joint Jacobian move which joint: 0/1 array (njoints, n); the world's row is zero."""
+    support = np.zeros((model.njoints, sum(joint.nvExtended for joint in list(model.joints)[1:])))
     for joint in range(1, model.njoints):
         support[joint] = support[model.parents[joint]]
-        first = model.joints[joint].idx_v
-        support[joint, first : first + model.joints[joint].nv] = 1.0
+        first = model.joints[joint].idx_vExtended
+        support[joint, first : first + model.joints[joint].nvExtended] = 1.0
     return support
+
+
+def extended_columns(model: pin.Model) -> NDArray[np.intp] | None:
+    """Place in the tangent of each column of the joint Jacobian; None where no joint follows another."""
+    joints = list(model.joints)[1:]
+    if not any(joint.nv != joint.nvExtended for joint in joints):
+        return None
+    columns = np.zeros(sum(joint.nvExtended for joint in joints), dtype=np.intp)
+    for joint in joints:
+        size = joint.nvExtended
+        columns[joint.idx_vExtended : joint.idx_vExtended + size] = np.arange(joint.idx_v, joint.idx_v + size)
+    return columns

@@ -2,37 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
-from xml.etree import ElementTree
-
-import numpy as np
-import pinocchio as pin
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
 
 from wholebody.errors import FileFormatError
+from wholebody.figures.link_pieces import LinkShape
+from wholebody.figures.mesh_search import find_mesh
+from wholebody.figures.urdf_joints import UrdfJoint, read_joints
+from wholebody.figures.xml_reading import bounded, numbers, placement, read_xml, unique_names
+from wholebody.geometry.pieces import LARGEST
 
-JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-Element = ElementTree.Element
-
-
-class Collision(NamedTuple):
-    """One collision element: on which link, where, and what.
-
-    Attributes:
-        link: name of the link.
-        placement: in the link's frame.
-        kind: "box", "sphere", "cylinder", "capsule" or "mesh".
-        size: box: three edges; sphere: radius; cylinder and capsule: radius, length; mesh: scale along x, y, z.
-        file: of a mesh.
-    """
-
-    link: str
-    placement: pin.SE3
-    kind: str
-    size: tuple[float, ...]
-    file: Path | None = None
+EXTENSION = "wholebody"
+"""Name of the element that says what a URDF has no words for; see `wholebody.figures.urdf_extension`."""
 
 
 class UrdfFile(NamedTuple):
@@ -41,16 +24,22 @@ class UrdfFile(NamedTuple):
     Attributes:
         path: the file.
         name: of the robot.
-        text: as Pinocchio reads it.
         links: names, the root link first.
-        collisions: in the order of the file.
+        inertials: link to its ``<inertial>`` element.
+        joints: in the order of the file.
+        shapes: collision shapes in the order of the file.
+        extension: the element `EXTENSION`, or None.
+        notes: one sentence for each thing that is missing in the file and was filled in.
     """
 
     path: Path
     name: str
-    text: str
     links: tuple[str, ...]
-    collisions: tuple[Collision, ...]
+    inertials: dict[str, Element]
+    joints: tuple[UrdfJoint, ...]
+    shapes: tuple[LinkShape, ...]
+    extension: Element | None
+    notes: tuple[str, ...]
 
 
 def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
@@ -58,108 +47,55 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
 
     Args:
         path: the file.
-        package_dirs: folders that hold the packages of ``package://<package>/...`` names, after the file's own parents.
+        package_dirs: folders that hold the packages of ``package://<package>/...`` names; see `find_mesh`.
 
     Raises:
         FileFormatError: one sentence with the place and the mend.
     """
-    if not path.is_file():
-        raise FileFormatError(f"{path}: there is no such file; give the path of a URDF, or 'human', 'avatar', 'hand'")
-    try:
-        text = path.read_text(encoding="utf-8")
-        robot = ElementTree.fromstring(text.encode())
-    except UnicodeDecodeError:
-        raise FileFormatError(f"{path}: this is not a text file; give a URDF") from None
-    except ElementTree.ParseError as error:
-        raise FileFormatError(f"{path}: the XML is broken ({error}); mend that place") from None
+    robot = read_xml(path, "URDF")
     if robot.tag != "robot":
         raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; give a URDF")
-    if "xacro" in text and (path.suffix == ".xacro" or robot.find(".//{http://www.ros.org/wiki/xacro}*") is not None):
+    if path.suffix == ".xacro" or robot.find(".//{http://www.ros.org/wiki/xacro}*") is not None:
         raise FileFormatError(
             f"{path}: this is a xacro macro file; expand it first with `xacro {path.name} > robot.urdf`"
         )
-    links = _names(robot.findall("link"), "link", path)
-    root = _check_joints(robot, links, path)
-    collisions = tuple(
-        collision for link in robot.findall("link") for collision in _collisions(link, path, tuple(package_dirs))
-    )
+    links = _links(robot, path)
+    joints, root, notes = read_joints(robot, links, path)
+    inertials = {}
+    for link in robot.findall("link"):
+        inertial = link.find("inertial")
+        if inertial is not None:
+            _check_inertial(inertial, f"{path}: link {link.get('name')!r}")
+            inertials[str(link.get("name"))] = inertial
+    shapes = tuple(shape for link in robot.findall("link") for shape in _shapes(link, path, tuple(package_dirs)))
     ordered = (root, *(name for name in links if name != root))
-    return UrdfFile(path, robot.get("name", path.stem), text, ordered, collisions)
+    name = robot.get("name") or path.stem
+    return UrdfFile(path, name, ordered, inertials, joints, shapes, robot.find(EXTENSION), notes)
 
 
-def _names(elements: list[Element], kind: str, path: Path) -> tuple[str, ...]:
-    names: list[str] = []
-    for k, element in enumerate(elements):
-        name = element.get("name")
-        if not name:
-            raise FileFormatError(f"{path}: {kind} number {k + 1} has no name; give it one")
-        if name in names:
-            raise FileFormatError(f"{path}: two {kind}s are called {name!r}; rename one")
-        names.append(name)
-    if kind == "link" and not names:
+def _links(robot: Element, path: Path) -> tuple[str, ...]:
+    names = unique_names(robot.findall("link"), "link", path)
+    if not names:
         raise FileFormatError(f"{path}: there are no links in it; give a URDF of a robot")
-    return tuple(names)
+    return names
 
 
-def _check_joints(robot: Element, links: tuple[str, ...], path: Path) -> str:
-    """Check the tree of joints; return the root link."""
-    joints = robot.findall("joint")
-    _names(joints, "joint", path)
-    parent_of: dict[str, str] = {}
-    for joint in joints:
-        place = f"{path}: joint {joint.get('name')!r}"
-        kind = joint.get("type")
-        if kind not in JOINT_TYPES:
-            raise FileFormatError(f"{place} has the type {kind!r}; use one of {', '.join(JOINT_TYPES)}")
-        ends = [
-            element.get("link") if (element := joint.find(tag)) is not None else None for tag in ("parent", "child")
-        ]
-        for tag, end in zip(("parent", "child"), ends, strict=True):
-            if end not in links:
-                raise FileFormatError(
-                    f"{place} has the {tag} link {end!r}, which is not in the file; add it or mend the name"
-                )
-        parent, child = str(ends[0]), str(ends[1])
-        if child in parent_of:
-            raise FileFormatError(f"{place}: link {child!r} already hangs on {parent_of[child]!r}; a URDF is a tree")
-        parent_of[child] = parent
-        _origin(joint, place)
-        if kind in ("revolute", "prismatic"):
-            _check_limit(joint, place)
-        axis = joint.find("axis")
-        if kind not in ("fixed", "floating") and axis is not None and not any(_floats(axis, "xyz", place, 3)):
-            raise FileFormatError(f"{place} has a zero axis; give a direction")
-    roots = [link for link in links if link not in parent_of]
-    if len(roots) != 1:
-        found = (
-            "no link without a parent: the joints form a loop"
-            if not roots
-            else f"{len(roots)} roots: {', '.join(roots[:4])}"
-        )
-        raise FileFormatError(f"{path}: a URDF is one tree, but there is {found}; connect it")
-    for link in links:
-        seen = {link}
-        while link in parent_of:
-            link = parent_of[link]
-            if link in seen:
-                raise FileFormatError(f"{path}: the joints around link {link!r} form a loop; a URDF is a tree")
-            seen.add(link)
-    return roots[0]
+def _check_inertial(inertial: Element, place: str) -> None:
+    """Masses are checked and moments are only kept from being absurd: many robots' are not quite physical."""
+    mass = inertial.find("mass")
+    if mass is None:
+        raise FileFormatError(f"{place} has an <inertial> without <mass>; add it")
+    if bounded(mass, "value", place, 1)[0] < 0.0:
+        raise FileFormatError(f"{place} has the mass {mass.get('value')}; give kilograms, not less than zero")
+    inertia = inertial.find("inertia")
+    if inertia is None:
+        raise FileFormatError(f"{place} has an <inertial> without <inertia>; add it")
+    for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"):
+        bounded(inertia, name, place, 1)
+    placement(inertial, place, LARGEST)
 
 
-def _check_limit(joint: Element, place: str) -> None:
-    limit = joint.find("limit")
-    if limit is None:
-        raise FileFormatError(f"{place} has no <limit>; add one, or make the joint continuous")
-    low, high = (_floats(limit, name, place, 1, "0")[0] for name in ("lower", "upper"))
-    if low > high:
-        raise FileFormatError(f"{place} has the lower limit {low:g} above the upper {high:g}; exchange them")
-    for name in ("effort", "velocity"):
-        if limit.get(name) is None:
-            raise FileFormatError(f'{place} has a limit without {name}; URDF demands it, add {name}="1"')
-
-
-def _collisions(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> list[Collision]:
+def _shapes(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> list[LinkShape]:
     name = str(link.get("name"))
     capsules = {element.get("name") for element in link.findall("collision_checking/capsule")}
     found = []
@@ -171,58 +107,24 @@ def _collisions(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> li
         shape = shapes[0]
         kind, file = shape.tag, None
         if kind == "box":
-            size = _floats(shape, "size", place, 3)
+            size = numbers(shape, "size", place, 3)
         elif kind == "sphere":
-            size = _floats(shape, "radius", place, 1)
+            size = numbers(shape, "radius", place, 1)
         elif kind in ("cylinder", "capsule"):
-            size = (*_floats(shape, "radius", place, 1), *_floats(shape, "length", place, 1))
+            size = (*numbers(shape, "radius", place, 1), *numbers(shape, "length", place, 1))
             kind = "capsule" if collision.get("name") in capsules - {None} else kind
         elif kind == "mesh":
-            size = _floats(shape, "scale", place, 3, "1 1 1")
-            file = _mesh_file(shape.get("filename", ""), place, path, package_dirs)
+            size = bounded(shape, "scale", place, 3, "1 1 1")
+            file = find_mesh(shape.get("filename", ""), place, path, package_dirs)
+            if not all(size):
+                raise FileFormatError(f"{place}: the mesh has the scale {shape.get('scale')!r}; give no zeros")
         else:
             raise FileFormatError(f"{place} is a <{kind}>; use box, sphere, cylinder or mesh")
-        if kind != "mesh" and min(size) <= 0.0:
+        if kind != "mesh" and min(size) < 0.0:
             raise FileFormatError(f"{place}: the {kind} has the size {min(size):g}; give metres above zero")
-        found.append(Collision(name, _origin(collision, place), kind, size, file))
+        if kind != "mesh" and max(size) > LARGEST:
+            raise FileFormatError(f"{place}: the {kind} has the size {max(size):g}; give metres, at most {LARGEST:g}")
+        found.append(
+            LinkShape(name, placement(collision, place, LARGEST), kind, size, file, name=collision.get("name", ""))
+        )
     return found
-
-
-def _mesh_file(name: str, place: str, path: Path, package_dirs: tuple[Path, ...]) -> Path:
-    """Find a mesh: by path, by ``file://``, or by ``package://`` below `package_dirs` and the parents of the URDF."""
-    if not name:
-        raise FileFormatError(f"{place} has a mesh without filename; add it")
-    folder = path.resolve().parent
-    if name.startswith(("package://", "model://")):
-        rest = name.split("://", 1)[1]
-        tails = [Path(rest), Path(*Path(rest).parts[1:])]
-        candidates = [base / tail for base in (*package_dirs, folder, *folder.parents) for tail in tails]
-    else:
-        plain = Path(name.removeprefix("file://"))
-        candidates = [plain if plain.is_absolute() else folder / plain, *(base / plain for base in package_dirs)]
-    for candidate in candidates:
-        if candidate.is_file():
-            return candidate
-    raise FileFormatError(
-        f"{place}: the mesh {name!r} is not found; put it in place or name its folder in package_dirs"
-    )
-
-
-def _origin(element: Element, place: str) -> pin.SE3:
-    origin = element.find("origin")
-    if origin is None:
-        return pin.SE3.Identity()
-    roll, pitch, yaw = _floats(origin, "rpy", place, 3, "0 0 0")
-    return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(_floats(origin, "xyz", place, 3, "0 0 0")))
-
-
-def _floats(element: Element, name: str, place: str, count: int, default: str | None = None) -> tuple[float, ...]:
-    text: Any = element.get(name, default)
-    try:
-        numbers = tuple(float(word) for word in text.split())
-    except (ValueError, AttributeError):
-        numbers = ()
-    if len(numbers) != count or not all(math.isfinite(number) for number in numbers):
-        wanted = "a finite number" if count == 1 else f"{count} finite numbers"
-        raise FileFormatError(f"{place}: <{element.tag}> has {name}={text!r}; give {wanted}")
-    return numbers

@@ -26,6 +26,25 @@ class Component(NamedTuple):
     volume: float
 
 
+CLOSED = 1e-4
+"""Share of a surface's area, and of its volume, by which a closed one may miss the sums that vanish: files round."""
+
+
+def enclosed_volume(vertices: Array, faces: NDArray[np.int64]) -> float | None:
+    """Volume inside a mesh, overlapping parts counted twice; None where its surface is not closed.
+
+    Of a closed surface the area vectors sum to zero, and the volume is the flux of (x, 0, 0), of (0, y, 0) and of
+    (0, 0, z), all the same. It takes no table of edges: 10 ms for 100,000 triangles, `split_components` a second.
+    """
+    a, b, c = (vertices[faces[:, k]] - vertices.mean(axis=0) for k in range(3))
+    area = 0.5 * np.cross(b - a, c - a)
+    total = float(np.linalg.norm(area, axis=1).sum())
+    flux = np.einsum("ij,ij->j", (a + b + c) / 3.0, area)
+    volume = float(flux.mean())
+    closed = np.abs(area.sum(axis=0)).max() <= CLOSED * total and np.ptp(flux) <= CLOSED * abs(volume)
+    return abs(volume) if closed and volume != 0.0 else None
+
+
 def split_components(vertices: Array, faces: NDArray[np.int64]) -> list[Component]:
     """Split a mesh where triangles do not share an edge.
 

@@ -1,8 +1,9 @@
-"""Mesh files: OBJ, STL, glTF and GLB, read through trimesh."""
+"""Mesh files: OBJ, STL, glTF, GLB and COLLADA, read through trimesh."""
 
 from __future__ import annotations
 
 import logging
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -13,24 +14,29 @@ from wholebody.files import check_file
 from wholebody.geometry.convex import check_mesh
 from wholebody.geometry.pieces import Array
 
-SUFFIXES = (".obj", ".stl", ".gltf", ".glb")
+SUFFIXES = (".obj", ".stl", ".gltf", ".glb", ".dae")
 
 Y_UP: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Turns a file whose y points up (glTF by its standard, and most modelling programs): a quarter turn about x."""
+
+
+class EmptyMeshError(FileFormatError):
+    """A mesh file that is sound, but has no triangles in it."""
 
 
 def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
     """Read all triangles of a file, every object of it in its place.
 
     Args:
-        path: an OBJ, STL, glTF or GLB file; polygons are cut into triangles.
+        path: an OBJ, STL, glTF, GLB or COLLADA (.dae) file; polygons are cut into triangles.
 
     Returns:
-        vertices (n, 3) in the file's units and axes, faces (m, 3).
+        vertices (n, 3) in the file's units and axes, faces (m, 3). A COLLADA file that names its unit is turned into
+        metres, and the axis that it calls up is not looked at, as in the tools of ROS.
 
     Raises:
         FileFormatError: missing, empty, of another kind, damaged, without triangles, or not finite.
-        MissingPackageError: trimesh is not installed.
+        MissingPackageError: trimesh, or for a COLLADA file pycollada, is not installed.
     """
     try:
         import trimesh
@@ -44,12 +50,17 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
         )
     if path.stat().st_size == 0:
         raise FileFormatError(f"mesh {path}: the file is empty")
+    if path.suffix.lower() == ".dae" and find_spec("collada") is None:
+        raise MissingPackageError(f"mesh {path}: reading COLLADA files needs pycollada: pip install pycollada")
     quiet = logging.getLogger("trimesh")
     level = quiet.level
     quiet.setLevel(logging.CRITICAL)
     try:
-        mesh = trimesh.load_scene(path, process=False).to_mesh()
+        scene = trimesh.load_scene(path, process=False)
+        mesh = scene.to_mesh()
         vertices, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces)
+        if path.suffix.lower() == ".dae":
+            vertices *= _metres(scene.units)
     except Exception as error:  # trimesh's readers raise whatever they stumble over
         raise FileFormatError(
             f"mesh {path}: it cannot be read ({type(error).__name__}: {error}); export it again"
@@ -57,8 +68,17 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
     finally:
         quiet.setLevel(level)
     if not len(faces):
-        raise FileFormatError(f"mesh {path}: there are no triangles in it")
+        raise EmptyMeshError(f"mesh {path}: there are no triangles in it")
     try:
         return check_mesh(vertices, faces, f"mesh {path}")
     except InputError as error:
         raise FileFormatError(str(error)) from error
+
+
+def _metres(unit: str | None) -> float:
+    """Metres of a unit as trimesh writes it for COLLADA files: "meters", or "0.0254 * meters"."""
+    number = (unit or "").partition("*")[0]
+    try:
+        return float(number)
+    except ValueError:
+        return 1.0

@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 from wholebody.errors import InputError
 from wholebody.geometry.pieces import Array
 
-TURNING_AXES = ("Composite", "Mimic", "SphericalZYX", "Universal", "Ellipsoid")
+TURNING_AXES = ("Composite", "SphericalZYX", "Universal", "Ellipsoid")
 """Joints whose twist is not constant along a geodesic, by a part of Pinocchio's name for them."""
+
+_NONE: Array = np.zeros((6, 0))
 
 
 class MotionBounds:
@@ -41,7 +43,7 @@ class MotionBounds:
             reach: (n,) radius of each piece about its origin; infinite for a half-space.
 
         Raises:
-            InputError: a joint whose axis turns as it moves (composite, mimic, Euler angles, universal).
+            InputError: a joint whose axis turns as it moves (composite, Euler angles, universal).
         """
         for name, kind in zip(model.names, model.joints, strict=True):
             if any(word in kind.shortname() for word in TURNING_AXES):
@@ -59,11 +61,12 @@ class MotionBounds:
         self.speed: Array = np.zeros((len(joint), model.njoints))
         self._finite = np.isfinite(reach)
         self._size = np.where(self._finite, reach, 0.0)
-        self._twists = np.zeros((2, model.njoints, 3, model.nv))
-        for j in range(1, model.njoints):
-            kind = model.joints[j]
-            twist = np.asarray(kind.createData().S).reshape(2, 3, -1)
-            self._twists[:, j, :, kind.idx_v : kind.idx_v + kind.nv] = twist
+        # one column a degree of freedom, in the order of the joints: a table over all pairs of them would be large
+        joints = list(model.joints)[1:]
+        sizes = np.array([joint.nvExtended for joint in joints], dtype=np.intp)
+        self._twists: Array = np.hstack([_NONE, *(np.asarray(made.createData().S).reshape(6, -1) for made in joints)])
+        self._first = np.cumsum(sizes) - sizes
+        self._column = np.array([made.idx_v + k for made in joints for k in range(made.nvExtended)], dtype=np.intp)
         self._parents = [int(parent) for parent in model.parents]
 
     def update(self, data: Any, velocity: Array, centers: Array) -> None:
@@ -74,8 +77,9 @@ class MotionBounds:
             velocity: (nv,) difference of the two postures.
             centers: (n, 3) the origins of the pieces at the start, world.
         """
-        twists = self._twists @ velocity
-        self._slide, self.turn = np.sqrt(np.einsum("ijk,ijk->ij", twists, twists))
+        if len(self._first):
+            twists = np.add.reduceat(self._twists * velocity[self._column], self._first, axis=1)
+            self._slide[1:], self.turn[1:] = np.sqrt(np.einsum("ijk,ijk->ik", *[twists.reshape(2, 3, -1)] * 2))
         origins = np.array([place.translation for place in data.oMi])
         self.speed = self._speeds(origins, centers, self._size)
         if not self._finite[self.joint > 0].all():

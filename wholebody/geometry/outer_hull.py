@@ -9,6 +9,12 @@ import numpy as np
 
 from wholebody.geometry.pieces import SMALLEST, Array
 
+MANY_FACES = 1000
+"""Faces from which on not all of them are tried."""
+
+SAME_NORMAL = 0.02
+"""Radians: of faces whose normals differ by less, one is tried."""
+
 
 def outer_hull(points: Array, max_vertices: int) -> Array:
     """Vertices of a convex polytope that holds points and has few vertices.
@@ -34,12 +40,13 @@ def outer_hull(points: Array, max_vertices: int) -> Array:
     box = np.vstack([axes, -axes])
     planes = np.column_stack([box, -(corners @ box.T).max(axis=0)])
     best = _vertices(planes, inside)
-    for _ in range(len(hull.equations)):
-        outside = best @ hull.equations[:, :3].T + hull.equations[:, 3]
+    faces = _apart(hull.equations)
+    for _ in range(len(faces)):
+        outside = best @ faces[:, :3].T + faces[:, 3]
         vertex, plane = np.unravel_index(int(outside.argmax()), outside.shape)
         if outside[vertex, plane] < SMALLEST:
             break
-        planes = np.vstack([planes, hull.equations[plane]])
+        planes = np.vstack([planes, faces[plane]])
         try:
             trial = _vertices(planes, inside)
         except QhullError:  # planes that all but coincide: what is there already holds the points
@@ -48,6 +55,14 @@ def outer_hull(points: Array, max_vertices: int) -> Array:
             break
         best = trial
     return np.asarray(best)
+
+
+def _apart(equations: Array) -> Array:
+    """Of thousands of faces, those whose normals differ: a rounded edge of a part in CAD has hundreds."""
+    if len(equations) <= MANY_FACES:
+        return equations
+    _, first = np.unique(np.round(equations[:, :3] / SAME_NORMAL), axis=0, return_index=True)
+    return np.asarray(equations[np.sort(first)])
 
 
 def _vertices(planes: Array, inside: Array) -> Array:

@@ -181,7 +181,8 @@ class Proximity:
         if not table.rows:
             return np.zeros(0, dtype=np.intp)
         if self._threshold[0] != within:
-            bound = np.where(table.has_pair, (table.sum_reach + within) ** 2, -1.0)
+            reach = table.sum_reach + within  # pieces inside of each other are asked for where it is negative
+            bound = np.where(table.has_pair & (reach > 0.0), reach**2, -1.0)
             self._threshold = (within, bound)
         centers = placements[:, 3]
         first = centers[: table.rows]

@@ -14,7 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from wholebody.checks import array, choice, number, path, shown, whole
 from wholebody.errors import InputError
-from wholebody.geometry.convex import ConvexPieces, check_mesh, check_points, convex_pieces, hull_piece
+from wholebody.geometry.convex import check_mesh, convex_pieces
+from wholebody.geometry.hull import check_points, hull_piece
+from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.meshes import Y_UP, read_mesh
 from wholebody.geometry.pieces import LARGEST, Array, Piece, check_length, check_vector
 
@@ -110,7 +112,7 @@ class Capsule(Shape):
 
 @dataclass(frozen=True)
 class Ellipsoid(Shape):
-    """An ellipsoid, centred at its origin. Its distances are right to about 1e-7 m, those of other shapes to 1e-9.
+    """An ellipsoid, centred at its origin. Its distances are right to 1e-6 m and 1e-5 of its size.
 
     Attributes:
         semi_axes: half lengths along x, y and z, metres.
@@ -186,7 +188,7 @@ class Mesh(Shape):
     """A triangle mesh, split into convex pieces when they are first asked for.
 
     Attributes:
-        source: path of an OBJ, STL, glTF or GLB file, or a pair of arrays (vertices (n, 3), faces (m, 3)).
+        source: path of an OBJ, STL, glTF, GLB or COLLADA file, or a pair of arrays (vertices (n, 3), faces (m, 3)).
         scale: metres for each unit of the file: 0.001 for millimetres.
         up: axis of the file that points up; "y" is turned so that it points along z, and the file's z along -y.
         max_vertices: most vertices of a piece that comes out of a decomposition; convex parts keep all of theirs.

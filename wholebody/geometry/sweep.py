@@ -24,6 +24,7 @@ from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, read_result
 from wholebody.geometry.motion_bounds import MotionBounds
 from wholebody.geometry.pieces import Array
+from wholebody.geometry.proximity import SINGLY
 
 Indices = NDArray[np.intp]
 
@@ -81,7 +82,8 @@ class Sweep:
         self._pairs: Indices = np.array(pairs, dtype=np.intp).reshape(-1, 2)
         self._number = {(int(i), int(j)): k for k, (i, j) in enumerate(self._pairs)}
         self._reach = reach[self._pairs].sum(axis=1)
-        self._active = np.zeros((geometry.ngeoms, geometry.ngeoms), dtype=bool, order="F")
+        few = len(self._pairs) < SINGLY  # else no table over all pairs of pieces is made
+        self._active = np.zeros((geometry.ngeoms,) * 2 if few else (0, 0), dtype=bool, order="F")
         self._place(pin.neutral(model), np.zeros(model.nv))
         pin.computeDistances(geometry, self._results)
         self._view = distance_view(self._results.distanceResults)
@@ -234,11 +236,15 @@ class Sweep:
 
     def _query(self, index: Indices) -> Array:
         """Ask coal for these pairs: rows of distance, normal and the two nearest points."""
-        first, second = self._pairs[index, 0], self._pairs[index, 1]
-        self._active[:] = False
-        self._active[first, second] = self._active[second, first] = True
-        self._results.setActiveCollisionPairs(self.geometry, self._active, True)
-        pin.computeDistances(self.geometry, self._results)
+        if len(self._active):
+            first, second = self._pairs[index, 0], self._pairs[index, 1]
+            self._active[:] = False
+            self._active[first, second] = self._active[second, first] = True
+            self._results.setActiveCollisionPairs(self.geometry, self._active, True)
+            pin.computeDistances(self.geometry, self._results)
+        else:
+            for number in index.tolist():
+                pin.computeDistance(self.geometry, self._results, number)
         if self._view is not None:
             return np.asarray(self._view[index])
         return np.array([read_result(self._results.distanceResults[int(k)]) for k in index]).reshape(-1, 10)

@@ -69,7 +69,7 @@ class AsAWhole:
             q = following
         queried = self._workspace.proximity.seconds - queried
         spent = time.perf_counter() - began - queried
-        return Removal((q,), queried, spent, self._displacements, 6 * bool(self._displacements), self._pairs, note)
+        return Removal((q,), queried, spent, self._displacements, 0, self._pairs, note)
 
     def _with_glove(self, shown: Array, tracked: Array) -> Array | None:
         """The shown hand with the tracked fingers, displaced out of what they go into; None where that fails."""

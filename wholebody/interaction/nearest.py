@@ -87,7 +87,7 @@ class NearestPosture:
         pairs = int((contacts.distance < self.problem.clearances[contacts.number] + 0.01 * CLEARANCE).sum())
         queried = proximity.seconds - queried
         whole = time.perf_counter() - began
-        joints = len(ways) * self.scene.model.nv if pairs else 0
+        joints = len(ways) * (self.scene.model.njoints - 1) if pairs else 0
         return Removal(tuple(ways[::-1]), queried, whole - queried, len(ways), joints, pairs, "")
 
 

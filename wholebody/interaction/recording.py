@@ -23,7 +23,8 @@ class Frame(NamedTuple):
         contact_seconds: of it, in collision queries.
         solve_seconds: of it, in finding joint angles (or, for a rigid figure, its displacement).
         iterations: programs solved, passes of CCD with a goal made anew, or displacements.
-        joints: degrees of freedom that were adjusted, counted once for each iteration that adjusted them.
+        joints: that were adjusted for contact, counted once for each iteration that adjusted them, as the joints per
+            frame of table 2 of Schmidl and Lin; 0 where the figure is displaced as a whole.
         pairs: pairs of pieces that were held off or taken apart.
         note: "" or what was out of the ordinary.
     """

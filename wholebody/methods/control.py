@@ -16,9 +16,9 @@ from wholebody.checks import a, number
 from wholebody.errors import InputError
 from wholebody.problem import Iterate
 
-TIME_LIMIT = 4.0
-"""Seconds that a solve may take unless its method is told otherwise. Few come near it; answers of those that do depend
-on the machine's load, and say so."""
+LONGEST = 4.0
+"""Seconds of processor time that a solve may take where no time limit is given. Few come near it, and how loaded the
+machine is does not change their answers."""
 
 LIMITS = (1e-9, 1e9)
 """Least and greatest time limit, seconds."""
@@ -41,7 +41,7 @@ class Control:
         """Begin to count.
 
         Args:
-            time_limit: seconds; None for no limit. See `check_time_limit`.
+            time_limit: seconds on the clock; None for `LONGEST` of processor time, infinity for no limit.
             progress: see `Progress`.
 
         Raises:
@@ -51,20 +51,24 @@ class Control:
             raise InputError(f"progress is {a(type(progress))}; give a function of one trace entry")
         self.reason = ""
         self._time_limit, self._progress = time_limit, progress
-        self._began = time.monotonic()
+        self._began = self._now()
         self._handler: Any = None
 
     @property
     def over(self) -> bool:
         """Whether the solve has to end now."""
         if not self.reason and self.spent > 1.0:
-            self.reason = f"the time limit of {self._time_limit:g} s ended it"
+            limit, kind = (LONGEST, " of processor time") if self._time_limit is None else (self._time_limit, "")
+            self.reason = f"the time limit of {limit:g} s{kind} ended it"
         return bool(self.reason)
 
     @property
     def spent(self) -> float:
-        """Share of the time limit that is over; 0 without a limit."""
-        return 0.0 if self._time_limit is None else (time.monotonic() - self._began) / self._time_limit
+        """Share of the time limit that is over."""
+        return (self._now() - self._began) / (LONGEST if self._time_limit is None else self._time_limit)
+
+    def _now(self) -> float:
+        return time.thread_time() if self._time_limit is None else time.monotonic()
 
     def message(self, judgement: Assessment) -> str:
         """Why the solve was ended and what is left then; empty where it was not ended."""
@@ -104,7 +108,7 @@ def check_time_limit(value: float | None) -> None:
     """Check a method's setting `time_limit`.
 
     Raises:
-        InputError: it is neither None nor a positive finite number.
+        InputError: it is neither None nor a positive number.
     """
-    if value is not None:
-        number(value, "time_limit", *LIMITS, "s, or None for no limit")
+    if value is not None and not (isinstance(value, float) and value == np.inf):
+        number(value, "time_limit", *LIMITS, "s, math.inf for no limit, or None")

@@ -27,7 +27,7 @@ from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.contradictions import explanation
-from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
+from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.problem import Iterate, Problem, Solution, Status
 from wholebody.tasks.base import Constraint, Goal
@@ -53,13 +53,14 @@ class DampedLeastSquares:
         iterations: most steps.
         damping: damping that is left when the goals are met [m, rad]; more is steadier near singular postures, less
             converges faster.
-        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
+        time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
+            ends after four seconds of processor time.
     """
 
     tolerance: float = 1e-5
     iterations: int = 300
     damping: float = 1e-3
-    time_limit: float | None = TIME_LIMIT
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         """Check the settings.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -36,8 +36,15 @@ def bent(problem: Problem, state: State, start: Array) -> Array | None:
     return None if np.array_equal(moved, start) else moved
 
 
-def restarts(problem: Problem, state: State, start: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:
-    """Postures within limits, farther and farther from the start, shape (nq,).
+def restarts(
+    problem: Problem,
+    state: State,
+    start: Array,
+    rng: np.random.Generator,
+    count: int,
+    spreads: Sequence[float] = SPREADS,
+) -> Iterator[Array]:
+    """Postures within limits, shape (nq,); farther and farther from the start as the spreads say, in turn.
 
     Args:
         problem: whose bounds are kept: frozen joints stay where they are.
@@ -45,11 +52,12 @@ def restarts(problem: Problem, state: State, start: Array, rng: np.random.Genera
         start: (nq,).
         rng: where the randomness comes from.
         count: how many.
+        spreads: share of each joint's range that each of them may leave the start by.
     """
     lower, upper = problem.scene.figure.tangent_bounds(start)
     span = np.where(np.isfinite(upper - lower), upper - lower, ROOT_SPREAD)
     for number in range(count):
-        spread = SPREADS[number % len(SPREADS)]
+        spread = spreads[number % len(spreads)]
         yield _moved(problem, state, start, rng.uniform(-0.5, 0.5, len(span)) * spread * span)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.geometry.convex import hull_piece
+from wholebody.geometry.hull import hull_piece
 from wholebody.geometry.outer_hull import outer_hull
 from wholebody.geometry.pieces import Piece
 from wholebody.geometry.proximity import COAL_ACCURACY

@@ -107,12 +107,17 @@ def _columns(term: Goal | Constraint, states: Iterable[State]) -> Mask:
     for state in states:
         jacobian = term.jacobian(state)
         if isinstance(jacobian, Wrench):
-            between = state.support[jacobian.joint] != state.support[jacobian.against]
+            between = _dofs(state, state.support[jacobian.joint] != state.support[jacobian.against])
             return np.tile(between, (len(jacobian.rows), 1))
         shown = np.abs(np.atleast_2d(jacobian)) > NOTHING
         found = shown if found is None else found | shown
     assert found is not None
     return found
+
+
+def _dofs(state: State, columns: Mask) -> Mask:
+    """(nv,) degrees of freedom to which these columns of the joint Jacobian belong."""
+    return np.asarray(state.folded(columns[None].astype(float))[0] > 0.0)
 
 
 def _slopes(measure: Measure, states: Iterable[State]) -> Mask:
@@ -152,7 +157,7 @@ def _too_near(problem: Problem) -> Mask:
     wrong = near.pair[near.distance < problem.clearances[near.number] - INSIDE]
     joint = scene.pair_table.joint
     between = state.support[joint[wrong[:, 0]]] != state.support[joint[wrong[:, 1]]]
-    return np.asarray(between.any(axis=0))
+    return _dofs(state, between.any(axis=0))
 
 
 def _excess(problem: Problem, locked: Mask) -> float:

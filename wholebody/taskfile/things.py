@@ -18,11 +18,12 @@ FIGURES = {
     "avatar": Form("A person with a stiff torso: arms, legs and neck.", (*_BODY, _DETAIL)),
     "hand": Form("One hand.", (Key("side", kinds.Choice(("left", "right")), "right if left out"), *_BODY)),
     "urdf": Form(
-        "Any URDF, with its own collision geometry.",
+        "Any URDF or MJCF, with its own collision geometry.",
         (
-            Key("path", kinds.Text(), "the URDF, relative to the task file", True),
-            Key("root", kinds.Choice(("fixed", "free")), "fixed if left out"),
+            Key("path", kinds.Text(), "the file, relative to the task file", True),
+            Key("root", kinds.Choice(("fixed", "free")), "as the file says if left out, else fixed"),
             Key("package_dirs", kinds.Several(kinds.Text()), "folders for package:// names, relative to the task file"),
+            Key("concavity", Number(0.01, 1.0), "left in the pieces of meshes, of their size; hulls if left out"),
         ),
     ),
 }
@@ -48,7 +49,7 @@ SHAPES = {
     ),
     "hull": Form("The convex hull of points.", (Key("points", kinds.Several(POSITION, 4), "in m", True),), shapes.Hull),
     "mesh": Form(
-        "A triangle mesh (OBJ, STL, glTF), split into convex pieces.",
+        "A triangle mesh (OBJ, STL, glTF, COLLADA), split into convex pieces.",
         (
             Key("path", kinds.Text(), "relative to the task file", True),
             Key("scale", Number(1e-6, 1e3), "metres to one unit of the file; 1 if left out"),

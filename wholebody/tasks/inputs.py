@@ -92,7 +92,8 @@ def find_dofs(scene: Surroundings, names: Sequence[str], where: str) -> Any:
 
 def angular_dofs(model: Any) -> Any:
     """(nv,) which degrees of freedom are in radians: those that turn something."""
-    return np.abs(State(model).jacobian[3:]).max(axis=0) > 0.5
+    state = State(model)
+    return state.folded(np.abs(state.jacobian[3:])).max(axis=0) > 0.5
 
 
 def point(value: object, where: str) -> Array:

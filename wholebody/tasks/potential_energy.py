@@ -73,12 +73,14 @@ class PotentialEnergy(Measure):
         centres = _centres(state, bodies.joints, bodies.centres)
         wrenches = _lifts(centres) * (2.0 * bodies.weights * (centres[:, 2] - bodies.heights))[:, None]
         # All that hangs on a joint acts on it: sum the wrenches first, then one product with each of its columns.
-        return np.asarray(((bodies.support.T @ wrenches) * state.jacobian.T).sum(axis=1))
+        columns = ((bodies.support.T @ wrenches) * state.jacobian.T).sum(axis=1)
+        return np.asarray(state.folded(columns[None])[0])
 
     def curvature(self, state: State) -> Array:
         """(nv,) diagonal of the Gauss-Newton matrix of the heights [J^2/rad^2 and J^2/m^2]."""
         bodies = self._bodies
-        rows = (_lifts(_centres(state, bodies.joints, bodies.centres)) @ state.jacobian) * bodies.support
+        lifts = _lifts(_centres(state, bodies.joints, bodies.centres))
+        rows = state.folded((lifts @ state.jacobian) * bodies.support)
         return np.asarray(2.0 * (bodies.weights @ (rows * rows)) + LEAST_CURVATURE)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import inf, isinf
 
+import numpy as np
 import pytest
 
 from wholebody.bench.compare.advice import advice, choices, standings
@@ -165,8 +166,55 @@ def test_advice_names_the_dependable_and_the_fast() -> None:
     made = results(slow, fast, quick)
     rows = summaries(made)
     (choice,) = choices(made, rows)
-    assert (choice.fastest, choice.exact) == ("quick", "slow")
+    assert (choice.fastest, choice.exact) == (("quick",), ("slow",))
     assert [standing.entrant for standing in standings(made, rows)] == ["quick", "slow", "fast"]
     said = advice(made, rows)
     assert "`quick`" in said[0]
     assert any("`fast` alone is not enough" in sentence and "80 %" in sentence for sentence in said)
+
+
+def noisy(entrant: str, share: float, error: float, seed: int) -> list[Record]:
+    """Solves of 20 problems whose times are off by some 20 % each, at random."""
+    rng = np.random.default_rng(seed)
+    return [
+        record(entrant, number, 1e-4, share * 0.01 * (number + 1) * float(np.exp(0.2 * rng.normal())), error)
+        for number in range(20)
+    ]
+
+
+def test_advice_names_no_winner_among_solvers_of_one_method() -> None:
+    made = results(noisy("qp/osqp", 1.0, 1e-6, 0), noisy("qp/daqp", 0.99, 1e-6, 1), noisy("slow", 3.0, 1e-6, 2))
+    rows = summaries(made)
+    (choice,) = choices(made, rows)
+    assert set(choice.fastest) == {"qp/osqp", "qp/daqp"}
+    assert set(choice.exact) == {"qp/osqp", "qp/daqp", "slow"}
+    said = advice(made, rows)
+    assert said[0].startswith("**If in doubt, take `qp` (any of ")
+    assert "cannot be told apart" in said[0]
+    times = {standing.entrant: standing.slowness for standing in standings(made, rows)}
+    assert times["qp/daqp"].low < 1.0 < times["qp/daqp"].high
+    assert 1.0 < times["slow"].low < 3.0 < times["slow"].high
+
+
+def test_advice_claims_no_accuracy_below_what_is_told_apart() -> None:
+    made = results(noisy("one", 1.0, 1e-12, 0), noisy("other", 2.0, 0.0, 1))
+    rows = summaries(made)
+    assert set(choices(made, rows)[0].exact) == {"one", "other"}
+    (sentence,) = [sentence for sentence in advice(made, rows) if sentence.startswith("**Most accurate")]
+    assert "at most 1e-09" in sentence
+
+
+def test_methods_are_not_compared_over_different_problems() -> None:
+    easy = [one for one in noisy("quick", 1.0, 1e-6, 0) if one.number < 10]  # it was given the short ones
+    hard = [one for one in noisy("other", 1.0, 1e-6, 1) if one.number >= 10]
+    made = results(noisy("qp/osqp", 1.0, 1e-6, 2), easy, hard)
+    found = {standing.entrant: standing.slowness for standing in standings(made, summaries(made))}
+    assert (found["quick"].cases, found["other"].cases) == (10, 10)
+    assert all(0.8 < each.value < 1.25 for each in found.values())
+
+
+def test_a_share_that_may_be_dependable_is_not_called_too_little() -> None:
+    good = [record("good", number, 1e-4, 0.01, 1e-6) for number in range(200)]
+    nearly = [record("nearly", number, 1e-4, 0.01, 0.3 if number < 5 else 1e-6) for number in range(200)]  # 97.5 %
+    made = results(good, nearly)
+    assert not any("`nearly` alone" in sentence for sentence in advice(made, summaries(made)))

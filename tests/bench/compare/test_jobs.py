@@ -19,5 +19,6 @@ def test_what_a_method_compiles_is_not_taken_for_what_its_solves_cost(fakes: Mod
         chunk = work(Task(fakes.SET, 0, 0, solves, cap=10.0, most=1.0))
     finally:
         own_worker().close()
-    assert chunk.spent["compiles"] < 0.4 <= chunk.spent["sleeps"]
+    assert chunk.spent["sleeps"] >= 0.4
+    assert chunk.spent["compiles"] < 1.5  # which it takes to compile
     assert [record.outcome for record in chunk.records] == ["answered", "answered", "failed"]

@@ -111,7 +111,7 @@ def test_the_page_of_results_gets_its_part(folder: Path) -> None:
     page = (folder / "docs" / "results.md").read_text()
     assert page.startswith("before\n<!-- bench:compare -->")
     assert page.endswith("<!-- /bench:compare -->\nafter\n")
-    assert "old" not in page
+    assert "\nold\n" not in page
     for name in re.findall(r"\]\((assets/bench/[^)]+)\)", page):
         assert (folder / "docs" / name).is_file()
 

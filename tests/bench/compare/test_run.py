@@ -22,6 +22,7 @@ from wholebody.bench.compare.store import NAME, Store
 from wholebody.errors import InputError, WholebodyError
 
 TIMES = ("seconds", "cpu_seconds", "setup_seconds", "frame_p95")
+CAP = 5.0  # s: much more than a solve takes on a machine with other things to do, less than what hangs
 
 
 def settings(fakes: ModuleType, *does: str, cases: int = 1, sweep: int = 1, cap: float = 5.0) -> Settings:
@@ -36,7 +37,7 @@ def timeless(records: list[Record]) -> list[dict[str, object]]:
 def misbehaved(fakes: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Record]]:
     """Return records by method of a run with every fault there is."""
     does = ("solves", "raises", "refuses", "hangs", "spins", "dies", "nan", "lies")
-    store = run(settings(fakes, *does, cap=1.0), tmp_path_factory.mktemp("run"))
+    store = run(settings(fakes, *does, cap=CAP), tmp_path_factory.mktemp("run"))
     return {name: [record for record in store.records if record.entrant == name] for name in does}
 
 
@@ -45,7 +46,7 @@ def test_a_method_that_solves_is_judged_at_every_budget(misbehaved: dict[str, li
     assert sorted(record.tolerance for record in records) == [1e-6, 1e-4, 1e-2]
     for record in records:
         assert record.success(max(1e-3, 1.1 * record.tolerance))
-        assert 0.0 < record.seconds < 1.0
+        assert 0.0 < record.seconds < CAP
         assert record.best > 0.0
     assert min(record.worst for record in records) < 2e-6
 
@@ -74,7 +75,7 @@ def test_a_solve_that_takes_too_long_is_ended_wherever_it_is(does: str, misbehav
     records = misbehaved[does]
     assert len(records) == 3  # further budgets count as what they would have been
     assert {record.outcome for record in records} == {OVERTIME}
-    assert records[0].said == "ended after 1 s"
+    assert records[0].said == f"ended after {CAP:g} s"
 
 
 def test_a_false_claim_is_seen(misbehaved: dict[str, list[Record]]) -> None:
@@ -117,9 +118,10 @@ def test_a_killed_run_goes_on_where_it_was(fakes: ModuleType, tmp_path: Path) ->
     script, folder = tmp_path / "run.py", tmp_path / "killed"
     script.write_text(SCRIPT)
     call = [sys.executable, str(script), str(Path(fakes.__file__).parent), str(folder)]
-    process = subprocess.Popen(call, start_new_session=True)
+    slowly = os.environ | {"FAKES_SLEEP": "2.0"}  # or it may be over before it is killed
+    process = subprocess.Popen(call, start_new_session=True, env=slowly)
     lines = folder / NAME
-    end = time.monotonic() + 90.0
+    end = time.monotonic() + 200.0
     while not lines.exists() or lines.read_bytes().count(b"\n") < 3:
         assert process.poll() is None
         assert time.monotonic() < end

@@ -1,38 +1,41 @@
-"""Which method to choose when, from the figures alone."""
+"""Which method to choose when, from the figures alone, and no winner where the figures do not tell one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp, inf, isfinite, log, nan
+from math import inf, isfinite, nan
 from typing import NamedTuple
 
-from wholebody.bench.compare.curves import curve
-from wholebody.bench.compare.results import QUANTITIES, Results
+from wholebody.bench.compare import paired
+from wholebody.bench.compare.front import OURS
+from wholebody.bench.compare.paired import Ratio, named
+from wholebody.bench.compare.record import FLOOR
+from wholebody.bench.compare.results import EFFORT_FLOOR, Results, middle
 from wholebody.bench.compare.summary import GOOD, Summary
+from wholebody.bench.intervals import wilson
 
-WORST = QUANTITIES[0]
+NOTHING = Ratio(nan, 0.0, inf, 0)
 
 
 class Choice(NamedTuple):
-    """What to choose for one set; names are empty where no method is dependable.
+    """What to choose for one set. Methods that cannot be told apart stand together; none where none is dependable.
 
     Attributes:
         set: which.
-        fastest: dependable method with the least median time; its milliseconds.
-        exact: dependable method with the least median error at any of its budgets; that error, and its milliseconds.
-        cheapest: dependable method with the least effort; the effort above the best known.
-        leading: where none is dependable, the one that solves most; its share.
+        fastest: dependable methods with the least time; the median milliseconds of the first.
+        exact: dependable methods with the least error at any of their budgets; the median error of the first.
+        cheapest: dependable methods with the least effort; the median effort of the first above the best known.
+        leading: those that solve most, of the methods that were given all problems; their share.
     """
 
     set: str
-    fastest: str
+    fastest: tuple[str, ...]
     fastest_ms: float
-    exact: str
+    exact: tuple[str, ...]
     exact_error: float
-    exact_ms: float
-    cheapest: str
+    cheapest: tuple[str, ...]
     cheapest_effort: float
-    leading: str
+    leading: tuple[str, ...]
     leading_share: float
 
 
@@ -44,7 +47,7 @@ class Standing(NamedTuple):
         taken: sets of which it takes every case.
         dependable: sets of which it solves at least 98 %.
         worst_set, worst_share: where it solves least of what it takes.
-        slowness: geometric mean over its dependable sets of its median time over the fastest dependable method's.
+        slowness: its time over that of the method that others are compared with, on the problems that both solve.
         false_claims: answers called solved that are off by more than 1 mm.
         deepest_mm: deepest overlap of all answers.
     """
@@ -54,7 +57,7 @@ class Standing(NamedTuple):
     dependable: int
     worst_set: str
     worst_share: float
-    slowness: float
+    slowness: Ratio
     false_claims: int
     deepest_mm: float
 
@@ -65,110 +68,137 @@ def choices(results: Results, rows: Sequence[Summary]) -> list[Choice]:
 
 
 def _choice(results: Results, family: str, rows: Sequence[Summary]) -> Choice:
-    good = [row for row in rows if row.dependable]
-    taken = [row for row in rows if row.refused < row.cases]
-    leading = max(taken, key=lambda row: row.success * (row.cases - row.refused) / row.cases, default=None)
-    share = leading.success * (leading.cases - leading.refused) / leading.cases if leading else 0.0
-    if not good:
-        return Choice(family, "", nan, "", nan, nan, "", nan, leading.entrant if leading else "", share)
-    fastest = min(good, key=lambda row: row.median_ms)
-    ends = {row.entrant: _most_exact(results, family, row.entrant) for row in good}
-    exact = min(ends, key=lambda name: ends[name])
-    cheap = min(good, key=lambda row: row.effort if isfinite(row.effort) else inf)
+    good = [row.entrant for row in rows if row.dependable]
+    given = max((row.cases for row in rows), default=0)  # others had easier or harder problems
+    shares = {
+        row.entrant: row.success * (row.cases - row.refused) / row.cases
+        for row in rows
+        if row.refused < row.cases == given
+    }
+    most = max(shares.values(), default=0.0)
+    leading = tuple(name for name, share in shares.items() if share == most)
+    fast = paired.best({name: paired.times(results, [family], name) for name in good})
+    errors = {name: paired.errors(results, family, name) for name in good}
+    exact = paired.best(errors)
+    efforts = {name: paired.efforts(results, family, name) for name in good} if not results.moving(family) else {}
+    cheap = paired.best(efforts)
     return Choice(
-        family, fastest.entrant, fastest.median_ms, exact, *ends[exact],
-        cheap.entrant if isfinite(cheap.effort) else "", cheap.effort, leading.entrant if leading else "", share,
+        family,
+        fast, next((row.median_ms for row in rows if fast and row.entrant == fast[0]), nan),
+        exact, middle(list(errors[exact[0]].values())) if exact else nan,
+        cheap, middle(list(efforts[cheap[0]].values())) if cheap else nan,
+        leading, most,
     )  # fmt: skip
 
 
-def _most_exact(results: Results, family: str, entrant: str) -> tuple[float, float]:
-    """Least median error of a method, and the milliseconds of that budget."""
-    points = curve(results, family, entrant, WORST)
-    return min(((point.value, 1e3 * point.seconds) for point in points), default=(inf, inf))
+def reference(results: Results) -> str:
+    """The method that others' times are compared with: our default, or the first where it did not take part."""
+    return OURS if OURS in results.entrants else next(iter(results.entrants), "")
 
 
 def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
     """All methods, the most dependable first, and of equal ones the fastest."""
-    best = {
-        family: min((row.median_ms for row in rows if row.set == family and row.dependable), default=inf)
-        for family in results.sets
-    }
+    base = paired.times(results, results.sets, reference(results))
     found = []
     for entrant in results.entrants:
         mine = [row for row in rows if row.entrant == entrant]
         if not mine:
             continue
-        good = [row for row in mine if row.dependable]
-        ratios = [log(max(row.median_ms, 1e-6) / max(best[row.set], 1e-6)) for row in good]
         judged = [row for row in mine if row.refused < row.cases]
         worst = min(judged, key=lambda row: row.success, default=None)
         found.append(
             Standing(
                 entrant,
                 sum(not row.refused for row in mine),
-                len(good),
+                sum(row.dependable for row in mine),
                 worst.set if worst else "",
                 worst.success if worst else nan,
-                exp(sum(ratios) / len(ratios)) if ratios else nan,
+                paired.ratio(paired.times(results, results.sets, entrant), base) if base else NOTHING,
                 sum(row.false_claims for row in mine),
                 max((row.deepest_mm for row in judged if isfinite(row.deepest_mm)), default=nan),
             )
         )
-    return sorted(found, key=lambda standing: (-standing.dependable, standing.slowness))
+    return sorted(found, key=lambda one: (-one.dependable, one.slowness.value if one.slowness.cases else inf))
 
 
 def advice(results: Results, rows: Sequence[Summary]) -> list[str]:
     """What a reader who reads nothing else should know."""
-    ranked, count = standings(results, rows), len(results.sets)
-    said = []
-    first = ranked[0] if ranked else None
-    if first and first.dependable:
-        said.append(
-            f"**If in doubt, take `{first.entrant}`.** It solves at least {100 * GOOD:.0f} % of the problems in "
-            f"{first.dependable} of {count} sets, and takes {first.slowness:.2g} times as long there as the fastest "
-            "method that does."
-        )
-    else:
-        said.append(f"**No method solves {100 * GOOD:.0f} % of any set.** Look at each set before choosing.")
-    picked = choices(results, rows)
+    ranked, picked = standings(results, rows), choices(results, rows)
+    said = [_in_doubt(results, ranked)]
     fast: dict[str, list[str]] = {}
     for choice in picked:
         if choice.fastest:
-            fast.setdefault(choice.fastest, []).append(f"{words(choice.set)} ({choice.fastest_ms:.3g} ms)")
+            fast.setdefault(named(choice.fastest), []).append(f"{words(choice.set)} ({choice.fastest_ms:.3g} ms)")
     if fast:
-        listed = "; ".join(f"`{name}` in {', '.join(sets)}" for name, sets in fast.items())
-        said.append(f"**Fastest of the dependable:** {listed}.")
-    exact = {choice.exact for choice in picked if choice.exact}
+        listed = "; ".join(f"{names} in {', '.join(sets)}" for names, sets in fast.items())
+        said.append(f"**Fastest of the dependable, on the problems that both solve:** {listed}.")
+    exact: dict[str, list[str]] = {}
+    for choice in picked:
+        if choice.exact:
+            exact.setdefault(named(choice.exact), []).append(f"{words(choice.set)} ({error(choice.exact_error)})")
     if exact:
-        said.append(
-            "**Most accurate:** "
-            + "; ".join(
-                f"`{choice.exact}` in {words(choice.set)} ({choice.exact_error:.0e} in {choice.exact_ms:.3g} ms)"
-                for choice in picked
-                if choice.exact
+        listed = "; ".join(f"{names} in {', '.join(sets)}" for names, sets in exact.items())
+        said.append(f"**Most accurate of the dependable:** {listed}. Errors below {FLOOR:g} are not told apart.")
+    for choice in picked:
+        if not choice.fastest:
+            solve = "solves" if len(paired.algorithms(choice.leading)) == 1 else "solve"
+            said.append(
+                f"**{words(choice.set).capitalize()} is solved dependably by none;** "
+                f"{named(choice.leading)} {solve} most, {100 * choice.leading_share:.3g} %."
             )
-            + "."
-        )
-    said += [
-        f"**{words(choice.set).capitalize()} is solved dependably by none;** `{choice.leading}` solves most, "
-        f"{100 * choice.leading_share:.0f} %."
-        for choice in picked
-        if not choice.fastest
-    ]
     for standing in ranked:
         if standing.dependable == 0 and isfinite(standing.worst_share):
-            said.append(_warning(standing, rows))
+            said += _warning(standing, rows)
     return said
 
 
-def _warning(standing: Standing, rows: Sequence[Summary]) -> str:
+def _in_doubt(results: Results, ranked: Sequence[Standing]) -> str:
+    """Which method to take where nothing else is known: the most dependable, and of those the ones that are fastest."""
+    most = max((one.dependable for one in ranked), default=0)
+    if not most:
+        return f"**No method solves {100 * GOOD:.0f} % of any set.** Look at each set before choosing."
+    names = [one.entrant for one in ranked if one.dependable == most]
+    alike = paired.best({name: paired.times(results, results.sets, name) for name in names})
+    apart = "" if len(alike) == 1 else " Their times cannot be told apart." if len(paired.algorithms(alike)) > 1 else ""
+    if not apart and len(alike) > 1:
+        apart = " Its solvers' times cannot be told apart."
+    solves = "It solves" if len(paired.algorithms(alike)) == 1 else "Each solves"
+    return (
+        f"**If in doubt, take {named(alike)}.** {solves} at least {100 * GOOD:.0f} % of the problems in {most} of "
+        f"{len(results.sets)} sets.{apart}"
+    )
+
+
+def _warning(standing: Standing, rows: Sequence[Summary]) -> list[str]:
+    """That a method is not enough, if in no set so many problems that it might be dependable after all are solved."""
     mine = [row for row in rows if row.entrant == standing.entrant and row.refused < row.cases]
+    for row in mine:
+        count = row.cases - row.refused
+        if not row.refused and wilson(round(row.success * count), count)[1] >= GOOD:
+            return []
     best = max(mine, key=lambda row: row.success)
     deep = f", and ends up to {standing.deepest_mm:.0f} mm inside of things" if standing.deepest_mm > 1.0 else ""
-    return (
+    return [
         f"**`{standing.entrant}` alone is not enough:** of what it takes it solves at most {100 * best.success:.0f} % "
         f"({words(best.set)}) and in {words(standing.worst_set)} {100 * standing.worst_share:.0f} %{deep}."
-    )
+    ]
+
+
+def error(value: float) -> str:
+    """An error as it was measured: those at the least that is told apart are at most that."""
+    return f"at most {FLOOR:g}" if value <= FLOOR else f"{value:.0e}"
+
+
+def effort(value: float) -> str:
+    """An effort above the best known, in the same way."""
+    return f"at most +{100 * EFFORT_FLOOR:.2g} %" if value <= EFFORT_FLOOR else f"+{100 * value:.2g} %"
+
+
+def slowness(found: Ratio) -> str:
+    """A ratio of times with its interval; empty where there are too few problems."""
+    if not isfinite(found.value):
+        return ""
+    return f"× {found.value:.2g} [{found.low:.2g}, {found.high:.2g}]"
 
 
 def words(name: str) -> str:

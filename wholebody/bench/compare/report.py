@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from math import isfinite
 
 from wholebody.bench.compare import leftout, sections
-from wholebody.bench.compare.advice import advice, choices, standings, words
+from wholebody.bench.compare.advice import advice, choices, effort, error, reference, slowness, standings, words
 from wholebody.bench.compare.blocks import Block, Chart, Heading, Points, Scenes, Table, Text
+from wholebody.bench.compare.paired import algorithms
 from wholebody.bench.compare.record import COARSE, DEFAULT
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.settings import Settings
@@ -63,8 +64,8 @@ def blocks(given: Material) -> list[Block]:
         Text(
             f"**Dependable** is a method that takes every problem of a set and solves at least {100 * GOOD:.0f} % of "
             f"them: goals met and everything that must hold kept to {COARSE:g} m and rad, as judged from the posture "
-            "by a judge who shares no code with any method. **Time against the fastest** is the geometric mean over "
-            "its dependable sets."
+            "by a judge who shares no code with any method. **Time against** another method is the geometric mean "
+            "over the problems that both solve, with its interval of 95 %."
         ),
         *_reading(given),
         *(block for family in given.settings.sets for block in sections.of_set(given.results, given.rows, family)),
@@ -159,20 +160,24 @@ def _reading(given: Material) -> list[Block]:
 def _choices(given: Material) -> Table:
     rows = []
     for choice in choices(given.results, given.rows):
+        most = f"{_plain(choice.leading)}, {100 * choice.leading_share:.3g} %"
         if not choice.fastest:
-            rows.append((words(choice.set), "none", "", "", f"{choice.leading}, {100 * choice.leading_share:.0f} %"))
+            rows.append((words(choice.set), "none", "", "", most))
             continue
-        cheap = f"{choice.cheapest} (+{100 * choice.cheapest_effort:.2g} %)" if choice.cheapest else ""
         rows.append(
             (
                 words(choice.set),
-                f"{choice.fastest} ({choice.fastest_ms:.3g} ms)",
-                f"{choice.exact} ({choice.exact_error:.0e}, {choice.exact_ms:.3g} ms)" if choice.exact else "",
-                cheap,
-                f"{choice.leading}, {100 * choice.leading_share:.0f} %",
+                f"{_plain(choice.fastest)} ({choice.fastest_ms:.3g} ms)",
+                f"{_plain(choice.exact)} ({error(choice.exact_error)})" if choice.exact else "",
+                f"{_plain(choice.cheapest)} ({effort(choice.cheapest_effort)})" if choice.cheapest else "",
+                most,
             )
         )
     return Table(("problems", "fastest dependable", "most accurate dependable", "least effort", "solves most"), rows)
+
+
+def _plain(entrants: Sequence[str]) -> str:
+    return ", ".join(algorithms(entrants))
 
 
 def _standings(given: Material) -> Table:
@@ -182,10 +187,11 @@ def _standings(given: Material) -> Table:
         rows.append(
             (
                 standing.entrant, f"{standing.taken} of {len(given.results.sets)}", str(standing.dependable), worst,
-                f"× {standing.slowness:.2g}" if isfinite(standing.slowness) else "", str(standing.false_claims),
+                slowness(standing.slowness), str(standing.slowness.cases), str(standing.false_claims),
                 f"{standing.deepest_mm:.2g}" if isfinite(standing.deepest_mm) else "",
             )
         )  # fmt: skip
-    columns = ("method", "sets it takes", "dependable in", "solves least of", "time against the fastest",
+    columns = ("method", "sets it takes", "dependable in", "solves least of",
+               f"time against {reference(given.results)}", "problems compared",
                "false “solved”", "deepest overlap mm")  # fmt: skip
     return Table(columns, rows)

@@ -14,7 +14,7 @@ from wholebody.bench.entrants.base import Entrant
 from wholebody.problem import Problem
 
 Array = NDArray[np.float64]
-Kind = Literal["solved", "honest", "refusal", "wrong"]
+Kind = Literal["solved", "honest", "refusal", "adapter", "wrong"]
 
 FRAME = 1.0 / 60.0  # s: a frame of a screen
 

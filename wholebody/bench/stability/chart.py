@@ -10,7 +10,9 @@ from wholebody.bench.stability.case import Kind
 from wholebody.bench.stability.rows import Result
 from wholebody.bench.stability.verdict import SYMBOLS, WORDS, Verdict
 
-COLORS: dict[Kind, str] = {"solved": "#8fd0b5", "honest": "#f6ec9c", "refusal": "#d9d9d9", "wrong": "#e8794a"}
+COLORS: dict[Kind, str] = {
+    "solved": "#8fd0b5", "honest": "#f6ec9c", "refusal": "#d9d9d9", "adapter": "#b9c7e8", "wrong": "#e8794a",
+}  # fmt: skip
 """Told apart by people with any colour vision, and by their signs in print."""
 
 PALE = "#fbf7d9"  # an honest answer where a better one was possible
@@ -76,5 +78,5 @@ def _legend(chart: Any) -> None:
         Patch(facecolor=COLORS["honest"], label="●  honest, as good as can be"),
         Patch(facecolor=PALE, edgecolor="#bbbbbb", label="○  honest, a better answer exists"),
     ]
-    handles.append(Patch(facecolor=COLORS["wrong"], label="✗  WRONG"))
+    handles += [Patch(facecolor=COLORS[kind], label=f"{SYMBOLS[kind]}  {WORDS[kind]}") for kind in ("adapter", "wrong")]
     chart.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8.5)

@@ -7,18 +7,30 @@ from pathlib import Path
 
 from wholebody.bench.entrants.base import Entrant
 from wholebody.bench.machine import sentence
-from wholebody.bench.stability.case import HardCase
+from wholebody.bench.stability.case import HardCase, Kind
 from wholebody.bench.stability.pictures import Drawn
 from wholebody.bench.stability.rows import Result
 from wholebody.bench.stability.verdict import WORDS
 from wholebody.bench.tables import markdown
 
 CHART = "stability.svg"
+FAULT = (
+    "In these cells the answer was bad, but the tool alone, without our adapter, does better on the same case. "
+    "They say something about our adapter and nothing about the tool."
+)
 
 
 def report(result: Result, facts: Mapping[str, str]) -> str:
     """The result in short: the counts, the cases by methods, and every wrong cell."""
-    return "\n\n".join([_counts(result), _matrix(result), _wrongs(result), sentence(facts)])
+    return "\n\n".join(
+        [
+            _counts(result),
+            _matrix(result),
+            _cells(result, "wrong", "No answer was wrong."),
+            *_adapters(result),
+            sentence(facts),
+        ]
+    )
 
 
 def page(result: Result, entrants: Sequence[Entrant], facts: Mapping[str, str], drawn: Drawn, folder: str) -> str:
@@ -42,7 +54,12 @@ def page(result: Result, entrants: Sequence[Entrant], facts: Mapping[str, str], 
             group = case.group
             parts.append(f"## {group}")
         parts += _case(case, result, drawn.get(case.name, []), folder)
-    parts += ["## Every wrong answer", _wrongs(result), sentence(facts)]
+    parts += [
+        "## Every wrong answer",
+        _cells(result, "wrong", "No answer was wrong."),
+        *_adapters(result),
+        sentence(facts),
+    ]
     return "\n\n".join(parts)
 
 
@@ -50,13 +67,13 @@ def _counts(result: Result) -> str:
     rows = [
         [
             f"`{method}`",
-            *(str(result.count(method, kind)) for kind in ("solved", "honest", "refusal")),
+            *(str(result.count(method, kind)) for kind in ("solved", "honest", "refusal", "adapter")),
             _strong(result.count(method, "wrong")),
             str(result.acceptable(method)),
         ]
         for method in result.methods
     ]
-    columns = ["method", *(WORDS[kind] for kind in ("solved", "honest", "refusal", "wrong")), "acceptable"]
+    columns = ["method", *WORDS.values(), "acceptable"]
     return markdown(columns, rows) + f"\n\nOf {len(result.cases)} cases each."
 
 
@@ -74,22 +91,32 @@ def _brief(result: Result, case: str, method: str) -> str:
     return f"{verdict.symbol} {verdict.brief}".strip()
 
 
-def _wrongs(result: Result) -> str:
+def _adapters(result: Result) -> list[str]:
+    """The cells in which our adapter is at fault, and what the tool alone does; nothing where there are none."""
+    found = _cells(result, "adapter", "")
+    return ["## Where our adapters are at fault", FAULT, found] if found else []
+
+
+def _cells(result: Result, kind: Kind, none: str) -> str:
+    """All cells of a kind, one a line, or what is said where there are none."""
     rows = [
         [f"`{method}`", f"`{case.name}`", result.verdicts[case.name, method].figure]
         for method in result.methods
         for case in result.cases
-        if result.verdicts[case.name, method].kind == "wrong"
+        if result.verdicts[case.name, method].kind == kind
     ]
     if not rows:
-        return "No answer was wrong."
+        return none
     head = ["method", "case", "what is wrong"]
     lines = [head, ["---", "---", "---"], *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def _setups(entrants: Sequence[Entrant]) -> str:
-    lines = ["How each method was set up, the others' as their own documentation has it:", ""]
+    lines = [
+        "How each method was set up; the others are called by adapters of this project, and may do better alone:",
+        "",
+    ]
     for entrant in entrants:
         differences = "; ".join(entrant.differences)
         lines.append(f"- `{entrant.name}`: {entrant.setup}" + (f" Besides: {differences}." if differences else ""))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from wholebody.bench.stability.audit import audited
 from wholebody.bench.stability.case import HardCase, Kind
 from wholebody.bench.stability.judging import INSIDE
 from wholebody.bench.stability.running import Cell
@@ -18,7 +19,7 @@ class StabilityRow:
 
     Attributes:
         case, method: who was asked what.
-        verdict: "solved", "honest", "refusal" or "wrong".
+        verdict: "solved", "honest", "refusal", "adapter" or "wrong".
         acceptable: whether the case accepts it.
         figure: the worst figure, in a few words.
         status: what the method says.
@@ -94,7 +95,8 @@ def result(cases: Sequence[HardCase], methods: Sequence[str], cells: Sequence[Ce
     best |= {case.name: case.best for case in cases if case.best is not None}
     placed = {(cell.case.name, cell.method): cell for cell in cells}
     verdicts = {
-        key: decide(cell.case, cell.answer, cell.judged, best.get(cell.case.name)) for key, cell in placed.items()
+        key: audited(*key, decide(cell.case, cell.answer, cell.judged, best.get(cell.case.name)))
+        for key, cell in placed.items()
     }
     return Result(tuple(cases), tuple(methods), placed, verdicts, best)
 

@@ -16,11 +16,12 @@ NOT_HELD = ("infeasible", "stalled")  # statuses that say that something may be 
 SAME = 2e-5  # m: nearer to the best known answer than this is as good
 LEAST_SENTENCE = 15  # letters of a refusal that says anything
 
-SYMBOLS: dict[Kind, str] = {"solved": "✓", "honest": "○", "refusal": "–", "wrong": "✗"}
+SYMBOLS: dict[Kind, str] = {"solved": "✓", "honest": "○", "refusal": "–", "adapter": "△", "wrong": "✗"}
 WORDS: dict[Kind, str] = {
     "solved": "solved",
     "honest": "honest best effort",
     "refusal": "clear refusal",
+    "adapter": "our adapter",
     "wrong": "WRONG",
 }
 
@@ -29,7 +30,7 @@ class Verdict(NamedTuple):
     """What one method's answer to one case is worth.
 
     Attributes:
-        kind: of the four.
+        kind: of the five; "adapter" is given by the audit alone, to what would be wrong.
         figure: the worst figure, in a few words; "" where there is nothing to add.
         brief: the same for the cell of a table.
         acceptable: whether the case accepts it.

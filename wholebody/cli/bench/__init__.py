@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import argparse
 
-from wholebody.cli.bench import challenge, compare, detail, newton, reaches, scaling, solve, stability, step
+from wholebody.cli.bench import (
+    attack,
+    challenge,
+    compare,
+    detail,
+    newton,
+    reaches,
+    robots,
+    scaling,
+    solve,
+    stability,
+    step,
+)
 
 HELP = "measure steps, solves and random reaches, beside other tools where installed"
 DESCRIPTION = """\
@@ -16,5 +28,5 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     """Add the command `bench` with its own commands."""
     parser = commands.add_parser("bench", help=HELP, description=DESCRIPTION)
     kinds = parser.add_subparsers(title="what to measure", metavar="WHAT", required=True)
-    for command in (compare, step, reaches, solve, newton, stability, challenge, detail, scaling):
+    for command in (compare, step, reaches, solve, newton, stability, challenge, detail, scaling, robots, attack):
         command.add_to(kinds)

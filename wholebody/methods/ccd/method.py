@@ -17,7 +17,7 @@ from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.remover import TOUCH, Remover
 from wholebody.methods.ccd.terms import read
 from wholebody.methods.contradictions import Contradiction, contradictions, in_words, proven
-from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
+from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, check_problem, check_settings
 from wholebody.problem import Iterate, Problem, Solution, Status
 from wholebody.workspace import Workspace
@@ -64,14 +64,15 @@ class CCD:
         iterations: most sweeps from one start.
         restarts: most further starts, first near the posture at hand, then anywhere within the limits.
         seed: of the restarts and of the order in which chains leave overlap.
-        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
+        time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
+            ends after four seconds of processor time.
     """
 
     tolerance: float = 1e-4
     iterations: int = 400
     restarts: int = 12
     seed: int = 0
-    time_limit: float | None = TIME_LIMIT
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         """Check the settings.

@@ -46,7 +46,7 @@ class OverlapResult:
     Attributes:
         q: (nq,) the posture to show.
         iterations: goals that cyclic coordinate descent was given.
-        joints: joints that took part.
+        joints: joints that took part, counted once for each goal that moved them.
         pairs: different pairs of pieces that overlapped on the way.
         contact_seconds: time of contact queries.
         ik_seconds: time of cyclic coordinate descent.
@@ -225,7 +225,7 @@ class Frames:
         return OverlapResult(
             q=q,
             iterations=tally.iterations,
-            joints=len(tally.joints),
+            joints=tally.joints,
             pairs=len(tally.pairs),
             contact_seconds=tally.contact_seconds,
             ik_seconds=tally.ik_seconds,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.errors import InputError
+from wholebody.figures.description import followers_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State, joint_support
 from wholebody.geometry.placement import placement
@@ -122,6 +123,7 @@ def read(problem: Problem) -> Request:
             refused.append(f"bounds[{number}], {type(bound).__name__}")
     if problem.measures_given:
         refused += [f"measures[{number}], {type(term).__name__}" for number, term in enumerate(problem.measures)]
+    refused += [f"joint {name!r}, which follows another one (mimic)" for name in list(followers_of(figure.model))[:1]]
     if refused:
         raise UnsupportedTermError("ccd", refused)
     return Request(tuple(wishes), tuple(sorted(joints)), frozenset(fixed), tuple(cones))

@@ -10,7 +10,7 @@ import numpy as np
 
 from wholebody.checks import choice, known
 from wholebody.methods.contradictions import in_words, proven
-from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
+from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.inequalities import KINDS, Kind
@@ -40,7 +40,8 @@ class Newton:
         inequalities: "slack" (squared slacks) or "barrier" (logarithmic).
         restarts: most seeded starts that are tried where the straight way does not serve.
         seed: of the restarts.
-        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
+        time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
+            ends after four seconds of processor time.
     """
 
     tolerance: float = 1e-5
@@ -49,7 +50,7 @@ class Newton:
     inequalities: Kind = "slack"
     restarts: int = 6
     seed: int = 0
-    time_limit: float | None = TIME_LIMIT
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         """Check the settings.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from wholebody.assessment import Assessment, assess
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.methods.contradictions import explanation
-from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
+from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, check, named_frames
@@ -50,12 +50,13 @@ class Placo:
     Attributes:
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most programs.
-        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
+        time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
+            ends after four seconds of processor time.
     """
 
     tolerance: float = 1e-5
     iterations: int = 200
-    time_limit: float | None = TIME_LIMIT
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         """Check the settings.

@@ -9,6 +9,7 @@ that could have jumped over something are swept.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -63,6 +64,8 @@ class Descent:
         eager: whether to ask for all of the way to the goals in every step, damped by how far they are, until steps are
             rejected or gain little; else for a piece of it.
         control: what may end it.
+        hopeless: asked once, where the violation first lessens hardly for a while, whether to go on from a posture
+            (nq,) leads nowhere.
     """
 
     subproblem: Subproblem
@@ -77,6 +80,7 @@ class Descent:
     hasty: bool = False
     eager: bool = False
     control: Control = field(default_factory=Control)
+    hopeless: Callable[[Array], bool] | None = None
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
@@ -135,6 +139,10 @@ class Descent:
                 history.append(here.violation.total)
                 if self.hasty and self._lingers(history):
                     break
+                if self.hopeless is not None and self._lingers(history):
+                    hopeless, self.hopeless = self.hopeless(here.at.q), None
+                    if hopeless:
+                        break
                 if self._measures and self._lingers(history):
                     self._measures = False
                     self._memory.forget()

@@ -10,7 +10,7 @@ import numpy as np
 from wholebody.assessment import Assessment, assess
 from wholebody.checks import flag
 from wholebody.methods.contradictions import in_words, proven
-from wholebody.methods.control import TIME_LIMIT, Control, Progress, check_time_limit
+from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.qp.search import Search, Settings
 from wholebody.methods.qp.solvers.base import make_solver
@@ -35,7 +35,8 @@ class QP:
         seed: of the restarts.
         measures: whether the measures are to be least. Without, the first posture is the answer that meets the goals
             with everything held, which is there in a fifth to nine tenths of the time. This is for `solve`.
-        time_limit: seconds after which a solve ends with the best posture so far; None for no limit.
+        time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
+            ends after four seconds of processor time.
     """
 
     solver: str = "osqp"
@@ -45,7 +46,7 @@ class QP:
     restarts: int = 40
     seed: int = 0
     measures: bool = True
-    time_limit: float | None = TIME_LIMIT
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         """Check the settings.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import chain, islice
 from typing import NamedTuple
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from wholebody.methods.contradictions import Contradiction, contradictions
 from wholebody.methods.control import Control
+from wholebody.methods.qp.curved_reach import CurvedReach
 from wholebody.methods.qp.descent import Descent
 from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.solvers.base import QPSolver
@@ -27,6 +28,14 @@ NO_NEARER = 20  # scouts in a row that came no nearer although nothing was in th
 REACHED = 10.0  # tolerances: scouts that are not this near to the goals although nothing is in their way are given up
 NEARER = 0.02  # share of what is left by which a scout is nearer
 FIRST = 8  # scouts before goals are approached in stages, which takes as many programs and stays near the start
+PROBES = 10  # most descents without contacts that tell whether goals are out of reach
+PROBE = 60  # most programs of each
+FAR = (1.0, 0.6)  # shares of the joints' ranges that their starts may be away by
+HELD = 1e-3  # m, rad: by which constraints may be missed where such a descent ends
+AGREEING = 5  # of them that have to come to rest equally near
+AGREE = 1.05  # times the least violation up to which they count as equally near
+COMING_NEAR = 40  # most programs from there to the nearest posture among things
+PUSHED_OUT = 2  # of the nearest ends of such descents, how many are pushed out of things
 STAGES = (0.25, 0.5, 0.75)  # of the way to the goals, when the straight attempt ends in a local minimum
 
 
@@ -57,6 +66,8 @@ class Search:
         self._in_vain = 0  # scouts in a row that came no nearer
         self.how = "directly"
         self.contradictions: tuple[Contradiction, ...] = ()
+        self._nearest: list[Local] = []  # where probes without contacts ended
+        self._out_of_reach: bool | None = None
         self._best: Local | None = None
 
     @property
@@ -73,10 +84,11 @@ class Search:
 
     def _try_ways(self) -> None:
         start = self.problem.scene.figure.clamp(self.problem.start)
-        if self._accept(self._descend(start, eager=not self.settings.measures), "directly"):
+        first = self._descend(start, eager=not self.settings.measures, hopeless=self._hopeless)
+        if self._accept(first, "directly"):
             return
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
-        if self.contradictions:
+        if self.contradictions or self._hopeless(self.best.q):
             return
         rng = np.random.default_rng(self.settings.seed)
         starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, self.settings.restarts))
@@ -145,6 +157,8 @@ class Search:
             return
         if not _held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
+        if self._out_of_reach:
+            self._come_near()
         if self.best.violation.left <= tolerance:
             return
         nearest = self._descend(self.best.q, note="nearest", measures=False)
@@ -156,6 +170,55 @@ class Search:
             local = self._stay(best)
             if _held(local, tolerance) and local.violation.left <= best.violation.left + tolerance:
                 self._best = local
+
+    def _hopeless(self, q: Array) -> bool:
+        """Whether the goals are out of reach: from a posture (nq,) and other starts, even through everything.
+
+        Where all of several descents without contacts, from postures all over the limits, come to rest at the same
+        distance, it is the nearest that limits and constraints allow. Local minima are told by their differing.
+        """
+        if self._out_of_reach is not None or not self.problem.goals:
+            return bool(self._out_of_reach)
+        tolerance, state = self.settings.tolerance, self.lineariser.state
+        reach = self._curved()
+        start = self.problem.scene.figure.clamp(self.problem.start)
+        rng = np.random.default_rng(self.settings.seed)
+        self._out_of_reach = False
+        for begin in chain([q], restarts(self.problem, state, start, rng, PROBES - 1, FAR)):
+            local = reach.through_everything(begin, REACHED * tolerance, PROBE)
+            self.spent += local.iterations
+            if local.violation.worst <= REACHED * tolerance or not local.converged or self.control.over:
+                return False
+            if local.violation.hold > HELD:
+                continue  # from there the constraints alone are too far
+            self._nearest.append(local)
+            self._nearest.sort(key=lambda local: local.violation.total)
+            least, most = self._nearest[0].violation.total, self._nearest[-1].violation.total
+            if most > AGREE * least + tolerance:
+                return False
+            if len(self._nearest) == AGREEING:
+                self._out_of_reach = True
+                break
+        return self._out_of_reach
+
+    def _come_near(self) -> None:
+        """Where the goals are out of reach, come as near as goes without passing through anything."""
+        reach, tolerance = self._curved(), self.settings.tolerance
+        starts = [self.best.q, *(self._pushed_out(local.q) for local in self._nearest[:PUSHED_OUT])]
+        for begin in starts:
+            if not self.control.over:
+                local = reach.among_things(begin, tolerance, COMING_NEAR)
+                self.spent += local.iterations
+                self._accept(local, self.how)
+
+    def _pushed_out(self, q: Array) -> Array:
+        """Where leaving what a posture (nq,) is inside of ends, with the goals' errors to stay as they are."""
+        local = self._descent(SCOUT, self._goal_errors(q), "nearest", measures=False).run(q)
+        self.spent += local.iterations
+        return local.q
+
+    def _curved(self) -> CurvedReach:
+        return CurvedReach(self.problem, self.lineariser, self.solver, self.control)
 
     def _stay(self, local: Local) -> Local:
         """Descend with the goals' errors to stay as they are: what must hold is mended, then the measures improve."""
@@ -186,11 +249,16 @@ class Search:
         measures: bool = True,
         most: int | None = None,
         eager: bool = False,
+        hopeless: Callable[[Array], bool] | None = None,
     ) -> Local:
         """Descend from a start; where that ends with something that must hold not holding, mend it."""
         iterations = self.settings.iterations if most is None else min(most, self.settings.iterations)
-        local = self._descent(iterations, offset, note, measures=measures, eager=eager).run(start)
+        descent = self._descent(iterations, offset, note, measures=measures, eager=eager)
+        descent.hopeless = hopeless
+        local = descent.run(start)
         self.spent += local.iterations
+        if hopeless is not None and self._out_of_reach:
+            return local
         if not _held(local, self.settings.tolerance) and offset is None and (most is None or local.iterations < most):
             stayed = self._stay(local)
             local = stayed if _better(stayed, local, self.settings.tolerance) else local

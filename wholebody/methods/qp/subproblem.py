@@ -113,6 +113,8 @@ class Subproblem:
         if heaviest.max(initial=0.0) > HEAVIEST_CURVATURE:
             self.scale = HEAVIEST_CURVATURE / float(heaviest.max())
         self._equal = np.flatnonzero(self._lower == self._upper)
+        self.equalities = [int((low == high).sum()) for low, high in zip(lower, upper, strict=True)]
+        """How many rows of each constraint are equalities."""
         self._low = np.flatnonzero((self._lower != self._upper) & np.isfinite(self._lower))
         self._high = np.flatnonzero((self._lower != self._upper) & np.isfinite(self._upper))
 

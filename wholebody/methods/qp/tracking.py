@@ -218,7 +218,8 @@ class Tracker:
 
         The workspace's state is where the linearisation is.
         """
-        twist = (self._support * displacement) @ self.workspace.state.jacobian.T
+        state = self.workspace.state
+        twist = (self._support * state.spread(displacement)) @ state.jacobian.T
         center = at.contacts.placements[self._moving, 3]
         turn = twist[:, 3:]
         shift = twist[:, :3].copy()

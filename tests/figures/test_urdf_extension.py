@@ -1,0 +1,91 @@
+"""A figure that is written as URDF and read back is the same figure; and other programs read it."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.cli import main
+from wholebody.errors import FileFormatError
+from wholebody.figures import urdf_path
+
+
+def pairs(figure: wb.Figure) -> set[frozenset[str]]:
+    names = [piece.name for piece in figure.geometry.geometryObjects]
+    return {frozenset((names[pair.first], names[pair.second])) for pair in figure.geometry.collisionPairs}
+
+
+@pytest.mark.parametrize("name", ["human", "avatar", "hand"])
+def test_what_is_read_back_is_what_was_written(name: str) -> None:
+    built, read = wb.load(name), wb.load(urdf_path(name))
+    assert (read.root, read.detail) == (built.root, built.detail)
+    assert pairs(read) == pairs(built)
+    assert read.postures == built.postures
+    for posture in built.postures:
+        assert read.posture(posture) == pytest.approx(built.posture(posture), abs=1e-10)
+    assert read.frames == built.frames
+    assert read.segments == built.segments
+    for what in ("groups", "chains", "collision_groups"):
+        assert dict(getattr(read, what)) == dict(getattr(built, what))
+    assert read.effort_weights == pytest.approx(built.effort_weights)
+    assert {frozenset((p.a, p.b)): p.reason for p in read.excluded_pairs} == {
+        frozenset((p.a, p.b)): p.reason for p in built.excluded_pairs
+    }
+    for cone in built.cones:
+        assert read.cones[cone].cone.vertices == pytest.approx(built.cones[cone].cone.vertices, abs=1e-10)
+        assert read.cones[cone][1:3] == built.cones[cone][1:3]
+
+
+def test_a_person_of_any_size_can_be_written_and_read_with_a_fixed_root(tmp_path: Path) -> None:
+    path = tmp_path / "woman.urdf"
+    assert main(["figure", "human", "--sex", "female", "--stature", "1.55", "--out", str(path)]) == 0
+    figure = wb.load(path, root="fixed")
+    assert (figure.root, figure.model.nv) == ("fixed", 49)
+    assert len(figure.geometry.collisionPairs) == len(wb.load("human").geometry.collisionPairs)
+    assert "sitting" in figure.postures
+    assert sum(inertia.mass for inertia in figure.model.inertias) == pytest.approx(
+        sum(inertia.mass for inertia in wb.load("human", sex="female", stature=1.55).model.inertias)
+    )
+
+
+@pytest.mark.skipif(importlib.util.find_spec("mujoco") is None, reason="mujoco is not installed")
+def test_mujoco_reads_the_person() -> None:
+    import mujoco
+
+    figure = wb.load("human")
+    model = mujoco.MjModel.from_xml_path(str(urdf_path("human")))
+    assert model.nv == figure.model.nv - 6
+    pelvis = figure.model.inertias[1].mass  # a part of MuJoCo's world
+    assert model.body_mass.sum() == pytest.approx(sum(i.mass for i in figure.model.inertias) - pelvis, abs=1e-6)
+    data = mujoco.MjData(model)
+    q = figure.posture("sitting")
+    for joint, value in figure.joint_values(q).items():
+        data.joint(joint).qpos = value
+    mujoco.mj_forward(model, data)
+    assert np.isfinite(data.qacc).all()
+
+
+WRONG = {
+    "no such joint": ('joints="left_shoulder', 'joints="left_sholder', "no joint is called 'left_sholder"),
+    "no such piece": ('pairs="pelvis ', 'pairs="pelvi ', "no piece is called 'pelvi'"),
+    "posture without unit root": ('root="0 0 ', 'root="0 0 0 9 ', "7 finite numbers"),
+    "values do not fit": ('values="', 'values="1 ', "finite number"),
+    "no name": ('<posture name="standing"', "<posture", "<posture> has no name"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_wrong_element_is_one_sentence(what: str, tmp_path: Path) -> None:
+    before, after, words = WRONG[what]
+    text = urdf_path("human").read_text()
+    assert before in text
+    path = tmp_path / "human.urdf"
+    path.write_text(text.replace(before, after, 1))
+    with pytest.raises(FileFormatError, match=words) as caught:
+        wb.load(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,114 @@
+"""Figures at random: people, avatars, hands, shipped robots, and small ones that are made up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+import wholebody as wb
+from wholebody.bench.attack import urdfs
+from wholebody.bench.attack.judging import Pairs
+
+Array = NDArray[np.float64]
+
+SCALES = (0.005, 0.02, 0.1, 1.0, 1.0, 1.0, 10.0, 60.0)
+"""Sizes of robots that are made up, metres: links from a millimetre to some thirty metres."""
+DETAILS = ("spheres", "capsules", "hulls")
+TRIES = 30  # postures that are tried for one in which nothing overlaps
+
+
+@dataclass(frozen=True)
+class Body:
+    """A figure, and the words that load it.
+
+    Attributes:
+        figure: loaded.
+        call: Python that loads it.
+        size: metres by which things about it are measured.
+        people: whether it is a person or an avatar, who stands.
+        files: what the call reads, by names beside the script.
+    """
+
+    figure: wb.Figure
+    call: str
+    size: float
+    people: bool = False
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+    @property
+    def frames(self) -> list[str]:
+        """Frames that goals can name."""
+        return list(dict.fromkeys((*self.figure.frames, *self.figure.segments)))
+
+    def near(self, q: Array, share: float, rng: np.random.Generator, free: list[int] | None = None) -> Array:
+        """Return a posture (nq,) within the limits, off from q by a share of what joints can do.
+
+        Args:
+            q: (nq,).
+            share: 0 to 1.
+            rng: of the posture.
+            free: places in the tangent that may differ; all but a free root's if left out.
+        """
+        model, limits = self.figure.model, self.figure.limits
+        way = rng.uniform(-share * np.pi, share * np.pi, model.nv)
+        reach = limits.upper - limits.lower
+        way[limits.idx_v] = rng.uniform(limits.lower, limits.upper) - q[limits.idx_q]
+        way[limits.idx_v] = share * np.where(np.isfinite(reach), way[limits.idx_v], 0.0)
+        root = 6 if self.figure.root == "free" else 0
+        kept = np.ones(model.nv, dtype=bool)
+        kept[list(range(root, model.nv)) if free is None else free] = False
+        way[kept] = 0.0
+        return self.figure.clamp(pin.integrate(model, q, way))
+
+    def clear(self, q: Array, share: float, rng: np.random.Generator, room: float) -> Array | None:
+        """Return a posture as `near` does that has some room, metres, between its own pairs; None if none was found."""
+        alone = Pairs(wb.Scene(self.figure))
+        for _ in range(TRIES):
+            found = self.near(q, share, rng)
+            if alone.distances(found).min(initial=np.inf) > room:
+                return found
+        return None
+
+
+def body(rng: np.random.Generator) -> Body:
+    """Return a figure."""
+    kind = rng.choice(["human", "avatar", "hand", "shipped", "robot"], p=[0.27, 0.1, 0.17, 0.11, 0.35])
+    if kind == "robot":
+        return robot(rng)
+    if kind == "hand":
+        side = ("left", "right")[int(rng.integers(2))]
+        return _called(f"wb.load('hand', side={side!r})", 0.15)
+    if kind == "shipped":
+        name = ("human", "avatar", "hand", "arm")[int(rng.integers(4))]
+        if name == "arm":
+            return _called("wb.load(task_paths()['shelf'].with_name('arm.urdf'))", 0.9)
+        root = ("free", "fixed")[int(rng.integers(2))]
+        return _called(f"wb.load(urdf_path({name!r}), root={root!r})", 0.15 if name == "hand" else 1.7)
+    detail = DETAILS[int(rng.integers(len(DETAILS)))]
+    sex, stature = ("male", "female")[int(rng.integers(2))], float(np.round(rng.uniform(1.5, 1.95), 3))
+    stature = 1.75 if detail == "hulls" else stature  # hulls of a size are made once
+    return _called(f"wb.load({str(kind)!r}, sex={sex!r}, stature={stature!r}, detail={detail!r})", 1.7, people=True)
+
+
+def robot(rng: np.random.Generator, scale: float | None = None) -> Body:
+    """Return a small robot that is made up."""
+    size = SCALES[int(rng.integers(len(SCALES)))] if scale is None else scale
+    text = urdfs.robot(rng, size).encode()
+    root = "free" if rng.random() < 0.15 else "fixed"
+    return _called(f"wb.load(HERE / 'robot.urdf', root={root!r})", size, files={"robot.urdf": text})
+
+
+def _called(call: str, size: float, people: bool = False, files: Mapping[str, bytes] | None = None) -> Body:
+    from wholebody.figures.shipped import task_paths, urdf_path
+    from wholebody.files import Scratch
+
+    with Scratch() as folder:
+        for name, text in (files or {}).items():
+            (folder / name).write_bytes(text)
+        known = {"wb": wb, "HERE": folder, "task_paths": task_paths, "urdf_path": urdf_path}
+        figure = eval(call, known)
+    return Body(figure, call, size, people, files or {})

@@ -1,0 +1,105 @@
+"""What a case of the attack is: a script with its files, written from a seed and a number and from nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from wholebody.errors import UnknownNameError
+
+Outcome = Literal["right", "refused", "gave up", "wrong"]
+
+SCRIPT = "repeat.py"
+PATTERN = (
+    ("file", "solve", "file", "argument") * 4
+    + ("file", "sweep", "file", "solve") * 3
+    + ("file", "solve", "file", "stream") * 2
+    + ("file", "solve", "file", "argument")
+)
+"""Kinds of cases in turn: two mutated files for each solve, as the targets of a long run have it."""
+KINDS = tuple(dict.fromkeys(PATTERN))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What came of a case.
+
+    Attributes:
+        outcome: "right"; "refused", where an input was refused by one sentence; "gave up", where an answer says that it
+            is none although there is one; "wrong".
+        words: what was asked and found, in one line.
+        seconds: CPU time of the call under attack.
+        status: what the answer says of itself; "" where it says nothing.
+    """
+
+    outcome: Outcome
+    words: str
+    seconds: float = 0.0
+    status: str = ""
+
+
+@dataclass(frozen=True)
+class Written:
+    """A case as files that repeat it.
+
+    Attributes:
+        script: Python; it leaves a `Verdict` in the name `verdict` and prints it.
+        files: what the script reads, by names beside it.
+        timed: whether the case is a solve, of which the time counts.
+    """
+
+    script: str
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    timed: bool = False
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case.
+
+    Attributes:
+        seed: of the attack.
+        number: of the case.
+        kind: of what is attacked.
+    """
+
+    seed: int
+    number: int
+    kind: str
+
+    def rng(self) -> np.random.Generator:
+        """Return a generator that depends on the case alone."""
+        return np.random.default_rng([self.seed, self.number, KINDS.index(self.kind)])
+
+    @property
+    def name(self) -> str:
+        """Name of the folder in which a failure is written."""
+        return f"{self.kind}-{self.seed}-{self.number:06d}"
+
+
+def kind_of(number: int) -> str:
+    """Return the kind of a case of an attack on everything."""
+    return PATTERN[number % len(PATTERN)]
+
+
+def write(case: Case) -> Written:
+    """Write a case.
+
+    Raises:
+        UnknownNameError: there is no such kind.
+    """
+    from wholebody.bench.attack import arguments, files, solves, streams, sweeps
+
+    writers: dict[str, Callable[[np.random.Generator], Written]] = {
+        "argument": arguments.written,
+        "file": files.written,
+        "solve": solves.written,
+        "stream": streams.written,
+        "sweep": sweeps.written,
+    }
+    if case.kind not in writers:
+        raise UnknownNameError("kind of case", case.kind, KINDS)
+    return writers[case.kind](case.rng())

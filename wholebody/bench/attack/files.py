@@ -1,0 +1,157 @@
+"""Files that are not what they should be: mutated tasks, tracks, results, robots and meshes, and paths to nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.bench.attack import corpus
+from wholebody.bench.attack.case import Verdict, Written
+from wholebody.bench.attack.mutations import mutated
+from wholebody.figures.shipped import task_paths, urdf_path
+
+LONGEST = 1500  # characters of a refusal: more is no sentence
+HEAVIEST = 1e9  # kg, m, rad/s: numbers of a robot above this are slips
+SHIPPED = 0.15  # share of cases that begin with a shipped file
+NO_FILES = (
+    "/dev/zero",
+    "/dev/null",
+    "/",
+    "no-such-file",
+    "a" * 5000,
+    "a/" * 3000 + "b",
+    "nul\0l",
+    "",
+    ".",
+    "/dev/full",
+)
+ELSEWHERE = 0.01  # share of cases whose path leads to no file
+
+SCRIPT = '''"""{title}"""
+
+from pathlib import Path
+
+import wholebody as wb
+from wholebody.bench.attack import files
+{imports}
+HERE = Path(__file__).parent
+
+try:
+    verdict = files.sane({call})
+except wb.WholebodyError as error:
+    verdict = files.refused(error)
+print(verdict)
+'''
+
+
+class Reader(NamedTuple):
+    """A way to read a file.
+
+    Attributes:
+        imports: what its call needs.
+        call: Python, with `{path}` for the file's path.
+        files: what it reads, by names; the first one is mutated, another one now and then.
+    """
+
+    imports: str
+    call: str
+    files: Mapping[str, bytes]
+
+
+def written(rng: np.random.Generator) -> Written:
+    """Write a case."""
+    reader = _reader(rng)
+    contents = dict(reader.files)
+    names = list(contents)
+    chosen = names[0] if rng.random() < 0.85 else names[int(rng.integers(len(names)))]
+    path = f"HERE / {names[0]!r}"
+    if rng.random() < ELSEWHERE:
+        path = f"Path({NO_FILES[int(rng.integers(len(NO_FILES)))]!r})"
+    else:
+        contents[chosen] = mutated(contents[chosen], rng)
+    call = reader.call.replace("{path}", path)
+    title = f"a {chosen} that is not what it should be"
+    return Written(SCRIPT.format(title=title, imports=reader.imports, call=call), contents)
+
+
+def _reader(rng: np.random.Generator) -> Reader:
+    kind = str(rng.choice(["task", "robot", "mesh", "track", "result"], p=[0.3, 0.3, 0.1, 0.15, 0.15]))
+    if kind == "mesh":
+        name, text = (("part.obj", corpus.CUBE), ("part.stl", corpus.STL))[int(rng.integers(2))]
+        return Reader("", "wb.Mesh({path}).pieces()", {name: text.encode()})
+    if kind == "track":
+        call = "read_track({path}, wb.load(HERE / 'robot.urdf'))"
+        return Reader("from wholebody.interaction.track_files import read_track\n", call, corpus.track())
+    if kind == "result":
+        return Reader("from wholebody.cli.result import read\n", "read({path})", corpus.result())
+    if kind == "robot":
+        if rng.random() < SHIPPED:
+            return Reader("", "wb.load({path})", {"hand.urdf": urdf_path("hand").read_bytes()})
+        return Reader("", "wb.load({path})", corpus.robot())
+    imports = "from wholebody.taskfile import read_task\n"
+    if rng.random() < SHIPPED:
+        tasks = task_paths()
+        name = sorted(tasks)[int(rng.integers(len(tasks)))]
+        beside = {p.name: p.read_bytes() for p in tasks[name].parent.iterdir() if p.suffix in (".urdf", ".csv")}
+        return Reader(imports, "read_task({path})", {"task.toml": tasks[name].read_bytes(), **beside})
+    return Reader(imports, "read_task({path})", corpus.task())
+
+
+def refused(error: Exception) -> Verdict:
+    """Judge a refusal: one sentence that a person can read."""
+    words = str(error)
+    if len(words) > LONGEST:
+        return Verdict("wrong", f"a refusal of {len(words)} characters: {words[:100]!r}...")
+    if not words.strip() or "\n" in words.strip():
+        return Verdict("wrong", f"a refusal of other than one line: {words[:100]!r}")
+    return Verdict("refused", words[:200])
+
+
+def sane(read: Any) -> Verdict:
+    """Judge what was read: it has to be made of numbers that a body or a task can have."""
+    if isinstance(read, wb.Figure):
+        return _figure(read)
+    if isinstance(read, wb.Task):
+        problem = read.problem
+        verdict = _figure(problem.scene.figure)
+        if verdict.outcome == "wrong":
+            return verdict
+        places = [thing.placement.homogeneous.ravel() for thing in problem.scene.objects.values()]
+        return _finite(np.concatenate([problem.start, [problem.clearance], problem.clearances, *places]), "a task")
+    if isinstance(read, tuple) and read and hasattr(read[0], "geometry"):
+        places = [np.append(piece.placement.homogeneous.ravel(), piece.volume) for piece in read]
+        return _finite(np.concatenate(places), "a mesh")
+    if isinstance(read, tuple):
+        return _finite(np.asarray(read[1], dtype=float), "a result")
+    return _finite(np.append(np.ravel(read.q), read.dt), "a track")
+
+
+def _finite(values: Any, what: str) -> Verdict:
+    if not np.isfinite(values).all():
+        return Verdict("wrong", f"{what} was taken that is not made of finite numbers")
+    return Verdict("right", f"{what} was taken")
+
+
+def _figure(figure: wb.Figure) -> Verdict:
+    model = figure.model
+    masses = np.array([inertia.mass for inertia in model.inertias])
+    places = np.array([place.homogeneous for place in model.jointPlacements]).ravel()
+    inner = np.array([inertia.inertia for inertia in model.inertias]).ravel()
+    limits = np.concatenate([model.lowerPositionLimit, model.upperPositionLimit, model.velocityLimit])
+    if not (np.isfinite(masses).all() and np.isfinite(places).all() and np.isfinite(inner).all()):
+        return Verdict("wrong", "a robot was taken whose masses or places are not made of finite numbers")
+    if (masses < 0.0).any() or masses.max() > HEAVIEST or np.abs(places).max() > HEAVIEST:
+        return Verdict(
+            "wrong", f"a robot was taken with a mass of {masses.min():g} to {masses.max():g} kg, or far apart"
+        )
+    if np.isnan(limits).any() or (model.velocityLimit < 0.0).any():
+        return Verdict("wrong", "a robot was taken with limits that are not numbers, or with negative velocities")
+    for name in figure.postures:
+        q = figure.posture(name)
+        if not np.isfinite(q).all() or not pin.isNormalized(model, q, 1e-6):
+            return Verdict("wrong", f"a robot was taken whose posture {name!r} is not made of numbers")
+    return Verdict("right", "a robot was taken")

@@ -1,0 +1,263 @@
+"""The judge: distances of all pairs by plain calls of coal, limits and goals by Pinocchio.
+
+It shares nothing with the package's own assessment but what the user wrote: the terms as they were given, the shapes of
+the things and where they stand. Pairs are the figure's own, and every piece of the figure that can move with every
+piece of every thing. Balance and reach cones, which are constructions of the package's own, are read from their terms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.problem import Problem
+from wholebody.scene import Scene
+from wholebody.tasks import (
+    Axis,
+    CenterOfMass,
+    Frame,
+    Freeze,
+    Hold,
+    Orientation,
+    Plane,
+    Point,
+    Posture,
+    Relative,
+)
+
+Array = NDArray[np.float64]
+
+RESTING = 1e-6  # m: a pair that begins deeper than this begins inside, and is asked for the whole clearance
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What a posture measures.
+
+    Attributes:
+        finite: whether it is made of numbers.
+        goal: largest goal error [m, rad].
+        least: least signed distance of any pair [m]; inf without pairs.
+        lack: by how much the worst pair misses what is asked of it [m].
+        closest: the worst pair.
+        limits: how far out of its limits the worst joint is [rad, m].
+        constraints: how far the worst constraint is from holding [m, rad].
+        unit: how far quaternions are from unit length.
+    """
+
+    finite: bool = True
+    goal: float = 0.0
+    least: float = np.inf
+    lack: float = 0.0
+    closest: str = ""
+    limits: float = 0.0
+    constraints: float = 0.0
+    unit: float = 0.0
+
+    @property
+    def violation(self) -> float:
+        """The worst of everything that must hold [m, rad]."""
+        return max(self.lack, self.limits, self.constraints, -self.least, 0.0)
+
+
+class Pairs:
+    """Pairs of a figure and of things, with their distances at postures."""
+
+    def __init__(self, scene: Scene) -> None:
+        """List the pieces and the pairs."""
+        figure = scene.figure
+        self._model, self._data = figure.model, figure.model.createData()
+        self._request = coal.DistanceRequest()
+        self._pieces: list[tuple[str, int, pin.SE3, Any]] = [
+            (self._model.frames[piece.parentFrame].name, int(piece.parentJoint), piece.placement, piece.geometry)
+            for piece in figure.geometry.geometryObjects
+        ]
+        pairs = [(int(pair.first), int(pair.second)) for pair in figure.geometry.collisionPairs]
+        moving = [number for number, piece in enumerate(self._pieces) if piece[1] > 0]
+        for name, thing in scene.objects.items():
+            for piece in thing.shape.pieces():
+                pairs += [(k, len(self._pieces)) for k in moving]
+                self._pieces.append((name, 0, thing.placement * piece.placement, piece.geometry))
+        self.owners = [(self._pieces[a][0], self._pieces[b][0]) for a, b in pairs]
+        self._pairs = pairs
+        self.size = max((_extent(geometry) for _, _, _, geometry in self._pieces), default=0.0)
+
+    def distances(self, q: Array) -> Array:
+        """Signed distances (pairs,) at a posture (nq,), metres."""
+        pin.forwardKinematics(self._model, self._data, q)
+        placed = []
+        for _, joint, place, geometry in self._pieces:
+            there = self._data.oMi[joint] * place if joint else place
+            placed.append((geometry, coal.Transform3s(there.rotation, there.translation)))
+        found = np.empty(len(self._pairs))
+        for number, (first, second) in enumerate(self._pairs):
+            (a, at), (b, bt) = placed[first], placed[second]
+            found[number] = coal.distance(a, at, b, bt, self._request, coal.DistanceResult())
+        return found
+
+    def asked(self, start: Array, clearance: float) -> Array:
+        """Distance (pairs,) asked of every pair: the clearance, or what a resting pair has at the start."""
+        began = self.distances(start)
+        return np.where(began >= -RESTING, np.minimum(clearance, np.maximum(began, 0.0)), clearance)
+
+
+def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q: Array) -> Judged:
+    """Measure a posture.
+
+    Args:
+        problem: what was asked; only its scene, start and clearance are read, and Balance and ReachCones.
+        goals: as they were given.
+        constraints: as they were given, with bounds.
+        q: (nq,) the posture.
+    """
+    scene, start = problem.scene, problem.start
+    q = np.asarray(q, dtype=float)
+    if q.shape != (scene.model.nq,) or not np.isfinite(q).all():
+        return Judged(finite=False)
+    pairs = Pairs(scene)
+    distance, asked = pairs.distances(q), pairs.asked(start, problem.clearance)
+    least, lack, closest = np.inf, 0.0, ""
+    if len(distance):
+        worst = int(np.argmax(asked - distance))
+        least, lack = float(distance.min()), float(max((asked - distance)[worst], 0.0))
+        closest = " and ".join(pairs.owners[worst])
+    if not np.isfinite(distance).all():
+        return Judged(finite=False)
+    body = _Body(scene.model, start, q)
+    held = [value for term in constraints for value in body.constraint(term)]
+    for term in problem.constraints:
+        if type(term).__name__ in ("Balance", "ReachCones"):
+            value = np.atleast_1d(term.value(scene.state(q)))
+            held += list(np.maximum(term.lower - value, value - term.upper))
+    return Judged(
+        goal=max((body.goal(term) for term in goals), default=0.0),
+        least=least,
+        lack=lack,
+        closest=closest,
+        limits=_limits(scene.model, q),
+        constraints=float(max([0.0, *held])),
+        unit=float(np.abs(pin.normalize(scene.model, q) - q).max(initial=0.0)),
+    )
+
+
+def _limits(model: pin.Model, q: Array) -> float:
+    worst = 0.0
+    for joint in model.joints[1:]:
+        if joint.nq == joint.nv == 1:
+            value = q[joint.idx_q]
+            low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+            worst = max(worst, low - value, value - high)
+    return float(worst)
+
+
+def _extent(geometry: Any) -> float:
+    """Radius of a piece about its origin, metres; 0 for a half-space, whose distances need none."""
+    if isinstance(geometry, coal.Halfspace):
+        return 0.0
+    geometry.computeLocalAABB()
+    return float(geometry.aabb_radius)
+
+
+class _Body:
+    """A figure at its start and at an answer."""
+
+    def __init__(self, model: pin.Model, start: Array, q: Array) -> None:
+        self._model, self._start, self._q = model, start, q
+        self._before, self._after = model.createData(), model.createData()
+        for data, posture in ((self._before, start), (self._after, q)):
+            pin.framesForwardKinematics(model, data, posture)
+            pin.centerOfMass(model, data, posture)
+
+    def goal(self, term: Any) -> float:
+        """What is left of a goal, metres or radians, the larger."""
+        if isinstance(term, Point):
+            there = self._at(term.frame).act(np.array(term.offset, dtype=float))
+            return float(np.linalg.norm(there - np.array(term.target, dtype=float)))
+        if isinstance(term, CenterOfMass):
+            left = self._after.com[0] - np.array(term.target, dtype=float)
+            return float(np.linalg.norm(left[: len(term.axes)]))
+        if isinstance(term, Frame):
+            return _apart(self._at(term.frame), _placement(term.target))
+        if isinstance(term, Orientation):
+            return _angle(self._at(term.frame).rotation, pin.Quaternion(np.array(term.target, dtype=float)).matrix())
+        if isinstance(term, Axis):
+            return self._axis(term)
+        if isinstance(term, Relative):
+            wanted = self._between(self._before, term) if term.placement is None else _placement(term.placement)
+            return _apart(self._between(self._after, term), wanted, term.orientation)
+        if isinstance(term, Posture):
+            way = pin.difference(self._model, np.array(term.target, dtype=float), self._q)
+            taking = np.zeros(self._model.nv, dtype=bool)
+            taking[self._places(term.joints)] = True
+            slides = self._slides()
+            return float(max(np.linalg.norm(way[taking & slides]), np.linalg.norm(way[taking & ~slides])))
+        raise TypeError(f"the judge does not know the goal {type(term).__name__}")
+
+    def constraint(self, term: Any) -> Iterator[float]:
+        """By how much a constraint or a frozen joint misses what must hold; nothing for bounds on speeds."""
+        if isinstance(term, Hold):
+            wanted = self._at(term.frame, self._before) if term.at is None else _placement(term.at)
+            yield _apart(self._at(term.frame), wanted, term.orientation)
+        elif isinstance(term, Plane):
+            normal = np.array(term.normal, dtype=float)
+            point = self._at(term.frame, self._before).translation if term.point is None else np.array(term.point)
+            height = float((self._at(term.frame).translation - point) @ normal / np.linalg.norm(normal))
+            yield -height if term.side == "above" else abs(height)
+        elif isinstance(term, Freeze):
+            way = pin.difference(self._model, self._start, self._q)
+            yield float(np.abs(way[self._places(term.joints)]).max(initial=0.0))
+
+    def _axis(self, term: Axis) -> float:
+        there = self._at(term.frame)
+        pointing = there.rotation @ np.array(term.axis, dtype=float)
+        wanted = (
+            np.array(term.direction, dtype=float)
+            if term.direction is not None
+            else np.array(term.toward, dtype=float) - there.translation
+        )
+        return float(np.arctan2(np.linalg.norm(np.cross(pointing, wanted)), pointing @ wanted))
+
+    def _between(self, data: Any, term: Relative) -> pin.SE3:
+        return self._at(term.to, data).actInv(self._at(term.frame, data))
+
+    def _at(self, frame: str, data: Any = None) -> pin.SE3:
+        return (self._after if data is None else data).oMf[self._model.getFrameId(frame)]
+
+    def _slides(self) -> Any:
+        """Which places of the tangent (nv,) are in metres: sliding joints, and where a free root is."""
+        slides = np.zeros(self._model.nv, dtype=bool)
+        for joint in self._model.joints[1:]:
+            if joint.nv == 6:
+                slides[joint.idx_v : joint.idx_v + 3] = True
+            elif "JointModelP" in joint.shortname():
+                slides[joint.idx_v : joint.idx_v + joint.nv] = True
+        return slides
+
+    def _places(self, names: Any) -> list[int]:
+        """Places in the tangent of joints by name, "root" among them; all of them for None."""
+        if names is None:
+            return list(range(self._model.nv))
+        listed = [names] if isinstance(names, str) else names
+        joints = [self._model.joints[1 if name == "root" else self._model.getJointId(name)] for name in listed]
+        return [place for joint in joints for place in range(joint.idx_v, joint.idx_v + joint.nv)]
+
+
+def _placement(at: Any) -> pin.SE3:
+    values = np.array(at, dtype=float)
+    turn = np.eye(3) if len(values) == 3 else pin.Quaternion(values[3:] / np.linalg.norm(values[3:])).matrix()
+    return pin.SE3(turn, values[:3])
+
+
+def _apart(a: pin.SE3, b: pin.SE3, orientation: bool = True) -> float:
+    distance = float(np.linalg.norm(a.translation - b.translation))
+    return max(distance, _angle(a.rotation, b.rotation)) if orientation else distance
+
+
+def _angle(a: Array, b: Array) -> float:
+    return float(np.linalg.norm(pin.log3(b.T @ a)))

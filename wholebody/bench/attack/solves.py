@@ -1,0 +1,210 @@
+"""Solves: figures inside things by micrometres to half a metre, goals that can be met, cannot be, or contradict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.bench.attack.bodies import Body, body
+from wholebody.bench.attack.case import Written
+from wholebody.bench.attack.things import Placed, Thing, clear, inside, seven
+
+Array = NDArray[np.float64]
+
+CLEARANCES = (0.0, 0.0, 0.001, 0.005, 0.005, 0.05, 0.3)
+METHODS = ("'qp'",) * 12 + (
+    "wb.QP(tolerance=1e-8)", "wb.QP(measures=False)", "wb.QP(solver='daqp')", "'ccd'", "'newton'", "'placo'", "'dls'",
+)  # fmt: skip
+MEASURES = (
+    "None", "None", "None", "[]", "[wb.Effort(), wb.Discomfort(weight=0.1)]", "[wb.Displacement()]",
+    "[wb.PotentialEnergy(weight=0.01)]", "[wb.Discomfort()]",
+)  # fmt: skip
+MOST = 8  # things, usually
+CROWD = 20  # things, seldom
+FARTHEST = 99.0  # m: goals farther than 100 m are refused
+
+HEAD = '''"""{title}"""
+
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+
+import wholebody as wb
+{imports}
+HERE = Path(__file__).parent
+
+'''
+TAIL = """
+problem = wb.Problem(
+    scene, start, goals=goals, constraints=constraints, measures={measures}, clearance={clearance!r},
+)
+method = {method}
+began = process_time()
+solution = wb.solve(problem, method=method)
+seconds = process_time() - began
+verdict = claims.verdict(
+    problem, goals, constraints, solution, method=method, witness={witness}, seconds=seconds,
+)
+print(verdict)
+"""
+
+
+@dataclass
+class Asked:
+    """What is asked, while it is being made up.
+
+    Attributes:
+        goals, constraints: as Python.
+        can: whether the witness fits all of it.
+    """
+
+    goals: list[str] = field(default_factory=list)
+    constraints: list[str] = field(default_factory=list)
+    can: bool = True
+
+
+def written(rng: np.random.Generator) -> Written:
+    """Write a solve."""
+    figure = body(rng)
+    clearance = float(CLEARANCES[int(rng.integers(len(CLEARANCES)))]) * min(1.0, figure.size)
+    start = begun(figure, rng)
+    witness = figure.clear(start, float(rng.choice([0.1, 0.4, 1.0])), rng, clearance + 1e-4 * figure.size)
+    things = around(figure, start, witness, clearance, rng)
+    asked = wishes(figure, start, witness, rng)
+    known = witness is not None and asked.can and bool(asked.goals) and _clear(figure, witness, things, clearance)
+    chosen = METHODS[int(rng.integers(len(METHODS)))]
+    measures = MEASURES[int(rng.integers(len(MEASURES)))]
+    title = f"{figure.figure.name} among {len(things)} things; {'a posture that fits is known' if known else 'made up'}"
+    tail = TAIL.format(measures=measures, clearance=clearance, method=chosen, witness=known)
+    return Written(opening(title, figure, start, things, asked) + tail, figure.files, timed=True)
+
+
+def opening(title: str, figure: Body, start: Array, things: list[Thing], asked: Asked) -> str:
+    """Return the script up to the problem: figure, scene, start, goals, constraints."""
+    imports = "from wholebody.bench.attack import claims\n"
+    if "_path" in figure.call:
+        imports += "from wholebody.figures.shipped import task_paths, urdf_path\n"
+    lines = [
+        f"figure = {figure.call}",
+        "scene = wb.Scene(figure)",
+        *(thing.line(f"thing {number}") for number, thing in enumerate(things)),
+        f"start = np.array({start.tolist()!r})",
+        f"goals = [{', '.join(asked.goals)}]",
+        f"constraints = [{', '.join(asked.constraints)}]",
+    ]
+    return HEAD.format(title=title, imports=imports) + "\n".join(lines)
+
+
+def begun(figure: Body, rng: np.random.Generator) -> Array:
+    """Return a posture (nq,) to start from: a named one, or one at random."""
+    names = figure.figure.postures
+    q = figure.figure.clamp(figure.figure.posture(names[int(rng.integers(len(names)))]))
+    return q if rng.random() < 0.5 else figure.near(q, float(rng.choice([0.05, 0.3, 1.0])), rng)
+
+
+def around(
+    figure: Body, start: Array, witness: Array | None, clearance: float, rng: np.random.Generator
+) -> list[Thing]:
+    """Return things: clear of the witness, some of them in the figure where it starts."""
+    placed = Placed(figure, [start] if witness is None else [start, witness])
+    count = CROWD if rng.random() < 0.05 else int(rng.integers(0, MOST + 1))
+    room = clearance + 1e-3 * figure.size
+    found: list[Thing | None] = []
+    free = rng.random() < 0.4  # nothing is in the figure where it starts
+    for _ in range(count):
+        if not free and rng.random() < 0.3:
+            depth = float(np.exp(rng.uniform(np.log(1e-6), np.log(0.5 * min(1.0, figure.size)))))
+            found.append(inside(rng, placed, figure.size, depth))
+        else:
+            postures = [0] if witness is None else [0, 1] if free else [1]
+            found.append(clear(rng, placed, figure.size, room, postures))
+    return [thing for thing in found if thing is not None and np.abs(thing.at[:3]).max() < FARTHEST]
+
+
+def _clear(figure: Body, witness: Array, things: list[Thing], clearance: float) -> bool:
+    placed = Placed(figure, [witness])
+    return all(placed.distance(thing.shape, thing.placement, 0) > clearance for thing in things)
+
+
+def wishes(figure: Body, start: Array, witness: Array | None, rng: np.random.Generator) -> Asked:
+    """Return goals and constraints: what the witness fits, what is out of reach, what contradicts."""
+    asked, model = Asked(), figure.figure.model
+    data, before = model.createData(), model.createData()
+    pin.framesForwardKinematics(model, before, start)
+    shown = start if witness is None else witness
+    pin.framesForwardKinematics(model, data, shown)
+    pin.centerOfMass(model, data, shown)
+    mood = rng.choice(["fits", "far", "contradicts", "nothing"], p=[0.68, 0.15, 0.13, 0.04])
+    frames = list(rng.permutation(figure.frames))
+    for name in map(str, frames[: int(rng.integers(1, 4))] if mood != "nothing" else []):
+        asked.goals.append(_goal(name, data.oMf[model.getFrameId(name)], data.com[0], shown, rng))
+    if mood == "far":
+        way = rng.normal(size=3)
+        way *= figure.size * float(rng.choice([0.02, 0.3, 1.0, 5.0, 40.0])) / np.linalg.norm(way)
+        place = np.clip(data.oMf[model.getFrameId(str(frames[0]))].translation + way, -FARTHEST, FARTHEST)
+        asked.goals.append(f"wb.Point({str(frames[0])!r}, {_three(place)})")
+        asked.can = False
+    if mood == "contradicts":
+        asked.can = False
+        place = data.oMf[model.getFrameId(str(frames[0]))].translation
+        for sign in (-1.0, 1.0):
+            asked.goals.append(f"wb.Point({str(frames[0])!r}, {_three(place + sign * 0.1 * figure.size)})")
+        if rng.random() < 0.5:
+            asked.constraints.append(f"wb.Hold({str(frames[0])!r}, {_three(place + 0.3 * figure.size)})")
+    _hold(figure, start, witness, before, data, asked, rng)
+    return asked
+
+
+def _goal(name: str, at: pin.SE3, mass: Array, q: Array, rng: np.random.Generator) -> str:
+    kind = rng.choice(["Point", "Point", "Point", "Frame", "Orientation", "Axis", "CenterOfMass", "Posture"])
+    weight = f", weight={float(np.exp(rng.uniform(-4.0, 4.0)))!r}" if rng.random() < 0.2 else ""
+    if kind == "Frame":
+        return f"wb.Frame({name!r}, {seven(at)}{weight})"
+    if kind == "Orientation":
+        return f"wb.Orientation({name!r}, {seven(at)[3:]}{weight})"
+    if kind == "Axis":
+        axis = rng.normal(size=3)
+        return f"wb.Axis({name!r}, {_three(axis)}, direction={_three(at.rotation @ axis)}{weight})"
+    if kind == "CenterOfMass":
+        axes = ("xy", "xyz")[int(rng.integers(2))]
+        return f"wb.CenterOfMass({_three(mass)}, axes={axes!r}{weight})"
+    if kind == "Posture" and rng.random() < 0.3:
+        return f"wb.Posture(np.array({q.tolist()!r}){weight})"
+    return f"wb.Point({name!r}, {_three(at.translation)}{weight})"
+
+
+def _hold(
+    figure: Body, start: Array, witness: Array | None, before: pin.Data, data: pin.Data, asked: Asked,
+    rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """Add constraints: mostly those that the witness fits, for it does not move what they keep."""
+    model = figure.figure.model
+    for name in map(str, rng.permutation(figure.frames)[: int(rng.integers(0, 4))]):
+        number = model.getFrameId(name)
+        still = witness is not None and np.allclose(before.oMf[number].homogeneous, data.oMf[number].homogeneous)
+        if still or rng.random() < 0.1:
+            asked.constraints.append(f"wb.Hold({name!r}{', orientation=False' if rng.random() < 0.3 else ''})")
+            asked.can &= bool(still)
+    if rng.random() < 0.15:
+        name = str(rng.permutation(figure.frames)[0])
+        normal = rng.normal(size=3)
+        place = data.oMf[model.getFrameId(name)].translation
+        side = ("on", "above")[int(rng.integers(2))]
+        asked.constraints.append(f"wb.Plane({name!r}, {_three(normal)}, point={_three(place)}, side={side!r})")
+    joints = figure.figure.joints
+    if rng.random() < 0.15 and len(joints) > 1:
+        chosen = [str(name) for name in rng.permutation(joints)[: int(rng.integers(1, len(joints)))]]
+        way = pin.difference(model, start, start if witness is None else witness)
+        asked.can &= not way[figure.figure.dofs(chosen)].any()
+        asked.constraints.append(f"wb.Freeze(*{chosen!r})")
+    if figure.people and rng.random() < 0.1:
+        asked.can = False  # whether the witness balances is not looked at
+        asked.constraints.append("wb.Balance()" if rng.random() < 0.7 else "wb.ReachCones()")
+
+
+def _three(values: Array) -> str:
+    return repr(tuple(float(x) for x in values))

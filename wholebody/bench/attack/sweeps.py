@@ -1,0 +1,100 @@
+"""Sweeps: ways between postures, with thin things across them, against a fine subdivision of the way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.bench.attack.bodies import body
+from wholebody.bench.attack.case import Verdict, Written
+from wholebody.bench.attack.judging import Pairs
+from wholebody.bench.attack.solves import Asked, opening
+from wholebody.bench.attack.things import Placed, clear, inside
+from wholebody.geometry.sweep import TOLERANCE, FirstContact
+from wholebody.scene import Scene
+
+Array = NDArray[np.float64]
+
+PARTS = 150  # of a way
+FINER = 40  # parts of the part where something is deepest
+ROUNDING = 3e-6  # m, of pieces of up to a metre
+
+TAIL = """
+end = np.array({end!r})
+began = process_time()
+found = scene.sweep(start, end)
+seconds = process_time() - began
+verdict = sweeps.verdict(scene, start, end, found, seconds)
+print(verdict)
+"""
+
+
+def written(rng: np.random.Generator) -> Written:
+    """Write a sweep."""
+    figure = body(rng)
+    names = figure.figure.postures
+    q = figure.figure.clamp(figure.figure.posture(names[int(rng.integers(len(names)))]))
+    share = float(rng.choice([0.01, 0.1, 0.5, 1.0]))
+    free = list(range(figure.figure.model.nv)) if rng.random() < 0.3 else None
+    end = figure.near(q, share, rng, free)
+    middle = np.asarray(pin.interpolate(figure.figure.model, q, end, float(rng.uniform(0.2, 0.8))))
+    placed = Placed(figure, [middle, q])
+    things = []
+    for _ in range(int(rng.integers(0, 6))):
+        if rng.random() < 0.5:
+            thing = inside(rng, placed, figure.size, float(np.exp(rng.uniform(np.log(1e-5), np.log(0.1)))))
+            if thing is not None and placed.distance(thing.shape, thing.placement, 1) < 0.0 and rng.random() < 0.8:
+                thing = None
+        else:
+            thing = clear(rng, placed, figure.size, 0.0, [1])
+        if thing is not None and np.abs(thing.at[:3]).max() < 99.0:
+            things.append(thing)
+    text = opening(f"a way of {figure.figure.name} among {len(things)} things", figure, q, things, Asked())
+    return Written(text.replace("import claims", "import sweeps") + TAIL.format(end=end.tolist()), figure.files)
+
+
+def verdict(scene: Scene, start: Array, end: Array, found: FirstContact | None, seconds: float) -> Verdict:
+    """Judge a sweep.
+
+    Args:
+        scene: with the figure and things.
+        start: (nq,) where the way begins.
+        end: (nq,) where it ends.
+        found: what the sweep found.
+        seconds: CPU time that it took.
+    """
+    pairs = Pairs(scene)
+    rounding = ROUNDING * max(1.0, pairs.size)
+    shares = np.linspace(0.0, 1.0, PARTS + 1)
+    deeper = _deeper(pairs, scene, start, end, shares)
+    top = int(np.argmax(deeper))
+    near = np.linspace(shares[max(top - 1, 0)], shares[min(top + 1, PARTS)], FINER)
+    shares, deeper = np.append(shares, near), np.append(deeper, _deeper(pairs, scene, start, end, near))
+    deepest = float(deeper.max(initial=0.0))
+    words = f"the deepest on the way is {deepest:.3g} m deeper than at the start"
+    if found is None:
+        if deepest > TOLERANCE + rounding:
+            return Verdict("wrong", f"nothing was found; {words}", seconds)
+        return Verdict("right", f"nothing was found; {words}", seconds)
+    said = f"{'a contact' if found.certain else 'the end of the search'} at {found.fraction:.6f}"
+    if not (0.0 <= found.fraction <= 1.0 and np.isfinite(found.q).all()):
+        return Verdict("wrong", f"{said}: no place on the way", seconds)
+    before = float(deeper[shares < found.fraction - 1e-9].max(initial=0.0))
+    if before > TOLERANCE + rounding:
+        return Verdict("wrong", f"{said}, and before it something is {before:.3g} m deeper", seconds)
+    if not found.certain:
+        return Verdict("gave up", f"{said}; {words}", seconds)
+    at = float(_deeper(pairs, scene, start, end, np.array([found.fraction]))[0])
+    if at < 0.5 * TOLERANCE - rounding:
+        return Verdict("wrong", f"{said}, where nothing is more than {at:.3g} m deeper; {words}", seconds)
+    return Verdict("right", f"{said}; {words}", seconds)
+
+
+def _deeper(pairs: Pairs, scene: Scene, start: Array, end: Array, shares: Array) -> Array:
+    """By how much some pair is deeper than at the start (k,), metres, at shares (k,) of the way."""
+    began = np.minimum(pairs.distances(start), 0.0)
+    if not len(began):
+        return np.zeros(len(shares))
+    ways = (np.asarray(pin.interpolate(scene.model, start, end, float(share))) for share in shares)
+    return np.array([float((began - pairs.distances(q)).max()) for q in ways])

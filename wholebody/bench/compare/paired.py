@@ -1,0 +1,109 @@
+"""Methods compared on the problems that both were given: the ratio of two figures with its interval.
+
+Medians over different problems say nothing of two methods, and a ratio whose interval holds 1 names no winner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import exp, inf, isfinite, log, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.bench.compare.front import FAMILY
+from wholebody.bench.compare.record import COARSE, FLOOR
+from wholebody.bench.compare.results import QUANTITIES, Results, effort_excess, middle
+
+LEAST = 5  # problems in common below which two methods are not compared
+SHARE = 0.975  # of Student's t: an interval of 95 %
+WORST = QUANTITIES[0]
+
+Figures = Mapping[tuple[str, int], float]
+"""One positive figure a problem, by the name of its set and its number."""
+
+
+class Ratio(NamedTuple):
+    """Geometric mean of a ratio over problems, with its interval of 95 %.
+
+    Attributes:
+        value, low, high: NaN and an interval without ends where there are too few problems.
+        cases: problems in common.
+    """
+
+    value: float
+    low: float
+    high: float
+    cases: int
+
+
+def ratio(one: Figures, other: Figures) -> Ratio:
+    """Return the figures of one method over those of another, on the problems that both have."""
+    from scipy.stats import t
+
+    logs = np.array([log(one[key] / other[key]) for key in one if key in other])
+    count = len(logs)
+    if count < LEAST:
+        return Ratio(float("nan"), 0.0, inf, count)
+    middle_log, spread = float(logs.mean()), float(logs.std(ddof=1)) / sqrt(count)
+    reach = float(t.ppf(SHARE, count - 1)) * spread
+    return Ratio(exp(middle_log), exp(middle_log - reach), exp(middle_log + reach), count)
+
+
+def best(found: Mapping[str, Figures]) -> tuple[str, ...]:
+    """Return the methods with the least figure, as many as cannot be told apart; the least of all first.
+
+    A method that has too few problems in common with the least is left out.
+    """
+    order = sorted((name for name in found if found[name]), key=lambda name: middle(list(found[name].values())))
+    for first in order:
+        others = {name: ratio(found[name], found[first]) for name in order if name != first}
+        if not any(each.high < 1.0 for each in others.values()):
+            return first, *(name for name, each in others.items() if each.cases >= LEAST and each.low <= 1.0)
+    return tuple(order[:1])
+
+
+def times(results: Results, families: Sequence[str], entrant: str) -> Figures:
+    """Return the seconds of a method for every problem of some sets that it solves at the default budget."""
+    return {
+        (family, record.number): max(getattr(record, results.clock), 1e-9)
+        for family in families
+        for record in results.taken(family, entrant)
+        if record.success(COARSE)
+    }
+
+
+def efforts(results: Results, family: str, entrant: str) -> Figures:
+    """Return the effort above the best known, as a share, for every problem that a method solves."""
+    found = {
+        (family, record.number): effort_excess(record, results.best(record))
+        for record in results.default(family, entrant)
+        if record.answered
+    }
+    return {key: value for key, value in found.items() if isfinite(value)}
+
+
+def errors(results: Results, family: str, entrant: str) -> Figures:
+    """Return the worst errors of a method at the budget where their median is least, on what it solved at all."""
+    cases = results.swept(family, entrant)
+    chosen: dict[tuple[str, int], float] = {}
+    least = inf
+    for level in results.levels(family, entrant):
+        _, values = results.values(family, entrant, level, WORST, cases)
+        if len(values) and middle(values) < least:
+            least = middle(values)
+            chosen = {(family, number): float(value) for number, value in zip(sorted(cases), values, strict=True)}
+    return {key: max(value, FLOOR) if isfinite(value) else 1.0 for key, value in chosen.items()}
+
+
+def named(entrants: Sequence[str]) -> str:
+    """Return methods in words, with the solvers of one method that cannot be told apart."""
+    ours = [name.removeprefix(FAMILY) for name in entrants if name.startswith(FAMILY)]
+    solvers = f" (any of {', '.join(ours)})" if len(ours) > 1 else ""
+    return ", ".join(f"`{name}`{solvers if name == FAMILY[:-1] else ''}" for name in algorithms(entrants))
+
+
+def algorithms(entrants: Sequence[str]) -> list[str]:
+    """Return the names of methods; several solvers of one method have the name of the method."""
+    several = sum(name.startswith(FAMILY) for name in entrants) > 1
+    return list(dict.fromkeys(FAMILY[:-1] if several and name.startswith(FAMILY) else name for name in entrants))

@@ -1,0 +1,158 @@
+"""The convex pieces of what a robot's links collide with: shapes exactly, meshes as hulls or decomposed."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.checks import known, number, shown
+from wholebody.errors import InputError
+from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
+from wholebody.geometry.hull import hull_piece
+from wholebody.geometry.mesh_cache import ConvexPieces, kept
+from wholebody.geometry.meshes import EmptyMeshError, read_mesh
+from wholebody.geometry.pieces import LARGEST, SMALLEST
+
+Array = NDArray[np.float64]
+
+CYLINDER_SIDES = 32
+"""A cylinder becomes a prism around it with this many sides; its corners stand out by 0.5 % of the radius."""
+
+WHOLE_IN_ONE_FILE = (".obj", ".stl", ".glb", ".dae")
+"""Kinds of mesh files whose triangles are all in the file itself, so that its content says what they are."""
+
+_log = logging.getLogger(__name__)
+
+Concavity = float | Mapping[str, float] | None
+"""None: a hull for each mesh. A number: what a decomposition of every mesh may leave. A mapping: of which links."""
+
+
+class LinkShape(NamedTuple):
+    """One collision shape of a link.
+
+    Attributes:
+        link: name of the link.
+        placement: in the link's frame.
+        kind: "box", "sphere", "cylinder", "capsule", "ellipsoid", "mesh" or "triangles".
+        size: box: three edges; sphere: radius; cylinder and capsule: radius, length; ellipsoid: three semi-axes;
+            mesh: scale along x, y, z; triangles: none.
+        file: of a mesh.
+        triangles: vertices (n, 3) and faces (m, 3).
+        name: of the shape in the file; empty without one.
+    """
+
+    link: str
+    placement: pin.SE3
+    kind: str
+    size: tuple[float, ...]
+    file: Path | None = None
+    triangles: tuple[Array, NDArray[np.int64]] | None = None
+    name: str = ""
+
+
+CONCAVITY = (0.01, 1.0)
+"""What convex pieces of a mesh may leave, as a share of its size: close, and hulls."""
+
+
+def check_concavity(concavity: object, links: Iterable[str]) -> Concavity:
+    """Return what was asked for, checked.
+
+    Raises:
+        InputError: not None, a number from 0.01 to 1, or a mapping to such numbers.
+        UnknownNameError: a link that is not there.
+    """
+    names = tuple(links)
+    if concavity is None:
+        return None
+    if isinstance(concavity, Mapping):
+        return {
+            known(link, names, "link", "concavity"): number(value, f"concavity of link {shown(link)}", *CONCAVITY)
+            for link, value in concavity.items()
+        }
+    return number(concavity, "concavity", *CONCAVITY, "or None for hulls")
+
+
+def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any, pin.SE3]], tuple[str, ...]]:
+    """Convex pieces of one shape, in its own frame, and one sentence on each thing that was changed about it.
+
+    Raises:
+        WholebodyError: a mesh that cannot be read.
+    """
+    size, here = shape.size, pin.SE3.Identity()
+    if shape.kind in ("mesh", "triangles"):
+        share = concavity.get(shape.link) if isinstance(concavity, Mapping) else concavity
+        try:
+            split = _of_file(shape, share) if shape.file is not None else _of_triangles(shape, share)
+        except EmptyMeshError as error:
+            return [], (f"{error}, so it is left out",)
+        return [(piece.geometry, piece.placement) for piece in split.pieces], split.notes
+    size, notes = _solid(size, shape.kind)
+    if shape.kind == "box":
+        return [(coal.Box(*size), here)], notes
+    if shape.kind == "sphere":
+        return [(coal.Sphere(size[0]), here)], notes
+    if shape.kind == "ellipsoid":
+        return [(coal.Ellipsoid(*size), here)], notes
+    if shape.kind == "capsule":
+        return [(coal.Capsule(size[0], size[1]), here)], notes
+    piece = hull_piece(_prism(size[0], size[1]), "cylinder")
+    return [(piece.geometry, piece.placement)], notes
+
+
+def _solid(size: tuple[float, ...], kind: str) -> tuple[tuple[float, ...], tuple[str, ...]]:
+    """Sizes that coal can be trusted with."""
+    if min(size) >= SMALLEST:
+        return size, ()
+    note = f"its {kind} is {min(size):.2g} m thin, so it is made {SMALLEST} m thick"
+    return tuple(max(length, SMALLEST) for length in size), (note,)
+
+
+def _of_file(shape: LinkShape, share: float | None) -> ConvexPieces:
+    assert shape.file is not None
+    file, what = shape.file, f"mesh {shape.file.name}"
+    scale = np.array(shape.size)
+
+    def make() -> ConvexPieces:
+        _log.info("link %s: making convex pieces of %s", shape.link, file)
+        vertices, faces = read_mesh(file)
+        return _pieces(vertices * scale, faces[:, ::-1] if np.prod(scale) < 0.0 else faces, share, what)
+
+    if file.suffix.lower() not in WHOLE_IN_ONE_FILE:
+        return make()
+    settings = f"link {HULL_VERTICES} {share!r} {shape.size!r} {file.suffix.lower()} {coacd_version()}"
+    return kept((file.read_bytes(),), settings, what, make)
+
+
+def _of_triangles(shape: LinkShape, share: float | None) -> ConvexPieces:
+    assert shape.triangles is not None
+    vertices, faces = shape.triangles
+    settings = f"link {HULL_VERTICES} {share!r} {coacd_version()}"
+    content = (np.ascontiguousarray(vertices).tobytes(), np.ascontiguousarray(faces).tobytes())
+    return kept(content, settings, "mesh", lambda: _pieces(vertices, faces, share, "mesh"))
+
+
+def _pieces(vertices: Array, faces: NDArray[np.int64], share: float | None, what: str) -> ConvexPieces:
+    if len(vertices) and np.abs(vertices).max() > LARGEST:
+        raise InputError(f"{what}: a vertex lies {np.abs(vertices).max():.4g} m from its origin; is the scale right?")
+    if share is None:
+        return mesh_hull(vertices, faces, what=what)
+    split = convex_pieces(vertices, faces, threshold=share, what=what)
+    if split.added_volume <= 0.01:
+        return split
+    told = f"{what}: its convex pieces ({len(split.pieces)}) have {split.added_volume:.0%} more volume"
+    return split._replace(notes=(*split.notes, told))
+
+
+def _prism(radius: float, length: float) -> Array:
+    """Corners of the prism around a cylinder along z, shape (2 sides, 3)."""
+    turn = 2.0 * np.pi * np.arange(CYLINDER_SIDES) / CYLINDER_SIDES
+    outside = radius / np.cos(np.pi / CYLINDER_SIDES)
+    ring = np.column_stack([outside * np.cos(turn), outside * np.sin(turn)])
+    return np.vstack([np.column_stack([ring, np.full(CYLINDER_SIDES, z)]) for z in (-0.5 * length, 0.5 * length)])

@@ -1,0 +1,132 @@
+"""A figure from an MJCF file (MuJoCo), as far as Pinocchio reads it: bodies, joints, and the geoms that collide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from os import PathLike
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import FileFormatError, InputError
+from wholebody.figures.figure import ROOT_JOINT, Figure
+from wholebody.figures.link_pieces import Concavity, LinkShape, check_concavity
+from wholebody.figures.robot_figure import check_size, geometry_of_links, robot_figure
+from wholebody.figures.urdf_figure import SAMPLES, urdf_figure
+from wholebody.figures.xml_reading import read_xml
+
+Array = NDArray[np.float64]
+
+_PLACED = {"pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"}
+"""Attributes that place a body; Pinocchio drops them of a first body that is fixed."""
+
+
+def xml_figure(
+    path: str | PathLike[str],
+    root: str | None = None,
+    package_dirs: Iterable[str | PathLike[str]] = (),
+    concavity: Concavity = None,
+    samples: int = SAMPLES,
+    seed: int = 0,
+) -> Figure:
+    """Return the figure of an ``.xml`` file, which is an MJCF if its outermost element is ``<mujoco>``, else a URDF.
+
+    Args:
+        path: the file.
+        root: "fixed" to the world, or "free"; if left out, as the file says.
+        package_dirs: as for `urdf_figure`; an MJCF has no packages.
+        concavity: as for `urdf_figure`.
+        samples: as for `urdf_figure`.
+        seed: as for `urdf_figure`.
+
+    Raises:
+        FileFormatError: a file that cannot be read, with the place and the mend.
+        InputError: another root, a concavity out of range, or more joints than memory suffices for.
+        UnknownNameError: `concavity` names a link that is not there.
+    """
+    place = Path(path)
+    outermost = read_xml(place, "URDF or MJCF")
+    if outermost.tag != "mujoco":
+        return urdf_figure(path, root, package_dirs, concavity, samples, seed)
+    if root not in (None, "fixed", "free"):
+        raise InputError(f"root is {root!r}; give 'fixed' or 'free'")
+    model, meshes = _read(place, root)
+    check_size(model, place)
+    links = tuple(frame.name for frame in model.frames if frame.type == pin.FrameType.BODY)
+    if not links:
+        raise FileFormatError(f"{place}: there are no bodies in it; give an MJCF of a robot")
+    shapes = [_shape(model, piece, place) for piece in meshes.geometryObjects]
+    geometry, notes = geometry_of_links(model, shapes, check_concavity(concavity, links), place)
+    name = outermost.get("model") or place.stem
+    return robot_figure(name, model, links, geometry, (*_unread(outermost), *notes), samples, seed)
+
+
+def _read(path: Path, root: str | None) -> tuple[pin.Model, pin.GeometryModel]:
+    base = [pin.JointModelFreeFlyer()] if root == "free" else []
+    try:
+        model = pin.buildModelFromMJCF(str(path), *base)
+        meshes = pin.buildGeomFromMJCF(model, str(path), pin.COLLISION)
+    except Exception as error:  # boost's and Pinocchio's own, of several kinds
+        reason = " ".join(str(error).split()).rpartition("message: ")[2]
+        raise FileFormatError(f"{path}: Pinocchio cannot read it ({reason}); convert it to URDF") from None
+    first = model.joints[1] if model.njoints > 1 else None
+    if first is not None and first.nq == 7:
+        if root == "fixed":
+            raise InputError(f"{path}: root is 'fixed', but its first body has a free joint; give root='free'")
+        model.names[1] = ROOT_JOINT
+    for name, joint in zip(model.names, model.joints, strict=True):
+        if joint.shortname() == "JointModelComposite":
+            raise FileFormatError(
+                f"{path}: the body of joint {name!r} has several joints; give each of them a body of its own"
+            )
+    limits = [np.array(limit) for limit in (model.lowerPositionLimit, model.upperPositionLimit)]
+    for joint in list(model.joints)[1:]:
+        if joint.nq == joint.nv == 1 and limits[0][joint.idx_q] > limits[1][joint.idx_q]:
+            raise FileFormatError(f"{path}: joint {model.names[joint.id]!r} has a lower limit above the upper; mend it")
+    return model, meshes
+
+
+def _shape(model: pin.Model, piece: pin.GeometryObject, path: Path) -> LinkShape:
+    frame = model.frames[piece.parentFrame]
+    solid: Any = piece.geometry
+    kind, at = type(solid).__name__, frame.placement.actInv(piece.placement)
+    if kind == "Box":
+        return LinkShape(frame.name, at, "box", tuple(2.0 * np.asarray(solid.halfSide)))
+    if kind == "Sphere":
+        return LinkShape(frame.name, at, "sphere", (solid.radius,))
+    if kind in ("Capsule", "Cylinder"):
+        return LinkShape(frame.name, at, kind.lower(), (solid.radius, 2.0 * solid.halfLength))
+    if kind == "Ellipsoid":
+        return LinkShape(frame.name, at, "ellipsoid", tuple(np.asarray(solid.radii)))
+    if kind.startswith("BVHModel"):
+        faces = [solid.tri_indices(k) for k in range(solid.num_tris)]
+        return _triangles(frame.name, at, np.array(solid.vertices()), faces)
+    if kind.startswith("Convex"):
+        faces = [solid.polygons(k) for k in range(solid.num_polygons)]
+        return _triangles(frame.name, at, np.array(solid.points()), faces)
+    raise FileFormatError(
+        f"{path}: a geom of body {frame.name!r} is a {kind}; use boxes, capsules, meshes and the like"
+    )
+
+
+def _triangles(link: str, at: pin.SE3, vertices: Array, faces: list[Any]) -> LinkShape:
+    triangles = np.array([[face[0], face[1], face[2]] for face in faces], dtype=np.int64).reshape(-1, 3)
+    return LinkShape(link, at, "triangles", (), triangles=(vertices.reshape(-1, 3), triangles))
+
+
+def _unread(outermost: Element) -> list[str]:
+    """Sentences on what of the file is not kept."""
+    notes = []
+    if outermost.find("worldbody/geom") is not None:
+        notes.append("the geoms of the world are not read; add them to the scene")
+    first = outermost.find("worldbody/body")
+    if first is not None and first.find("freejoint") is None and set(first.attrib) & _PLACED:
+        notes.append(f"body {first.get('name')!r}: its place in the world is not kept, it stands at the origin")
+    equality = outermost.find("equality")
+    if equality is not None and len(equality):
+        notes.append(f"the {len(equality)} constraints in <equality> are not kept: the joints move by themselves")
+    return notes

@@ -1,0 +1,156 @@
+"""From a robot's model and collision shapes to its figure: pieces, pairs, the posture it begins in, chains."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import FileFormatError, InputError, WholebodyError
+from wholebody.figures.description import Chain, Description
+from wholebody.figures.figure import ROOT_JOINT, Figure
+from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces
+from wholebody.figures.rest_posture import RestPosture, rest_posture
+from wholebody.figures.self_pairs import choose_pairs
+from wholebody.geometry.large_models import geometry_model
+
+Array = NDArray[np.float64]
+
+DATA_KEPT = 4
+"""Pinocchio's data that a scene with one problem holds."""
+
+COLOR = (0.62, 0.66, 0.70, 1.0)
+
+
+def robot_figure(
+    name: str,
+    model: pin.Model,
+    links: tuple[str, ...],
+    geometry: pin.GeometryModel,
+    notes: Iterable[str],
+    samples: int,
+    seed: int,
+) -> Figure:
+    """Return the figure of a robot about which nothing is known but its model and geometry.
+
+    Args:
+        name: of the robot.
+        model: Pinocchio's model.
+        links: names, the root link first.
+        geometry: pieces; its pairs are chosen here.
+        notes: what had to be changed so far.
+        samples: random postures by which the pairs are chosen.
+        seed: of those postures.
+    """
+    excluded = choose_pairs(model, geometry, samples, seed)
+    rest = rest_posture(model, geometry, seed)
+    carrying = {model.frames[piece.parentFrame].name for piece in geometry.geometryObjects}
+    postures = {"neutral": partial(_copied, q=rest.q)}
+    if np.abs(rest.q - rest.zero).max(initial=0.0) > 1e-12:
+        postures["zero"] = partial(_copied, q=rest.zero)
+    description = Description(
+        groups={"all": tuple(name for name in list(model.names)[1:] if name != ROOT_JOINT)},
+        chains=link_chains(model, links),
+        frames=links,
+        segments=tuple(link for link in links if link in carrying) or links,
+        postures=postures,
+        excluded=(*excluded, *rest.excluded),
+        notes=(*notes, *_told(rest)),
+    )
+    return Figure(name, model, geometry, "own", description)
+
+
+def _copied(figure: Figure, q: Array) -> Array:
+    return np.array(q)
+
+
+def _told(rest: RestPosture) -> list[str]:
+    """Sentences on overlaps at zero."""
+    notes = []
+    if rest.parted:
+        shown = ", ".join(f"{a} and {b}" for a, b in rest.parted[:3])
+        more = f" and {len(rest.parted) - 3} more pairs" if len(rest.parted) > 3 else ""
+        notes.append(f"posture 'neutral': moved away from zero, where {shown}{more} overlap")
+    notes += [f"pair {pair.a} and {pair.b}: not tested, {pair.reason}" for pair in rest.excluded]
+    return notes
+
+
+def check_size(model: pin.Model, path: Path) -> None:
+    """Refuse a model for which the memory of this machine does not suffice.
+
+    Pinocchio's data hold four tables of the cube of the degrees of freedom: 0.26 GB for 200 of them, 108 GB for 1,500.
+
+    Raises:
+        InputError: too many degrees of freedom.
+    """
+    needed = DATA_KEPT * 4 * 8 * model.nv**3
+    if needed > machine_memory():
+        raise InputError(
+            f"{path}: {model.nv} degrees of freedom need {needed / 1e9:.0f} GB, since Pinocchio keeps tables of their "
+            f"cube, and this machine has {machine_memory() / 1e9:.0f} GB; make joints fixed that need not move"
+        )
+
+
+def machine_memory() -> float:
+    """Return the bytes of memory of this machine; inf where the system does not say."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return float("inf")
+
+
+def link_chains(model: pin.Model, links: Iterable[str]) -> dict[str, Chain]:
+    """One chain from the root to each link after which no joint follows; named after that link."""
+    inner = {model.parents[joint] for joint in range(1, model.njoints)}
+    chains = {}
+    for link in links:
+        joint = model.frames[model.getFrameId(link, pin.FrameType.BODY)].parentJoint
+        if joint in inner or joint == 0:
+            continue
+        names = [model.names[k] for k in model.supports[joint] if k > 0 and model.names[k] != ROOT_JOINT]
+        chains[link] = Chain(tuple(names), link)
+    return chains
+
+
+def geometry_of_links(
+    model: pin.Model, shapes: Iterable[LinkShape], concavity: Concavity, path: Path, named: bool = False
+) -> tuple[pin.GeometryModel, tuple[str, ...]]:
+    """Return the convex pieces of links, and one sentence on each thing that was changed about them.
+
+    Args:
+        model: Pinocchio's model.
+        shapes: of the links.
+        concavity: see `link_pieces`.
+        path: of the file, for errors.
+        named: call a piece as its shape is called in the file, and not "<link>:<k>".
+
+    Raises:
+        FileFormatError: a mesh that cannot be read, with the link.
+    """
+    made, notes = [], []
+    count: dict[str, int] = {}
+    for shape in shapes:
+        try:
+            pieces, remarks = link_pieces(shape, concavity)
+        except WholebodyError as error:
+            raise FileFormatError(f"{path}: collision of link {shape.link!r}: {error}") from error
+        notes += [f"link {shape.link!r}: {remark}" for remark in remarks]
+        frame_id = model.getFrameId(shape.link, pin.FrameType.BODY)
+        frame = model.frames[frame_id]
+        for solid, placement in pieces:
+            k = count[shape.link] = count.get(shape.link, -1) + 1
+            piece = pin.GeometryObject(
+                shape.name if named and shape.name and len(pieces) == 1 else f"{shape.link}:{k}",
+                frame.parentJoint,
+                frame_id,
+                frame.placement * shape.placement * placement,
+                solid,
+            )
+            piece.meshColor[:] = COLOR
+            made.append(piece)
+    return geometry_model(made), tuple(notes)

@@ -1,0 +1,221 @@
+"""What a URDF has no words for: the element ``<wholebody>``, written with our figures and read with them.
+
+Other programs skip it. With it a figure that is read from its file is the figure that was written: its pairs, postures,
+groups, chains, the frames to reach with, reach cones, collision groups and weights of effort. All of it is by name::
+
+    <wholebody root="free" detail="capsules">
+      <frames names="left_palm left_index_tip"/>
+      <segments names="pelvis left_hand"/>
+      <group name="left_arm" joints="left_shoulder_flexion left_elbow_flexion"/>
+      <chain name="left_arm" tip="left_index_tip" joints="left_shoulder_flexion left_elbow_flexion"/>
+      <posture name="standing" root="0 0 0.93 0 0 0 1" joints="left_elbow_flexion" values="0.26"/>
+      <untested reason="same segment" pairs="left_hand:0 left_hand:1"/>
+      <cone name="left_shoulder" reference="thorax" limb="left_upper_arm" axis="0 0 -1" visible="1 0 0" corners="..."/>
+      <collision_group name="left_arm" segments="left_forearm left_hand"/>
+      <effort joints="left_clavicle_elevation" weights="1000"/>
+    </wholebody>
+
+A posture names the joints that are not at zero, in radians and metres, and where the root stands: x, y, z and the
+quaternion x, y, z, w. Pieces are called as their ``<collision>`` elements. All pairs that are not untested, and whose
+pieces are on different joints, are tested.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import NoReturn
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import FileFormatError, UnknownNameError, WholebodyError
+from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone
+from wholebody.figures.figure import ROOT_JOINT, Figure
+from wholebody.figures.reach_cones import ReachCone
+from wholebody.figures.reduction import drop_rigid_pairs
+from wholebody.figures.xml_reading import numbers
+
+Array = NDArray[np.float64]
+
+
+def extension_text(figure: Figure) -> str:
+    """Return the element of a figure, indented to stand in its URDF."""
+    known = figure.describe()
+    made = Element("wholebody", root=figure.root, detail=figure.detail)
+    SubElement(made, "frames", names=" ".join(figure.frames))
+    SubElement(made, "segments", names=" ".join(figure.segments))
+    for name, joints in known.groups.items():
+        SubElement(made, "group", name=name, joints=" ".join(joints))
+    for name, chain in known.chains.items():
+        SubElement(made, "chain", name=name, tip=chain.tip, joints=" ".join(chain.joints))
+    for name in figure.postures:
+        q = figure.posture(name)
+        values = {joint: value for joint, value in figure.joint_values(q).items() if abs(value) > 1e-12}
+        posture = SubElement(made, "posture", name=name)
+        if figure.root == "free":
+            posture.set("root", _text(q[:7]))
+        posture.set("joints", " ".join(values))
+        posture.set("values", _text(values.values()))
+    reasons: dict[str, list[str]] = {}
+    for pair in figure.excluded_pairs:
+        reasons.setdefault(pair.reason, []).append(f"{pair.a} {pair.b}")
+    for reason, pairs in reasons.items():
+        SubElement(made, "untested", reason=reason, pairs=" ".join(pairs))
+    for name, cone in known.cones.items():
+        ends = {"reference": cone.reference, "limb": cone.limb, "axis": _text(cone.axis)}
+        shape = {"visible": _text(cone.cone.visible), "corners": _text(cone.cone.vertices.ravel())}
+        SubElement(made, "cone", {"name": name, **ends, **shape})
+    collision_groups: dict[str, list[str]] = {}
+    for segment, name in known.collision_groups.items():
+        collision_groups.setdefault(name, []).append(segment)
+    for name, segments in collision_groups.items():
+        SubElement(made, "collision_group", name=name, segments=" ".join(segments))
+    effort = {joint: weight for joint, weight in known.effort.items() if joint in figure.joints}
+    if effort:
+        SubElement(made, "effort", joints=" ".join(effort), weights=_text(effort.values()))
+    ElementTree.indent(made, space="  ", level=1)
+    return "  " + ElementTree.tostring(made, encoding="unicode").rstrip() + "\n"
+
+
+def extended_figure(
+    path: Path, element: Element, name: str, model: pin.Model, geometry: pin.GeometryModel, notes: Sequence[str]
+) -> Figure:
+    """Return the figure that an element `extension_text` describes.
+
+    Args:
+        path: of the file, for errors.
+        element: the extension.
+        name: of the figure.
+        model: Pinocchio's model.
+        geometry: pieces, without pairs; the pairs are put in here.
+        notes: what had to be changed about the geometry.
+
+    Raises:
+        FileFormatError: a name that is not in the file, or numbers that do not fit.
+    """
+    return _Reader(path, element, model, geometry).figure(name, tuple(notes))
+
+
+class _Reader:
+    def __init__(self, path: Path, element: Element, model: pin.Model, geometry: pin.GeometryModel) -> None:
+        self.path, self.element, self.model, self.geometry = path, element, model, geometry
+        self.joints = {joint for joint in list(model.names)[1:] if joint != ROOT_JOINT}
+        self.frames = {frame.name for frame in model.frames}
+
+    def figure(self, name: str, notes: tuple[str, ...]) -> Figure:
+        excluded = self._pairs()
+        postures = {self._name(item): self._posture(item) for item in self._all("posture")}
+        if not postures:
+            self._fail("it has no <posture>; write the figure again")
+        efforts: dict[str, float] = {}
+        for item in self._all("effort"):
+            joints = self._names(item, "joints", "joint", self.joints)
+            efforts.update(zip(joints, numbers(item, "weights", self._place(item), len(joints)), strict=True))
+        segments = self._listed("segments")
+        description = Description(
+            groups={self._name(item): self._names(item, "joints", "joint", self.joints) for item in self._all("group")},
+            chains={
+                self._name(item): Chain(
+                    self._names(item, "joints", "joint", self.joints), self._names(item, "tip", "frame", self.frames)[0]
+                )
+                for item in self._all("chain")
+            },
+            frames=self._listed("frames"),
+            segments=segments,
+            postures=postures,
+            cones={self._name(item): self._cone(item) for item in self._all("cone")},
+            collision_groups={
+                segment: self._name(item)
+                for item in self._all("collision_group")
+                for segment in self._names(item, "segments", "segment", set(segments))
+            },
+            effort=efforts,
+            excluded=excluded,
+            notes=notes,
+        )
+        return Figure(name, self.model, self.geometry, self.element.get("detail", "own"), description)
+
+    def _pairs(self) -> tuple[ExcludedPair, ...]:
+        number = {piece.name: k for k, piece in enumerate(self.geometry.geometryObjects)}
+        excluded: dict[frozenset[str], ExcludedPair] = {}
+        for item in self._all("untested"):
+            names = self._names(item, "pairs", "piece", set(number))
+            if len(names) % 2:
+                self._fail("<untested> has a piece without partner in its pairs; write two names a pair")
+            for a, b in zip(names[::2], names[1::2], strict=True):
+                excluded[frozenset((a, b))] = ExcludedPair(a, b, item.get("reason", ""))
+        self.geometry.removeAllCollisionPairs()
+        pieces = [piece.name for piece in self.geometry.geometryObjects]
+        for second in range(len(pieces)):
+            for first in range(second):
+                if frozenset((pieces[first], pieces[second])) not in excluded:
+                    self.geometry.addCollisionPair(pin.CollisionPair(first, second))
+        return (*excluded.values(), *drop_rigid_pairs(self.geometry))
+
+    def _posture(self, item: Element) -> Callable[[Figure], Array]:
+        joints = self._names(item, "joints", "joint", self.joints)
+        values = numbers(item, "values", self._place(item), len(joints), "") if joints else ()
+        root = None
+        if item.get("root") is not None:
+            root = np.array(numbers(item, "root", self._place(item), 7))
+            if abs(float(np.linalg.norm(root[3:])) - 1.0) > 1e-6:
+                self._fail(f"posture {item.get('name')!r} has a root whose quaternion is not of unit length")
+            root[3:] /= np.linalg.norm(root[3:])
+        return partial(_placed, root=root, values=dict(zip(joints, values, strict=True)))
+
+    def _cone(self, item: Element) -> JointCone:
+        place = self._place(item)
+        count = len(item.get("corners", "").split())
+        try:
+            cone = ReachCone(
+                np.array(numbers(item, "corners", place, count)).reshape(-1, 3), numbers(item, "visible", place, 3)
+            )
+        except (WholebodyError, ValueError) as error:
+            if isinstance(error, FileFormatError):
+                raise
+            raise FileFormatError(f"{place}: {error}") from None
+        ends = [self._names(item, end, "frame", self.frames)[0] for end in ("reference", "limb")]
+        return JointCone(cone, ends[0], ends[1], np.array(numbers(item, "axis", place, 3)))
+
+    def _all(self, tag: str) -> list[Element]:
+        return self.element.findall(tag)
+
+    def _listed(self, tag: str) -> tuple[str, ...]:
+        return tuple(name for item in self._all(tag) for name in self._names(item, "names", "frame", self.frames))
+
+    def _name(self, item: Element) -> str:
+        name = item.get("name")
+        if not name:
+            self._fail(f"a <{item.tag}> has no name; give it one")
+        return name
+
+    def _names(self, item: Element, attribute: str, kind: str, known: Iterable[str]) -> tuple[str, ...]:
+        names = tuple(item.get(attribute, "").split())
+        for name in names:
+            if name not in known:
+                raise FileFormatError(str(UnknownNameError(kind, name, known, self._place(item))))
+        if not names and attribute in ("tip", "reference", "limb"):
+            self._fail(f"<{item.tag}> {item.get('name')!r} has no {attribute}; add it")
+        return names
+
+    def _place(self, item: Element) -> str:
+        return f"{self.path}: <wholebody>, <{item.tag}> {item.get('name', '')}".rstrip()
+
+    def _fail(self, what: str) -> NoReturn:
+        raise FileFormatError(f"{self.path}: <wholebody>: {what}")
+
+
+def _placed(figure: Figure, root: Array | None, values: dict[str, float]) -> Array:
+    q = pin.neutral(figure.model)
+    if root is not None and figure.root == "free":
+        q[:7] = root
+    return figure.with_joints(q, values)
+
+
+def _text(values: Iterable[float] | Array) -> str:
+    return " ".join(f"{float(value):.12g}" if abs(value) > 1e-12 else "0" for value in values)

@@ -1,0 +1,210 @@
+"""The joints of a URDF, checked: a tree, with limits where a joint needs some, and followers that can be obeyed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.errors import FileFormatError
+from wholebody.figures.xml_reading import bounded, numbers, placement, unique_names
+from wholebody.geometry.pieces import LARGEST
+
+JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+FOLLOWING = ("revolute", "continuous", "prismatic")
+
+UNLIMITED = 1e4
+"""Limits beyond this, radians or metres, are no limits: files write 1e16 for them."""
+
+
+class Mimic(NamedTuple):
+    """A joint's value is that of another times `multiplier` plus `offset`."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+class UrdfJoint(NamedTuple):
+    """One joint.
+
+    Attributes:
+        name: its name.
+        kind: one of `JOINT_TYPES`.
+        parent: link.
+        child: link.
+        origin: placement of the child in the parent at zero.
+        axis: (3,) unit direction.
+        lower: radians or metres; -inf without a limit.
+        upper: inf without a limit.
+        velocity: largest speed, 1/s or m/s; inf where none is said.
+        effort: largest torque or force; inf where none is said.
+        mimic: the joint it follows.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: pin.SE3
+    axis: NDArray[np.float64]
+    lower: float
+    upper: float
+    velocity: float
+    effort: float
+    mimic: Mimic | None
+
+
+def read_joints(
+    robot: Element, links: tuple[str, ...], path: Path
+) -> tuple[tuple[UrdfJoint, ...], str, tuple[str, ...]]:
+    """Read and check all joints.
+
+    Returns:
+        The joints, the root link, and one sentence for each thing that is missing and was filled in.
+
+    Raises:
+        FileFormatError: one sentence with the place and the mend.
+    """
+    elements = robot.findall("joint")
+    unique_names(elements, "joint", path)
+    notes: list[str] = []
+    joints = []
+    parent_of: dict[str, str] = {}
+    known = frozenset(links)
+    for element in elements:
+        joint = _joint(element, known, f"{path}: joint {element.get('name')!r}", notes)
+        if joint.child in parent_of:
+            raise FileFormatError(
+                f"{path}: joint {joint.name!r}: link {joint.child!r} already hangs on {parent_of[joint.child]!r}; "
+                "a URDF is a tree"
+            )
+        parent_of[joint.child] = joint.parent
+        joints.append(joint)
+    joints = _with_leaders(joints, notes)
+    _check_followers({joint.name: joint for joint in joints}, path)
+    return tuple(joints), _root(links, parent_of, path), tuple(notes)
+
+
+def _with_leaders(joints: list[UrdfJoint], notes: list[str]) -> list[UrdfJoint]:
+    """Let joints that mimic one which is not in the file move by themselves."""
+    known = {joint.name for joint in joints}
+    made = []
+    for joint in joints:
+        if joint.mimic is not None and joint.mimic.joint not in known:
+            notes.append(
+                f"joint {joint.name!r}: it mimics {joint.mimic.joint!r}, which is not in the file, so it is on its own"
+            )
+            joint = joint._replace(mimic=None)
+        made.append(joint)
+    return made
+
+
+def _joint(element: Element, links: frozenset[str], place: str, notes: list[str]) -> UrdfJoint:
+    kind = element.get("type")
+    if kind not in JOINT_TYPES:
+        raise FileFormatError(f"{place} has the type {kind!r}; use one of {', '.join(JOINT_TYPES)}")
+    ends = []
+    for tag in ("parent", "child"):
+        found = element.find(tag)
+        end = found.get("link") if found is not None else None
+        if end not in links:
+            raise FileFormatError(
+                f"{place} has the {tag} link {end!r}, which is not in the file; add it or mend the name"
+            )
+        ends.append(str(end))
+    axis = np.array([1.0, 0.0, 0.0])
+    direction = element.find("axis")
+    if kind not in ("fixed", "floating") and direction is not None:
+        axis = np.array(bounded(direction, "xyz", place, 3))
+        length = float(np.linalg.norm(axis))
+        if length < 1e-9:
+            raise FileFormatError(f"{place} has a zero axis; give a direction")
+        axis = axis / length
+    lower, upper, velocity, effort = _limits(element, kind, place, notes)
+    origin, name = placement(element, place, LARGEST), str(element.get("name"))
+    return UrdfJoint(
+        name, kind, ends[0], ends[1], origin, axis, lower, upper, velocity, effort, _mimic(element, kind, place)
+    )
+
+
+def _limits(element: Element, kind: str, place: str, notes: list[str]) -> tuple[float, float, float, float]:
+    """Lower and upper limit, velocity and effort; infinite where there is none."""
+    free = (-np.inf, np.inf, np.inf, np.inf)
+    if kind in ("fixed", "floating", "planar"):
+        return free
+    limit = element.find("limit")
+    name = element.get("name")
+    if limit is None:
+        if kind != "continuous":
+            notes.append(f"joint {name!r}: it has no <limit>, so it moves without limits")
+        return free
+    lower, upper = -np.inf, np.inf
+    if kind != "continuous":
+        lower, upper = (numbers(limit, end, place, 1, "0")[0] for end in ("lower", "upper"))
+        if lower > upper:
+            raise FileFormatError(f"{place} has the lower limit {lower:g} above the upper {upper:g}; exchange them")
+        if limit.get("lower") is None and limit.get("upper") is None:
+            notes.append(f"joint {name!r}: its <limit> has neither lower nor upper, so it moves without limits")
+            lower, upper = -np.inf, np.inf
+        lower, upper = (lower if lower > -UNLIMITED else -np.inf), (upper if upper < UNLIMITED else np.inf)
+    speeds = []
+    for what in ("velocity", "effort"):
+        text = limit.get(what)
+        if text is None or text.strip().lower().lstrip("+") in ("inf", "infinity"):
+            speeds.append(np.inf)
+            continue
+        value = bounded(limit, what, place, 1, most=1e20)[0]
+        if value < 0.0:
+            raise FileFormatError(f"{place} has the {what} limit {value:g}; give a number that is not negative")
+        speeds.append(value)
+    return lower, upper, speeds[0], speeds[1]
+
+
+def _mimic(element: Element, kind: str, place: str) -> Mimic | None:
+    mimic = element.find("mimic")
+    if mimic is None or kind not in FOLLOWING:  # on a fixed joint, as robots with locked hands have it, it says nothing
+        return None
+    multiplier = bounded(mimic, "multiplier", place, 1, "1")[0]
+    return Mimic(mimic.get("joint", ""), multiplier, bounded(mimic, "offset", place, 1, "0", LARGEST)[0])
+
+
+def _check_followers(joints: dict[str, UrdfJoint], path: Path) -> None:
+    for joint in joints.values():
+        seen = [joint.name]
+        while (mimic := joints[seen[-1]].mimic) is not None:
+            place = f"{path}: joint {seen[-1]!r}"
+            if joints[mimic.joint].kind in ("floating", "planar"):
+                raise FileFormatError(
+                    f"{place} mimics {mimic.joint!r}, which is {joints[mimic.joint].kind}; name another"
+                )
+            if mimic.joint in seen:
+                raise FileFormatError(
+                    f"{place} mimics {mimic.joint!r}, which mimics it in turn; let one of them be free"
+                )
+            seen.append(mimic.joint)
+
+
+def _root(links: tuple[str, ...], parent_of: dict[str, str], path: Path) -> str:
+    roots = [link for link in links if link not in parent_of]
+    if len(roots) != 1:
+        found = (
+            "no link without a parent: the joints form a loop"
+            if not roots
+            else f"{len(roots)} roots: {', '.join(roots[:4])}"
+        )
+        raise FileFormatError(f"{path}: a URDF is one tree, but there is {found}; connect it")
+    under = {roots[0]}
+    for link in links:
+        way = [link]
+        while way[-1] not in under:
+            above = parent_of[way[-1]]
+            if above in way:
+                raise FileFormatError(f"{path}: the joints around link {above!r} form a loop; a URDF is a tree")
+            way.append(above)
+        under.update(way)
+    return roots[0]

@@ -1,0 +1,169 @@
+"""From a checked URDF to Pinocchio's model, with joints that follow others (mimic).
+
+Pinocchio wants a follower to come after the joint it follows, in its own order. Of joints that move together the first
+in that order therefore carries the coordinate, and the others follow it; whichever of them the file calls the leader.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.errors import FileFormatError
+from wholebody.figures.urdf_file import UrdfFile
+from wholebody.figures.urdf_joints import Mimic, UrdfJoint
+
+_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+class _Law(NamedTuple):
+    """A joint's value as ``slope * leader + offset``."""
+
+    leader: str
+    slope: float
+    offset: float
+
+
+def urdf_model(urdf: UrdfFile, root: str) -> tuple[pin.Model, tuple[str, ...]]:
+    """Return Pinocchio's model and one sentence for each joint that could not be taken as it is.
+
+    Args:
+        urdf: the checked file.
+        root: "fixed" or "free".
+
+    Raises:
+        FileFormatError: what passed our checks and still fails in Pinocchio.
+    """
+    joints, notes = _with_constant_followers(urdf.joints)
+    model = _build(urdf, joints, root, mimic=False)
+    if any(joint.mimic for joint in joints):
+        joints = _led_by_the_first(joints, {name: place for place, name in enumerate(model.names)})
+        model = _build(urdf, joints, root, mimic=True)
+    _set_limits(model, joints)
+    return model, notes
+
+
+def _laws(joints: tuple[UrdfJoint, ...]) -> dict[str, _Law]:
+    """The law of every joint that follows another, directly or over others."""
+    by_name = {joint.name: joint for joint in joints}
+    laws: dict[str, _Law] = {}
+    for joint in joints:
+        slope, offset, at = 1.0, 0.0, joint
+        while at.mimic is not None:
+            slope, offset = slope * at.mimic.multiplier, offset + slope * at.mimic.offset
+            at = by_name[at.mimic.joint]
+        if at is not joint:
+            laws[joint.name] = _Law(at.name, slope, offset)
+    return laws
+
+
+def _with_constant_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJoint, ...], tuple[str, ...]]:
+    """Fix the joints that follow a fixed joint, or another one by a multiplier of zero."""
+    laws = _laws(joints)
+    fixed = {joint.name for joint in joints if joint.kind == "fixed"}
+    made, notes = [], []
+    for joint in joints:
+        law = laws.get(joint.name)
+        if law is None or (law.leader not in fixed and law.slope != 0.0):
+            made.append(joint)
+            continue
+        notes.append(f"joint {joint.name!r}: it mimics {law.leader!r}, which does not move it, so it is fixed")
+        if joint.kind == "prismatic":
+            moved = pin.SE3(np.eye(3), law.offset * joint.axis)
+        else:
+            moved = pin.SE3(pin.exp3(law.offset * joint.axis), np.zeros(3))
+        made.append(joint._replace(kind="fixed", origin=joint.origin * moved, mimic=None))
+    return tuple(made), tuple(notes)
+
+
+def _led_by_the_first(joints: tuple[UrdfJoint, ...], order: dict[str, int]) -> tuple[UrdfJoint, ...]:
+    """Let the first joint of those that move together lead; its limits are those of the file's leader."""
+    laws, by_name = _laws(joints), {joint.name: joint for joint in joints}
+    first: dict[str, str] = {}
+    for name in sorted({*laws, *(law.leader for law in laws.values())}, key=order.__getitem__):
+        first.setdefault(laws[name].leader if name in laws else name, name)
+    made = []
+    for joint in joints:
+        law = laws.get(joint.name, _Law(joint.name, 1.0, 0.0))
+        if law.leader not in first:
+            made.append(joint)
+            continue
+        # a turning joint without limits would be a point on a circle, which nothing can follow
+        kind = "prismatic" if joint.kind == "prismatic" else "revolute"
+        head = first[law.leader]
+        if joint.name != head:
+            base = laws.get(head, _Law(head, 1.0, 0.0))
+            slope = law.slope / base.slope
+            made.append(joint._replace(kind=kind, mimic=Mimic(head, slope, law.offset - slope * base.offset)))
+            continue
+        leader = by_name[law.leader]
+        ends = sorted(law.slope * end + law.offset for end in (leader.lower, leader.upper))
+        made.append(
+            joint._replace(
+                kind=kind, mimic=None, lower=ends[0], upper=ends[1], velocity=abs(law.slope) * leader.velocity
+            )
+        )
+    return tuple(made)
+
+
+def _build(urdf: UrdfFile, joints: tuple[UrdfJoint, ...], root: str, mimic: bool) -> pin.Model:
+    base = [pin.JointModelFreeFlyer()] if root == "free" else []
+    try:
+        return pin.buildModelFromXML(_text(urdf, joints), *base, mimic=mimic)
+    except Exception as error:  # what passed our checks and still fails in urdfdom
+        reason = " ".join(str(error).split())
+        raise FileFormatError(f"{urdf.path}: Pinocchio cannot read it ({reason}); mend the file") from error
+
+
+def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:
+    """The links and joints as a URDF without shapes, each number as it was read."""
+    robot = Element("robot", name=urdf.name)
+    for name in urdf.links:
+        link = SubElement(robot, "link", name=name)
+        if name in urdf.inertials:
+            _add_inertial(link, urdf.inertials[name])
+    for joint in joints:
+        made = SubElement(robot, "joint", name=joint.name, type=joint.kind)
+        SubElement(made, "parent", link=joint.parent)
+        SubElement(made, "child", link=joint.child)
+        angles = pin.rpy.matrixToRpy(joint.origin.rotation)
+        SubElement(made, "origin", xyz=_numbers(joint.origin.translation), rpy=_numbers(angles))
+        if joint.kind not in ("fixed", "floating"):
+            SubElement(made, "axis", xyz=_numbers(joint.axis))
+        if joint.kind in ("revolute", "prismatic"):  # urdfdom asks for limits; the real ones are set afterwards
+            SubElement(made, "limit", lower="-1", upper="1", effort="1", velocity="1")
+        if joint.mimic is not None:
+            multiplier, offset = (repr(float(value)) for value in joint.mimic[1:])
+            SubElement(made, "mimic", joint=joint.mimic.joint, multiplier=multiplier, offset=offset)
+    return ElementTree.tostring(robot, encoding="unicode")
+
+
+def _add_inertial(link: Element, given: Element) -> None:
+    inertial = SubElement(link, "inertial")
+    for tag, names in (("origin", ("xyz", "rpy")), ("mass", ("value",)), ("inertia", _INERTIA)):
+        element = given.find(tag)
+        if element is not None:
+            SubElement(inertial, tag, {name: element.get(name, "") for name in names if element.get(name)})
+
+
+def _numbers(values: object) -> str:
+    return " ".join(repr(float(value)) for value in np.asarray(values))
+
+
+def _set_limits(model: pin.Model, joints: tuple[UrdfJoint, ...]) -> None:
+    lower, upper = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)
+    velocity, effort = np.array(model.velocityLimit), np.array(model.effortLimit)
+    for joint in joints:
+        if not model.existJointName(joint.name) or joint.mimic is not None:
+            continue
+        made = model.joints[model.getJointId(joint.name)]
+        if made.nv == 1:
+            velocity[made.idx_v], effort[made.idx_v] = joint.velocity, joint.effort
+            if made.nq == 1:
+                lower[made.idx_q], upper[made.idx_q] = joint.lower, joint.upper
+    model.lowerPositionLimit, model.upperPositionLimit = lower, upper
+    model.velocityLimit, model.effortLimit = velocity, effort

@@ -1,0 +1,129 @@
+"""XML files of robots: read whole, and their numbers with their place, refused where no robot has them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.errors import FileFormatError
+from wholebody.files import read_bytes
+
+MOST_BYTES = 64 * 2**20
+"""Largest file that is taken for a description of a robot."""
+
+
+MOST = 1e12
+"""Largest number that is taken for a mass, a length, a speed or an inertia in SI units; more is a mistake."""
+
+
+def read_xml(path: Path, kind: str) -> Element:
+    """Return the outermost element of an XML file.
+
+    Args:
+        path: the file.
+        kind: what it should be, for the error's sentence: "URDF".
+
+    Raises:
+        FileFormatError: no file, too large, not text, an unknown encoding, or broken XML.
+    """
+    data = read_bytes(path, kind, MOST_BYTES)
+    try:
+        return ElementTree.fromstring(data)
+    except ElementTree.ParseError as error:
+        if not _is_text(data):
+            raise FileFormatError(f"{path}: this is not a text file; give a {kind}") from None
+        raise FileFormatError(f"{path}: the XML is broken ({error}); mend that place") from None
+    except (LookupError, ValueError) as error:
+        raise FileFormatError(
+            f"{path}: its encoding cannot be read ({error}); save the file as UTF-8 and say so in its first line"
+        ) from None
+
+
+def _is_text(data: bytes) -> bool:
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return False
+    return b"\0" not in data
+
+
+def unique_names(elements: Sequence[Element], kind: str, path: Path) -> tuple[str, ...]:
+    """Return the names of elements.
+
+    Raises:
+        FileFormatError: an element without a name, or two of one name.
+    """
+    names: dict[str, None] = {}
+    for k, element in enumerate(elements):
+        name = element.get("name")
+        if not name:
+            raise FileFormatError(f"{path}: {kind} number {k + 1} has no name; give it one")
+        if name in names:
+            raise FileFormatError(f"{path}: two {kind}s are called {name!r}; rename one")
+        names[name] = None
+    return tuple(names)
+
+
+def numbers(element: Element, name: str, place: str, count: int, default: str | None = None) -> tuple[float, ...]:
+    """Return the finite numbers of an attribute.
+
+    Args:
+        element: the element.
+        name: of the attribute.
+        place: of the element in the file, for the error's sentence.
+        count: how many numbers there must be.
+        default: what an attribute that is missing says; without it the attribute must be there.
+
+    Raises:
+        FileFormatError: another count, not numbers, or not finite.
+    """
+    text: Any = element.get(name, default)
+    try:
+        found = tuple(float(word) for word in text.split())
+    except (ValueError, AttributeError):
+        found = ()
+    if len(found) != count or not all(math.isfinite(number) for number in found):
+        wanted = "a finite number" if count == 1 else f"{count} finite numbers"
+        raise FileFormatError(f"{place}: <{element.tag}> has {name}={_short(text)}; give {wanted}")
+    return found
+
+
+def bounded(
+    element: Element, name: str, place: str, count: int, default: str | None = None, most: float = MOST
+) -> tuple[float, ...]:
+    """Return the numbers of an attribute, none of them larger than `most`.
+
+    Raises:
+        FileFormatError: as `numbers`, or one that is too large.
+    """
+    found = numbers(element, name, place, count, default)
+    if max(abs(number) for number in found) > most:
+        raise FileFormatError(
+            f"{place}: <{element.tag}> has {name}={_short(element.get(name))}; give SI units, at most {most:g}"
+        )
+    return found
+
+
+def placement(element: Element, place: str, most: float) -> pin.SE3:
+    """Return the ``<origin>`` of an element; the identity without one.
+
+    Raises:
+        FileFormatError: numbers that are not finite, or a place farther than `most` metres away.
+    """
+    origin = element.find("origin")
+    if origin is None:
+        return pin.SE3.Identity()
+    roll, pitch, yaw = bounded(origin, "rpy", place, 3, "0 0 0", 1e6)
+    return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(bounded(origin, "xyz", place, 3, "0 0 0", most)))
+
+
+def _short(text: object) -> str:
+    shown = repr(text)
+    return shown if len(shown) <= 60 else f"{shown[:57]}..."

@@ -1,0 +1,173 @@
+"""Convex hulls that coal can be trusted with.
+
+coal's own ``ConvexBase.convexHull`` crashes the process on flat or collinear points and takes NaN without a word, so
+hulls are computed by qhull through scipy and everything is checked before coal sees it.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from wholebody.errors import InputError
+from wholebody.geometry.outer_hull import outer_hull
+from wholebody.geometry.pieces import LARGEST, SMALLEST, Array, Piece
+
+MOST_NEIGHBOURS = 255
+"""Edges at one vertex that coal can count."""
+
+FEW = 1000
+"""Points up to which duplicates are dropped before their hull is made: qhull drops those of many by itself."""
+
+MOST_LOOKED_AT = 1000
+"""Faces across which the width of a hull is measured, those nearest to its middle."""
+
+MANY_EDGES = 128
+"""Vertices of the hull around one that has more edges at a vertex than coal can count."""
+
+
+def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] | None = None) -> Piece:
+    """Convex hull of points, with its origin at the centre of the smallest sphere around it.
+
+    Args:
+        points: (n, 3), metres, n >= 4; duplicates and inner points are dropped.
+        what: what the points are, for the error's sentence.
+        vertices: (most, few): a hull with more than `most` vertices is replaced by one around it that has no more than
+            `few`, at least 8. Without it only a hull that coal cannot take, with more than `MOST_NEIGHBOURS` edges at a
+            vertex, is replaced.
+
+    Raises:
+        InputError: not (n, 3), not finite, fewer than four different points, or thinner than `SMALLEST` in some
+            direction (flat and collinear points too).
+    """
+    cloud = _finite_points(points, what)
+    if len(cloud) < FEW:
+        cloud = np.unique(cloud, axis=0)
+    hull = _solid_hull(cloud, what)
+    if vertices is not None and len(hull.vertices) > vertices[0]:
+        hull = _solid_hull(outer_hull(cloud[hull.vertices], vertices[1]), what)
+    if np.bincount(hull.simplices.ravel()).max() > MOST_NEIGHBOURS:
+        hull = _solid_hull(outer_hull(cloud[hull.vertices], MANY_EDGES), what)
+    used = hull.vertices
+    corners = hull.points[used]
+    centre, _ = enclosing_ball(corners)
+    corners = corners - centre
+    number = np.full(len(hull.points), -1)
+    number[used] = np.arange(len(used))
+    faces = number[hull.simplices]
+    normals = np.cross(corners[faces[:, 1]] - corners[faces[:, 0]], corners[faces[:, 2]] - corners[faces[:, 0]])
+    inward = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) < 0
+    faces[inward] = faces[inward][:, [0, 2, 1]]
+    return Piece(coal_convex(corners, faces), pin.SE3(np.eye(3), centre), float(hull.volume))
+
+
+def thickened(points: Array) -> Array:
+    """Corners of a cube of twice `SMALLEST` about every point: a hull of them is solid, however thin the points are."""
+    cube = SMALLEST * np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    return np.asarray((points[:, None] + cube).reshape(-1, 3))
+
+
+def coal_convex(corners: Array, faces: NDArray[np.int_]) -> Any:
+    """Return coal's Convex of corners (n, 3) and outward triangles (m, 3)."""
+    import coal
+
+    vertices = coal.StdVec_Vec3s()
+    vertices.extend(list(corners))
+    triangles = coal.StdVec_Triangle()
+    triangles.extend([coal.Triangle(*map(int, face)) for face in faces])
+    return coal.Convex(vertices, triangles)
+
+
+def check_points(points: ArrayLike, what: str) -> Array:
+    """Return points as a float array (n, 3) without duplicates.
+
+    Raises:
+        InputError: another shape, not finite, or farther than `LARGEST` from the origin.
+    """
+    return np.unique(_finite_points(points, what), axis=0)
+
+
+def _finite_points(points: ArrayLike, what: str) -> Array:
+    try:
+        cloud = np.asarray(points, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{what}: the points are not numbers; give an array of shape (n, 3)") from None
+    if cloud.ndim != 2 or cloud.shape[1:] != (3,):
+        raise InputError(f"{what}: the points have shape {cloud.shape}; give an array of shape (n, 3)")
+    bad = np.flatnonzero(~np.isfinite(cloud).all(axis=1))
+    if len(bad):
+        raise InputError(f"{what}: point {bad[0]} is {cloud[bad[0]].tolist()}; give finite numbers")
+    if len(cloud) and np.abs(cloud).max() > LARGEST:
+        raise InputError(
+            f"{what}: a point lies {np.abs(cloud).max():.4g} m from the origin; give metres, at most {LARGEST:g}"
+        )
+    return cloud
+
+
+def _solid_hull(cloud: Array, what: str) -> Any:
+    """Hull of a cloud that is solid, by qhull: a thin one never reaches qhull, nor coal."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    if len(cloud) < 4:
+        raise InputError(
+            f"{what}: {len(cloud)} different points enclose no volume; give at least four that are not in a plane"
+        )
+    centred = cloud - cloud.mean(axis=0)
+    spread = np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1][:, ::-1], axis=0)
+    if spread.min() < SMALLEST:
+        shape = "in one place" if spread[0] < SMALLEST else "on a line" if spread[1] < SMALLEST else "in a plane"
+        raise InputError(f"{what}: all points lie {shape} to {SMALLEST} m; give points that enclose a volume")
+    try:
+        hull = ConvexHull(cloud)
+    except QhullError as error:
+        raise InputError(
+            f"{what}: qhull finds no volume in the points ({str(error).splitlines()[0]}); give solid points"
+        ) from None
+    corners = cloud[hull.vertices]
+    inside = -(hull.equations[:, :3] @ corners.mean(axis=0) + hull.equations[:, 3])
+    if inside.min() < SMALLEST:  # no ball of that size is known to be inside: the width itself is asked for
+        thin = np.argsort(inside)[:MOST_LOOKED_AT]
+        width = -(corners @ hull.equations[thin, :3].T + hull.equations[thin, 3]).min(axis=0)
+        if width.min() < SMALLEST:
+            raise InputError(f"{what}: the points are {width.min():.2g} m thick; give at least {SMALLEST} m")
+    return hull
+
+
+def enclosing_ball(points: Array) -> tuple[Array, float]:
+    """Smallest ball that holds points (n, 3): centre (3,) and radius.
+
+    An exchange of bases: the ball of at most four points on its surface is enlarged by the farthest point outside until
+    there is none. The radius grows with each exchange, so it ends (Welzl 1991 has the theory; this is a pivoting form).
+    """
+    scale = float(np.ptp(points, axis=0).max()) or 1.0
+    basis = [int(((points - points.mean(axis=0)) ** 2).sum(axis=1).argmax())]
+    centre, radius = points[basis[0]], 0.0
+    for _ in range(10 * len(points)):
+        distance = np.linalg.norm(points - centre, axis=1)
+        far = int(distance.argmax())
+        if distance[far] <= radius + 1e-12 * scale or far in basis:
+            break
+        basis, centre, radius = _smallest_basis(points, [*basis, far], scale)
+    return centre, float(np.linalg.norm(points - centre, axis=1).max())
+
+
+def _smallest_basis(points: Array, candidates: list[int], scale: float) -> tuple[list[int], Array, float]:
+    """Of all balls through one to four of at most five points, the smallest that holds the five."""
+    best: tuple[list[int], Array, float] | None = None
+    for size in range(1, min(4, len(candidates)) + 1):
+        for chosen in combinations(candidates, size):
+            corners = points[list(chosen)]
+            edges = corners[1:] - corners[0]
+            offset = np.linalg.lstsq(2 * edges, (edges**2).sum(axis=1), rcond=None)[0] if size > 1 else np.zeros(3)
+            centre, radius = corners[0] + offset, float(np.linalg.norm(offset))
+            inside = np.linalg.norm(points[candidates] - centre, axis=1).max() <= radius + 1e-10 * scale
+            if inside and (best is None or radius < best[2]):
+                best = (list(chosen), centre, radius)
+    if best is None:  # rounding among nearly concyclic points: any ball that holds them will do
+        centre = points[candidates].mean(axis=0)
+        best = (candidates[-4:], centre, float(np.linalg.norm(points[candidates] - centre, axis=1).max()))
+    return best

@@ -1,0 +1,242 @@
+"""Convex pieces of meshes kept on disk: what took seconds the first time takes milliseconds afterwards.
+
+An entry is one file, named after the content it was made from and the settings. It is written beside its place and
+moved there whole, so that any number of processes may read and write at once; it begins with its own checksum, and one
+that does not match is thrown away. Where the folder cannot be written, nothing is kept.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.geometry.hull import coal_convex
+from wholebody.geometry.pieces import Piece
+from wholebody.version import __version__
+
+VARIABLE = "WHOLEBODY_CACHE"
+"""Environment variable that names another folder for the cache."""
+
+LARGEST_CACHE = 256 * 2**20
+"""Bytes that are kept; a mesh as hull takes 3 kB, a decomposition 20 kB."""
+
+LEFT_AFTER_EVICTION = 0.75
+"""Share of `LARGEST_CACHE` that is left when entries are thrown away: those that were not used for longest go first."""
+
+LOOKED_AT_EVERY = 64
+"""Writes of a process after which it looks at the size of the cache, and at its first."""
+
+TOUCHED_EVERY = 3600.0
+"""Seconds after which a read marks its entry as used again."""
+
+STALE = 600.0
+"""Seconds after which a file that a killed process left half-written is removed."""
+
+_FORMAT = "1"
+_SUFFIX = ".pieces"
+_PART = ".part"
+_CHECKSUM = hashlib.sha256().digest_size
+
+_writes = 0
+
+
+class ConvexPieces(NamedTuple):
+    """A mesh as a union of convex pieces.
+
+    Attributes:
+        pieces: at least one.
+        added_volume: volume of all pieces over the volume of the mesh, minus one; parts that are not closed do not
+            count, since they have no volume of their own.
+        notes: one sentence for each part that could not be kept as it is.
+    """
+
+    pieces: tuple[Piece, ...]
+    added_volume: float
+    notes: tuple[str, ...]
+
+
+class CacheState(NamedTuple):
+    """What is kept on disk.
+
+    Attributes:
+        folder: where.
+        entries: number of meshes.
+        size: bytes.
+        writable: whether this process can write there.
+    """
+
+    folder: Path
+    entries: int
+    size: int
+    writable: bool
+
+
+def cache_folder() -> Path:
+    """Return the folder of the cache, which need not exist: the user's of this platform, or what `VARIABLE` names."""
+    import platformdirs
+
+    named = os.environ.get(VARIABLE)
+    if named:
+        return Path(named)
+    return Path(platformdirs.user_cache_path("wholebody", appauthor=False)) / "convex-pieces"
+
+
+def kept(content: tuple[bytes, ...], settings: str, what: str, make: Callable[[], ConvexPieces]) -> ConvexPieces:
+    """Return pieces from the cache, or make them and keep them.
+
+    Args:
+        content: what they are made from.
+        settings: how, with the versions of the libraries that make them.
+        what: name of the mesh, with which all notes begin; the cache does not depend on it.
+        make: makes them.
+    """
+    digest = hashlib.sha256("\0".join((_FORMAT, __version__, settings)).encode())
+    for part in content:
+        digest.update(hashlib.sha256(part).digest())
+    path = cache_folder() / f"{digest.hexdigest()}{_SUFFIX}"
+    found = _read(path)
+    if found is not None:
+        return found._replace(notes=tuple(what + note for note in found.notes))
+    made = make()
+    _write(path, made._replace(notes=tuple(note.removeprefix(what) for note in made.notes)))
+    return made
+
+
+def cache_state() -> CacheState:
+    """Look at the cache."""
+    folder = cache_folder()
+    files = _entries(folder)
+    place = folder
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    return CacheState(folder, len(files), sum(size for _, size, _ in files), os.access(place, os.W_OK | os.X_OK))
+
+
+def clear_cache() -> CacheState:
+    """Throw all entries away; return what there was."""
+    state = cache_state()
+    for file in [*state.folder.glob(f"*{_SUFFIX}"), *state.folder.glob(f"*{_PART}")]:
+        file.unlink(missing_ok=True)
+    return state
+
+
+def _read(path: Path) -> ConvexPieces | None:
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    try:
+        if hashlib.sha256(data[_CHECKSUM:]).digest() != data[:_CHECKSUM]:
+            raise ValueError("the checksum does not match")
+        found = _unpacked(data[_CHECKSUM:])
+    except Exception:  # another program's file, or a disk that failed: made anew
+        path.unlink(missing_ok=True)
+        return None
+    try:
+        if time.time() - path.stat().st_mtime > TOUCHED_EVERY:
+            os.utime(path)
+    except OSError:
+        pass
+    return found
+
+
+def _write(path: Path, pieces: ConvexPieces) -> None:
+    global _writes
+    packed = _packed(pieces)
+    part: str | None = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=_PART, delete=False) as file:
+            part = file.name
+            file.write(hashlib.sha256(packed).digest() + packed)
+        os.replace(part, path)
+    except OSError:  # a read-only or full disk: nothing is kept
+        if part is not None:
+            Path(part).unlink(missing_ok=True)
+        return
+    if _writes % LOOKED_AT_EVERY == 0:
+        _evict(path.parent)
+    _writes += 1
+
+
+def _evict(folder: Path) -> None:
+    """Throw away what was not used for longest, where there is too much, and what killed processes left."""
+    for file in folder.glob(f"*{_PART}"):
+        try:
+            if time.time() - file.stat().st_mtime > STALE:
+                file.unlink(missing_ok=True)
+        except OSError:
+            continue
+    files = sorted(_entries(folder))
+    size = sum(entry[1] for entry in files)
+    if size <= LARGEST_CACHE:
+        return
+    for _, bytes_, file in files:
+        if size <= LEFT_AFTER_EVICTION * LARGEST_CACHE:
+            return
+        try:
+            file.unlink(missing_ok=True)
+        except OSError:
+            continue
+        size -= bytes_
+
+
+def _entries(folder: Path) -> list[tuple[float, int, Path]]:
+    """Time of last use, size and path of every entry; another process may remove some meanwhile."""
+    found = []
+    for file in folder.glob(f"*{_SUFFIX}"):
+        try:
+            status = file.stat()
+        except OSError:
+            continue
+        found.append((status.st_mtime, status.st_size, file))
+    return found
+
+
+def _packed(found: ConvexPieces) -> bytes:
+    corners = [np.array(piece.geometry.points()) for piece in found.pieces]
+    faces = [_triangles(piece.geometry) for piece in found.pieces]
+    told = json.dumps([found.added_volume, found.notes]).encode()
+    buffer = io.BytesIO()
+    np.savez(
+        buffer,
+        corners=np.vstack(corners),
+        corner_count=np.array([len(part) for part in corners]),
+        faces=np.vstack(faces),
+        face_count=np.array([len(part) for part in faces]),
+        centre=np.array([piece.placement.translation for piece in found.pieces]),
+        volume=np.array([piece.volume for piece in found.pieces]),
+        told=np.frombuffer(told, dtype=np.uint8),
+    )
+    return buffer.getvalue()
+
+
+def _unpacked(data: bytes) -> ConvexPieces:
+    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        corners = np.split(arrays["corners"], np.cumsum(arrays["corner_count"])[:-1])
+        faces = np.split(arrays["faces"], np.cumsum(arrays["face_count"])[:-1])
+        pieces = tuple(
+            Piece(coal_convex(points, triangles), pin.SE3(np.eye(3), centre), float(volume))
+            for points, triangles, centre, volume in zip(
+                corners, faces, arrays["centre"], arrays["volume"], strict=True
+            )
+        )
+        added, notes = json.loads(arrays["told"].tobytes())
+    return ConvexPieces(pieces, float(added), tuple(notes))
+
+
+def _triangles(hull: object) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
+    shape: object = hull
+    count = shape.num_polygons  # type: ignore[attr-defined]
+    polygons = (shape.polygons(k) for k in range(count))  # type: ignore[attr-defined]
+    return np.array([[face[0], face[1], face[2]] for face in polygons], dtype=np.int64).reshape(-1, 3)

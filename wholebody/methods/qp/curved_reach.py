@@ -1,0 +1,172 @@
+"""The nearest that limbs come to goals out of reach, by Newton steps that know how bodies turn.
+
+A goal out of reach leaves a large residual, and Gauss-Newton steps, which neglect the residual's curvature, creep along
+a stretched limb for hundreds of iterations. Here the curvature is part of the program: with F the force that the
+weighted residual puts on a point p of a body, and w_j, v_j the angular and linear velocity that joint j gives it,
+
+    d2/dq_j dq_k (F . p) = F . (w_j x (v_k + w_k x p)),    j between the root and k,
+
+for goals and, by their multipliers, for holds (the Hessian of the Lagrangian; Nocedal and Wright 2006, section 18.1).
+Its positive part joins the program as soft rows. A dozen programs lead to a stationary point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.figures.state import State, Wrench
+from wholebody.geometry.moved_pairs import Placed
+from wholebody.linearisation import Lineariser
+from wholebody.methods.control import Control
+from wholebody.methods.passage import jumps
+from wholebody.methods.qp.quadratic_program import Array
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.subproblem import Rows, Subproblem
+from wholebody.methods.qp.visit import Local, Visit
+from wholebody.methods.qp.working_set import WorkingSet
+from wholebody.problem import Problem
+
+NOTHING = -1e3  # m: clearance at which no pair is looked at
+WITHIN = 0.12  # m: pairs nearer than this get rows
+RADIUS = 0.5  # rad, m: of the first step
+LARGEST_RADIUS = 1.0
+LEAST_RADIUS = 1e-4
+FLAT = 1e-3  # share of the violation that a step must be foreseen to gain, or the posture is stationary
+WORTH, POOR, GOOD = 0.05, 0.25, 0.6  # shares of the gain foreseen: a step is taken, was too long, may be longer
+SHRINK = 0.3
+NEGLIGIBLE = 1e-6  # share of the largest curvature below which a direction is left out
+
+
+class CurvedReach:
+    """Comes as near to a problem's goals as goes, with the curvature of what is pulled and held in every program."""
+
+    def __init__(self, problem: Problem, lineariser: Lineariser, solver: QPSolver, control: Control) -> None:
+        """Take a lineariser of the problem and what may end a descent."""
+        self._problem, self._lineariser, self._control = problem, lineariser, control
+        self._subproblem = Subproblem(problem, lineariser.state)
+        self._solver = solver
+
+    def through_everything(self, start: Array, enough: float, most: int) -> Local:
+        """Descend from a posture (nq,) within limits and constraints, as if nothing were there.
+
+        Args:
+            start: (nq,) where to begin.
+            enough: violation at which to end, metres and radians.
+            most: programs.
+
+        Returns:
+            A posture that may be inside of things; converged where nothing nearer is near.
+        """
+        lineariser = self._lineariser
+        goals, clearances = lineariser.goals, lineariser.clearances
+        lineariser.take(goals, np.full_like(clearances, NOTHING))
+        try:
+            return self._descend(start, enough, most, 0.0)
+        finally:
+            lineariser.take(goals, clearances)
+
+    def among_things(self, start: Array, enough: float, most: int) -> Local:
+        """Descend from a posture (nq,) and pass through nothing; arguments as of `through_everything`."""
+        return self._descend(start, enough, most, WITHIN)
+
+    def _descend(self, q: Array, enough: float, most: int, within: float) -> Local:
+        working_set = WorkingSet(self._solver)
+        here = self._visit(q, within)
+        push = np.zeros(len(here.rows.soft_error))
+        radius, used, converged = RADIUS, 0, False
+        while used < most and here.violation.worst > enough and radius > LEAST_RADIUS and not self._control.over:
+            used += 1
+            rows = here.rows
+            program = self._subproblem.program(
+                here.at, rows, 0.5 * radius, None, 0.0, np.zeros(len(rows.soft_error)), False
+            )
+            self._lineariser.state.update(here.at.q)
+            bend, weight = self._curvature(rows, push)
+            program = replace(
+                program,
+                rows=np.vstack([program.rows, bend]),
+                target=np.concatenate([program.target, np.zeros(len(bend))]),
+                weight=np.concatenate([program.weight, weight]),
+            )
+            x = working_set.solve(program, rows.key).x
+            foreseen = self._subproblem.violation(rows, x)
+            pull = float(rows.soft_weight[: rows.goals].max(initial=1.0))
+            goal = np.sqrt(foreseen.goal**2 + float(weight @ (bend @ x) ** 2) / pull)
+            gain = here.violation.total - foreseen._replace(goal=float(goal)).total
+            if gain <= FLAT * here.violation.total:
+                converged = True
+                break
+            there = self._visit(np.asarray(pin.integrate(self._lineariser.state.model, here.at.q, x)), within)
+            ratio = (here.violation.total - there.violation.total) / gain
+            step = float(np.abs(x).max(initial=0.0))
+            blocked = ratio > WORTH and within > 0.0 and self._jumps(here, there)
+            if ratio < POOR or blocked:
+                radius = SHRINK * min(radius, step)
+            elif ratio > GOOD and step > 0.7 * radius:
+                radius = min(2.0 * radius, LARGEST_RADIUS)
+            if ratio > WORTH and not blocked:
+                push = rows.soft_weight * (rows.soft @ x + rows.soft_error)
+                here = there
+        return Local(here.at.q, here.violation, here.at.measure, converged, used)
+
+    def _visit(self, q: Array, within: float) -> Visit:
+        at = self._lineariser.at(q, within)
+        rows = self._subproblem.rows(at)
+        return Visit(at, rows, self._subproblem.violation(rows), Placed(at.contacts, within))
+
+    def _jumps(self, here: Visit, there: Visit) -> bool:
+        return jumps(self._lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
+
+    def _curvature(self, rows: Rows, push: Array) -> tuple[Array, Array]:
+        """Soft rows (k, nv) and weights (k,) that stand for the positive curvature of what is pulled and held.
+
+        Args:
+            rows: of the linearisation at the state's posture.
+            push: (soft rows,) multipliers of the last program; goals pull with what is left of them.
+        """
+        state, nv = self._lineariser.state, self._lineariser.state.model.nv
+        force = np.concatenate([rows.soft_weight[: rows.goals] * rows.soft_error[: rows.goals], push[rows.goals :]])
+        total, row = np.zeros((nv, nv)), 0
+        for term in self._problem.goals:
+            part = term.jacobian(state)
+            size = len(part.rows) if isinstance(part, Wrench) else len(part)
+            if isinstance(part, Wrench) and part.against == 0:
+                total += _bending(state, part, force[row : row + size])
+            row += size
+        for held, equal in zip(self._problem.constraints, self._subproblem.equalities, strict=True):
+            if not equal:
+                continue
+            part = held.jacobian(state)
+            if isinstance(part, Wrench) and part.against == 0 and equal == len(part.rows):
+                total += _bending(state, part, force[row : row + equal])
+            row += equal
+        value, vector = np.linalg.eigh(total)
+        kept = value > NEGLIGIBLE * max(float(value.max(initial=0.0)), 1.0)
+        return vector[:, kept].T, value[kept]
+
+
+def _bending(state: State, part: Wrench, force: Array) -> Array:
+    """Second derivative (nv, nv) of force times place, for the rows of one term on one joint.
+
+    The rows are forces along the world's axes through a point, or moments, or both in this order; others have none.
+    """
+    linear = part.rows[:3]
+    nv = state.model.nv
+    if len(linear) == 3 and np.allclose(linear[:, :3], np.eye(3)):
+        F, moment = force[:3], force[3:6] if len(force) == 6 else np.zeros(3)
+        point = np.array([linear[1, 5], linear[2, 3], linear[0, 4]])
+    elif len(linear) == 3 and not linear[:, :3].any():
+        F, moment, point = np.zeros(3), force[:3], np.zeros(3)
+    else:
+        return np.zeros((nv, nv))
+    support = np.flatnonzero(state.support[part.joint])
+    v, w = state.jacobian[:3, support].T, state.jacobian[3:, support].T
+    moved = v + np.cross(w, point)
+    upper = np.triu(np.cross(F, w) @ moved.T + 0.5 * np.cross(moment, w) @ w.T)
+    upper += np.triu(upper, 1).T
+    total = np.zeros((nv, nv))
+    total[np.ix_(support, support)] = upper
+    return total
