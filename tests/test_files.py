@@ -118,8 +118,12 @@ def test_what_a_killed_process_leaves_is_removed_by_the_next(tmp_path: Path, mon
 
 def test_folders_that_are_not_ours_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    (tmp_path / "wholebody-being-made").mkdir()  # its process is about to lock it
+    (tmp_path / "wholebody-scratch-being-made").mkdir()  # its process is about to lock it
     (tmp_path / "other").mkdir()
-    (tmp_path / "wholebody-link").symlink_to(tmp_path / "other")
+    (tmp_path / "wholebody-scratch-link").symlink_to(tmp_path / "other")
     files.Scratch().close()
-    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["other", "wholebody-being-made", "wholebody-link"]
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == [
+        "other",
+        "wholebody-scratch-being-made",
+        "wholebody-scratch-link",
+    ]

@@ -183,7 +183,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         return term.resolve(person, person.figure.neutral)
 
     yield "load", Call(lambda spec, **options: wb.load(spec, **options), {"spec": path / "arm.urdf"})
-    for option, value in {"root": "fixed", "package_dirs": [path]}.items():
+    for option, value in {"root": "fixed", "package_dirs": [path], "concavity": 0.5, "samples": 10, "seed": 0}.items():
         yield f"load({option})", Call(wb.load, {"spec": path / "arm.urdf", option: value})
     for option, value in {"sex": "male", "stature": 1.7, "mass": 70.0, "detail": "spheres"}.items():
         yield f"load({option})", Call(lambda _option=option, **given: wb.load("human", **given), {option: value})
@@ -462,6 +462,8 @@ OF_METHODS = ("Tracker", "NewtonTracker")
 
 DERIVATIVES = (
     "companion",
+    "folded",
+    "spread",
     "resolve",
     "error",
     "jacobian",

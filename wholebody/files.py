@@ -28,7 +28,7 @@ LARGEST = 1_000_000_000
 LONGEST_NAME = 200
 """Characters of a path that a sentence repeats."""
 
-PREFIX = "wholebody-"
+PREFIX = "wholebody-scratch-"
 """What the names of our scratch folders begin with."""
 
 LOCK = "in-use"

@@ -68,7 +68,7 @@ def test_the_tables_go_into_the_documentation(tmp_path: Path) -> None:
     [
         (["hand_on_tabel"], "no scene is called 'hand_on_tabel'; did you mean hand_on_table"),
         (["two_arms", "--overlap", "springs"], "--overlap: no way to remove overlap is called 'springs'"),
-        (["two_arms", "--frames", "0"], "give 1 or more"),
+        (["two_arms", "--frames", "0"], "frames is 0; give a whole number between 1"),
         (["two_arms", "--out", "/dev/null/pictures"], "/dev/null/pictures"),
         (["two_arms", "--update-docs", "nowhere"], "nowhere"),
     ],

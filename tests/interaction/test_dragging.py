@@ -109,7 +109,7 @@ def test_a_frame_keeps_its_orientation() -> None:
 def test_mistakes_are_named(problem: wb.Problem) -> None:
     with pytest.raises(wb.InputError, match="places"):
         drag_along(problem, [(0.0, 0.0)])
-    with pytest.raises(wb.InputError, match="number 4"):
+    with pytest.raises(wb.InputError, match="the number of the goal is 4"):
         present_place(problem, 4)
     with pytest.raises(wb.UnknownNameError, match="method"):
         drag_along(problem, [(0.4, -0.25, 0.9)], "jacobi")

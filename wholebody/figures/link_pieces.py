@@ -12,7 +12,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.checks import known, number, shown
+from wholebody.errors import InputError
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
 from wholebody.geometry.hull import hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces, kept
@@ -56,6 +57,10 @@ class LinkShape(NamedTuple):
     name: str = ""
 
 
+CONCAVITY = (0.01, 1.0)
+"""What convex pieces of a mesh may leave, as a share of its size: close, and hulls."""
+
+
 def check_concavity(concavity: object, links: Iterable[str]) -> Concavity:
     """Return what was asked for, checked.
 
@@ -63,23 +68,15 @@ def check_concavity(concavity: object, links: Iterable[str]) -> Concavity:
         InputError: not None, a number from 0.01 to 1, or a mapping to such numbers.
         UnknownNameError: a link that is not there.
     """
-    known = tuple(links)
+    names = tuple(links)
     if concavity is None:
         return None
     if isinstance(concavity, Mapping):
-        for link, value in concavity.items():
-            if link not in known:
-                raise UnknownNameError("link", str(link), known, "concavity")
-            _check_share(value, f"concavity of link {link!r}")
-        return {str(link): float(value) for link, value in concavity.items()}
-    _check_share(concavity, "concavity")
-    return float(concavity)  # type: ignore[arg-type]
-
-
-def _check_share(value: object, what: str) -> None:
-    number = isinstance(value, (int, float, np.floating, np.integer)) and not isinstance(value, bool)
-    if not number or not 0.01 <= float(value) <= 1.0:  # type: ignore[arg-type]
-        raise InputError(f"{what} is {value!r}; give a number between 0.01 (close) and 1 (hulls), or None for hulls")
+        return {
+            known(link, names, "link", "concavity"): number(value, f"concavity of link {shown(link)}", *CONCAVITY)
+            for link, value in concavity.items()
+        }
+    return number(concavity, "concavity", *CONCAVITY, "or None for hulls")
 
 
 def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any, pin.SE3]], tuple[str, ...]]:

@@ -68,7 +68,7 @@ def _check_options(builder: Callable[..., Figure], options: dict[str, Any], wher
                 [value] if isinstance(value, (str, PathLike)) else listed(value, f"{where}: {option}", "['share']")
             )
             options[option] = [path(folder, f"{where}: {option}") for folder in folders]
-        elif option in ("root", "detail", "side"):
+        elif option in ("detail", "side") or (option == "root" and value is not None):
             text(value, f"{where}: {option}")
         elif option == "samples":
             whole(value, f"{where}: {option}", 0, MOST_SAMPLES)

@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.errors import FileFormatError
+from wholebody.files import read_bytes
 
 MOST_BYTES = 64 * 2**20
 """Largest file that is taken for a description of a robot."""
@@ -32,20 +33,7 @@ def read_xml(path: Path, kind: str) -> Element:
     Raises:
         FileFormatError: no file, too large, not text, an unknown encoding, or broken XML.
     """
-    try:
-        if not path.is_file():
-            raise FileFormatError(
-                f"{path}: there is no such file; give the path of a {kind}, or 'human', 'avatar', 'hand'"
-            )
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-    except (OSError, ValueError) as error:
-        if isinstance(error, FileFormatError):
-            raise
-        reason = getattr(error, "strerror", None) or str(error)
-        raise FileFormatError(f"{_shown(path)}: it cannot be read ({reason}); give another path") from None
-    if len(data) > MOST_BYTES:
-        raise FileFormatError(f"{path}: it has more than {MOST_BYTES // 2**20} MB; give a {kind}")
+    data = read_bytes(path, kind, MOST_BYTES)
     try:
         return ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
@@ -64,11 +52,6 @@ def _is_text(data: bytes) -> bool:
     except UnicodeDecodeError:
         return False
     return b"\0" not in data
-
-
-def _shown(path: Path) -> str:
-    text = str(path)
-    return text if len(text) <= 200 else f"{text[:100]}...{text[-60:]}"
 
 
 def unique_names(elements: Sequence[Element], kind: str, path: Path) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from wholebody.assessment import assess
 from wholebody.errors import InputError
 from wholebody.files import check_writable, write
 from wholebody.geometry.placement import FARTHEST
+from wholebody.problem import Problem
 from wholebody.view import style
 from wholebody.view.commands import look
 from wholebody.view.composition import Composition
@@ -111,7 +112,7 @@ class Viewer:
             InputError: q has the wrong shape or is not finite.
         """
         posture = self._composition.checked(q)
-        blockers = () if problem is None else assess(problem, posture).blockers
+        blockers = assess(problem, posture).blockers if isinstance(problem, Problem) else ()
         moment = self._composition.moment(posture, problem, blockers)
         self._seen, self._motion = [posture], None
         if self._stage.store.camera is None:

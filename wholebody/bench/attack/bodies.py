@@ -103,14 +103,12 @@ def robot(rng: np.random.Generator, scale: float | None = None) -> Body:
 
 
 def _called(call: str, size: float, people: bool = False, files: Mapping[str, bytes] | None = None) -> Body:
-    import tempfile
-    from pathlib import Path
-
     from wholebody.figures.shipped import task_paths, urdf_path
+    from wholebody.files import Scratch
 
-    with tempfile.TemporaryDirectory() as folder:
+    with Scratch() as folder:
         for name, text in (files or {}).items():
-            (Path(folder) / name).write_bytes(text)
-        known = {"wb": wb, "HERE": Path(folder), "task_paths": task_paths, "urdf_path": urdf_path}
+            (folder / name).write_bytes(text)
+        known = {"wb": wb, "HERE": folder, "task_paths": task_paths, "urdf_path": urdf_path}
         figure = eval(call, known)
     return Body(figure, call, size, people, files or {})

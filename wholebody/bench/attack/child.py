@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import resource
 import signal
-import tempfile
 import time
 import traceback
 from multiprocessing.connection import Connection
@@ -17,6 +16,7 @@ from pathlib import Path
 
 from wholebody.bench.attack.case import SCRIPT, Verdict, Written, write
 from wholebody.errors import WholebodyError
+from wholebody.files import Scratch
 
 WRITING = 300.0  # s: to write a case
 WARMING = 1800.0  # s: to compile everything on a machine that has other things to do
@@ -60,8 +60,7 @@ def serve(ear: Connection, deadline: float) -> None:
 
 def run(prepared: Written) -> Verdict:
     """Run a case in a folder of its own, and return its verdict: "wrong" for an error that is none of ours."""
-    with tempfile.TemporaryDirectory(prefix="wholebody-attack-") as name:
-        folder = Path(name)
+    with Scratch() as folder:
         put(prepared, folder)
         began = time.process_time()
         known: dict[str, object] = {"__name__": "__main__", "__file__": str(folder / SCRIPT)}

@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from wholebody.bench.machine import sentence
 from wholebody.bench.robots.reaching import Loaded
 from wholebody.bench.tables import markdown
 from wholebody.errors import InputError
+from wholebody.files import Scratch
 from wholebody.geometry.mesh_cache import VARIABLE
 
 LONGEST = 300.0
@@ -72,9 +72,9 @@ def measure(folder: Path, reaches: int) -> Iterator[Robot]:
         reaches: of each robot.
     """
     for path in descriptions(folder):
-        with tempfile.TemporaryDirectory(prefix="wholebody-robots-") as cache:
-            first = _examined(path, 0, cache)
-            again = _examined(path, reaches, cache) if not first.refused else None
+        with Scratch() as cache:
+            first = _examined(path, 0, str(cache))
+            again = _examined(path, reaches, str(cache)) if not first.refused else None
         yield Robot(str(path.relative_to(folder)), first, again)
 
 
