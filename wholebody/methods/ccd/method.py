@@ -137,7 +137,7 @@ class CCD:
         check_problem(problem, "CCD.pushed_out: problem")
         q = posture(q, problem.scene.model.nq)
         with problem.lend() as workspace:
-            return _Search(self, problem, workspace, Control()).pushed_out(q)
+            return _Search(self, problem, workspace, Control(np.inf)).pushed_out(q)
 
     def _status(self, best: _Trial, judgement: Assessment) -> Status:
         slack = 1.05 * self.tolerance + 1e-6

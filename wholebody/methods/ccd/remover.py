@@ -80,7 +80,7 @@ class Remover:
             exact: where PD_g cancels, look for the least translation that separates, which takes up to 0.1 s.
             control: what may end the pushing.
         """
-        self.control = Control() if control is None else control
+        self.control = Control(np.inf) if control is None else control
         self.exact, self.skin = exact, SKIN
         self.scene, self.workspace, self.clearances, self.touch = scene, workspace, clearances, touch
         self._within = 0.0 if clearances is None else float(clearances.max(initial=0.0))

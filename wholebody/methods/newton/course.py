@@ -23,7 +23,7 @@ class Course:
     """
 
     longest = np.inf
-    control = Control()
+    control = Control(np.inf)
 
     def __init__(self, system: System, algebra: LinearAlgebra) -> None:
         """Take equations that do not change."""

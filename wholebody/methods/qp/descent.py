@@ -79,7 +79,7 @@ class Descent:
     measures: bool = True
     hasty: bool = False
     eager: bool = False
-    control: Control = field(default_factory=Control)
+    control: Control = field(default_factory=lambda: Control(np.inf))
     hopeless: Callable[[Array], bool] | None = None
 
     def __post_init__(self) -> None:

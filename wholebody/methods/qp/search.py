@@ -80,6 +80,8 @@ class Search:
         """Try one way after the other until the goals are met; the best that was found."""
         self._try_ways()
         self._settle()
+        if self._out_of_reach:  # which is known, although a nearer posture may be near
+            self._best = self.best._replace(converged=True)
         return self.best._replace(converged=False) if self.control.reason else self.best
 
     def _try_ways(self) -> None:
@@ -177,7 +179,7 @@ class Search:
         Where all of several descents without contacts, from postures all over the limits, come to rest at the same
         distance, it is the nearest that limits and constraints allow. Local minima are told by their differing.
         """
-        if self._out_of_reach is not None or not self.problem.goals:
+        if self._out_of_reach is not None or not (self.problem.goals and self.problem.scene.model.nv):
             return bool(self._out_of_reach)
         tolerance, state = self.settings.tolerance, self.lineariser.state
         reach = self._curved()
