@@ -64,7 +64,7 @@ def test_the_page_tells_every_case_with_its_picture_and_verdicts(found: Result) 
         assert f"### {case.title}\n\n{case.why}\n\n*Acceptable.* {case.acceptable}" in text
     assert "(assets/stability/edge-on-edge.jpg)" in text
     assert "| ● honest best effort: best known | `qp/osqp` |" in text
-    assert "| `qp/osqp` | 0 | 2 | 0 | 0 | 2 |" in text
+    assert "| `qp/osqp` | 0 | 2 | 0 | 0 | 0 | 2 |" in text
     assert "No answer was wrong." in text
     assert "`ccd`: wb.CCD()" in text
 

@@ -37,7 +37,8 @@ LEAST_RADIUS = 1e-4
 FLAT = 1e-3  # share of the violation that a step must be foreseen to gain, or the posture is stationary
 WORTH, POOR, GOOD = 0.05, 0.25, 0.6  # shares of the gain foreseen: a step is taken, was too long, may be longer
 SHRINK = 0.3
-NEGLIGIBLE = 1e-6  # share of the largest curvature below which a direction is left out
+DAMPING = 1e-2  # share of the largest curvature that every direction has at least; less: sets that go in circles
+NEGLIGIBLE = 1e-2  # share of the largest curvature below which a direction is left out
 
 
 class CurvedReach:
@@ -87,6 +88,7 @@ class CurvedReach:
             bend, weight = self._curvature(rows, push)
             program = replace(
                 program,
+                diagonal=np.maximum(program.diagonal, DAMPING * float(weight.max(initial=0.0))),
                 rows=np.vstack([program.rows, bend]),
                 target=np.concatenate([program.target, np.zeros(len(bend))]),
                 weight=np.concatenate([program.weight, weight]),
