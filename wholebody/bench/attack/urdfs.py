@@ -12,6 +12,8 @@ BRANCH = 0.2  # share of links that do not follow the last one
 BARE = 0.1  # share of links without a shape
 MOST = 8  # joints
 
+HEAVIEST = 1e5  # kg: heavier links are taken for a slip of units
+
 
 def robot(rng: np.random.Generator, scale: float) -> str:
     """Return a robot whose links are about 0.3 times the scale long, metres."""
@@ -50,7 +52,8 @@ def _joint(number: int, parent: int, length: float, rng: np.random.Generator, sc
 
 
 def _link(name: str, rng: np.random.Generator, scale: float, length: float) -> str:
-    mass, inertia = float(scale**3 * 100.0 + 1e-6), float(scale**5 + 1e-12)
+    mass = float(min(scale**3 * 100.0 + 1e-6, HEAVIEST))
+    inertia = float(mass * scale**2 / 100.0 + 1e-12)
     inertial = (
         f'<inertial><origin xyz="0 0 {length / 2!r}"/><mass value="{mass!r}"/>'
         f'<inertia ixx="{inertia!r}" iyy="{inertia!r}" izz="{inertia!r}" ixy="0" ixz="0" iyz="0"/></inertial>'

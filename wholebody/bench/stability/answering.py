@@ -65,7 +65,7 @@ def ask(case: HardCase, entrant: Entrant, alive: Callable[[], None] = lambda: No
 def _posed(question: Posed, entrant: Entrant) -> Answer:
     method = entrant.make(ASKED, question.iterations)
     if question.adjust is not None:
-        question.adjust(method)
+        method = question.adjust(method)
     solution = method.solve(question.problem)
     left = max(solution.assessment.goal_error, solution.assessment.goal_angle)
     return Answer(

@@ -26,12 +26,12 @@ class Posed:
     Attributes:
         problem: what is asked.
         iterations: most iterations that the method gets; None for its own default.
-        adjust: what is done to the method before it begins; None for nothing.
+        adjust: what takes the method's place, from the method; None for itself.
     """
 
     problem: Problem
     iterations: int | None = None
-    adjust: Callable[[Any], None] | None = None
+    adjust: Callable[[Any], Any] | None = None
 
 
 @dataclass(frozen=True)

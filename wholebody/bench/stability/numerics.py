@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -175,15 +176,17 @@ class QPLimit(HardCase):
         return kind in ("honest", "solved", "refusal")
 
 
-def unfinished(method: Any) -> None:
-    """Give a method's quadratic programs to `Unfinished`; a method without any gets one iteration itself."""
-    from wholebody.bench.stability.unfinished import Unfinished
-    from wholebody.methods.qp.solvers.base import QPSolver
+def unfinished(method: Any) -> Any:
+    """The method with quadratic programs that `Unfinished` solves; one without any gets one iteration itself."""
+    from wholebody.bench.stability.unfinished import UnfinishedQP
+    from wholebody.methods.qp.method import QP
 
-    if isinstance(getattr(method, "_solver", None), QPSolver):
-        method._solver = Unfinished()
-    elif hasattr(method, "iterations"):
-        method.iterations = 1
+    if isinstance(method, QP):
+        return UnfinishedQP(**{field.name: getattr(method, field.name) for field in fields(method)})
+    if is_dataclass(method) and not isinstance(method, type):
+        return replace(method, iterations=1)
+    method.iterations = 1  # an adapter of another tool
+    return method
 
 
 def _across() -> Problem:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from wholebody.methods.qp.active_set import guess_active_set
+from wholebody.methods.qp.method import QP
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import GUESS_TOLERANCE
+from wholebody.methods.qp.solvers.base import GUESS_TOLERANCE, QPSolver
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver, _Workspace
 
 LIMIT = 5  # iterations: OSQP takes 25 to some hundreds for programs of a reach
@@ -27,3 +28,11 @@ class Unfinished(OSQPSolver):
         x, used = self._workspace.run(LIMIT, 1e-3)
         x = x.clip(program.lower, program.upper)
         return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, used, self.name)
+
+
+class UnfinishedQP(QP):
+    """The QP method with such a solver."""
+
+    def qp_solver(self) -> QPSolver:
+        """One that never finishes."""
+        return Unfinished()

@@ -13,7 +13,7 @@ from wholebody.methods.contradictions import in_words, proven
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.qp.search import Search, Settings
-from wholebody.methods.qp.solvers.base import make_solver
+from wholebody.methods.qp.solvers.base import QPSolver, make_solver
 from wholebody.methods.qp.tracking import Tracker
 from wholebody.methods.qp.visit import Local
 from wholebody.problem import Problem, Solution, Status
@@ -82,7 +82,7 @@ class QP:
         began = time.perf_counter()
         settings = Settings(self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures)
         with problem.lend() as workspace, Control(self.time_limit, progress) as control:
-            search = Search(problem, workspace, make_solver(self.solver), settings, control)
+            search = Search(problem, workspace, self.qp_solver(), settings, control)
             best = search.run()
         judgement = assess(problem, best.q)
         status = _status(best, judgement, self.tolerance)
@@ -99,13 +99,17 @@ class QP:
             message=said + judgement.in_the_way,
         )
 
+    def qp_solver(self) -> QPSolver:
+        """A QP solver of the name in the settings, for one run."""
+        return make_solver(self.solver)
+
     def tracker(self, problem: Problem, dt: float) -> Tracker:
         """What follows the goals of a problem that move from call to call: one program a step of `dt` seconds.
 
         Raises:
             InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
         """
-        return Tracker(problem, make_solver(self.solver), dt)
+        return Tracker(problem, self.qp_solver(), dt)
 
 
 def _status(local: Local, judgement: Assessment, tolerance: float) -> Status:
