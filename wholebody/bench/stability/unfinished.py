@@ -33,6 +33,6 @@ class Unfinished(OSQPSolver):
 class UnfinishedQP(QP):
     """The QP method with such a solver."""
 
-    def qp_solver(self) -> QPSolver:
+    def _qp_solver(self) -> QPSolver:
         """One that never finishes."""
         return Unfinished()

@@ -82,7 +82,7 @@ class QP:
         began = time.perf_counter()
         settings = Settings(self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures)
         with problem.lend() as workspace, Control(self.time_limit, progress) as control:
-            search = Search(problem, workspace, self.qp_solver(), settings, control)
+            search = Search(problem, workspace, self._qp_solver(), settings, control)
             best = search.run()
         judgement = assess(problem, best.q)
         status = _status(best, judgement, self.tolerance)
@@ -99,7 +99,7 @@ class QP:
             message=said + judgement.in_the_way,
         )
 
-    def qp_solver(self) -> QPSolver:
+    def _qp_solver(self) -> QPSolver:
         """A QP solver of the name in the settings, for one run."""
         return make_solver(self.solver)
 
@@ -109,7 +109,7 @@ class QP:
         Raises:
             InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
         """
-        return Tracker(problem, self.qp_solver(), dt)
+        return Tracker(problem, self._qp_solver(), dt)
 
 
 def _status(local: Local, judgement: Assessment, tolerance: float) -> Status:
