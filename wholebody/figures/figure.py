@@ -22,7 +22,7 @@ from wholebody.figures.description import (
 LARGEST = 1e6
 """Largest value of a joint, radians or metres, and largest tolerance: what is beyond is a slip."""
 
-HEAVIEST = 1e6
+HEAVIEST = 1e12
 """Kilograms: greatest mass of what one joint carries."""
 
 ROOT_JOINT = "root_joint"
