@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +23,8 @@ ROOT = Path(__file__).resolve().parent.parent
 # A failure says how to repeat it. In CI, where CI is set, the examples are the same in every run.
 settings.register_profile("default", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True)
 settings.register_profile("ci", settings.get_profile("default"), derandomize=True, database=None)
+# Tests that press Ctrl-C do so as in a terminal; what runs in the background is started with it ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 # Pieces of meshes are made anew in every run of the tests, by the code under test.
 _CACHE = tempfile.TemporaryDirectory(prefix="wholebody-cache-")
 os.environ["WHOLEBODY_CACHE"] = _CACHE.name

@@ -16,6 +16,14 @@ from wholebody.methods.control import Control
 METHODS = {"qp": wb.QP, "ccd": wb.CCD, "newton": wb.Newton, "placo": wb.Placo, "dls": wb.DampedLeastSquares}
 
 
+@pytest.fixture(autouse=True)
+def listening():
+    """Ctrl-C as in a terminal; what starts the tests in the background ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.fixture(scope="module")
 def reach():
     """A hand asked for a place two metres away: every method works on it as long as it may."""

@@ -36,6 +36,7 @@ AGREEING = 5  # of them that have to come to rest equally near
 AGREE = 1.05  # times the least violation up to which they count as equally near
 COMING_NEAR = 40  # most programs from there to the nearest posture among things
 PUSHED_OUT = 2  # of the nearest ends of such descents, how many are pushed out of things
+FOR_WAYS = 0.5  # share of the time limit that ways after the first may take: to come nearest takes its time too
 STAGES = (0.25, 0.5, 0.75)  # of the way to the goals, when the straight attempt ends in a local minimum
 
 
@@ -98,7 +99,7 @@ class Search:
             self._bent(start), self._scouted(islice(starts, FIRST)), self._staged(start), self._scouted(starts)
         )
         for local, how in ways:
-            if self._accept(local, how) or self._left <= 0 or self.control.over:
+            if self._accept(local, how) or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
 
     def _bent(self, start: Array) -> Iterator[tuple[Local, str]]:
@@ -123,7 +124,7 @@ class Search:
         a row, although nothing was in their way, came no nearer than the best posture, the goals are out of reach.
         """
         for q in starts:
-            if self._in_vain == NO_NEARER or self._left <= 0 or self.control.over:
+            if self._in_vain == NO_NEARER or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
             ghost = self._scout(q, GHOST)
             nearer = ghost.violation.left < (1.0 - NEARER) * self.best.violation.left
