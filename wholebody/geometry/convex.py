@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import logging
+import pickle
+import subprocess
+import sys
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 
 import numpy as np
 import pinocchio as pin
@@ -191,19 +195,35 @@ def _thickened(points: Array, name: str, notes: list[str]) -> list[Piece]:
         return [hull_piece(thickened(points), name)]
 
 
+_RUN = """
+import os, pickle, sys
+out = os.dup(1)
+os.dup2(2, 1)  # what CoACD says does not go where the answer goes
+import coacd
+vertices, faces, threshold = pickle.load(sys.stdin.buffer)
+coacd.set_log_level("error")
+parts = coacd.run_coacd(coacd.Mesh(vertices, faces), threshold=threshold, preprocess_mode="off", seed=0)
+with os.fdopen(out, "wb") as answer:
+    pickle.dump([corners for corners, _ in parts], answer)
+"""
+_MEND = "mend the mesh where it passes through itself, or place its hull with wb.Hull"
+MOST_SECONDS = 40.0
+"""How long CoACD may take for one part; the largest of real robots took a fraction of it."""
+
+
 def _coacd(part: Component, max_vertices: int, threshold: float, name: str) -> list[Array]:
-    try:
-        import coacd
-    except ImportError:
-        raise MissingPackageError("a mesh that is not convex needs coacd: pip install coacd") from None
+    if find_spec("coacd") is None:
+        raise MissingPackageError("a mesh that is not convex needs coacd: pip install coacd")
     _log.info("decomposing %s (%d triangles) into convex pieces", name, len(part.faces))
-    coacd.set_log_level("error")
     # CoACD's own cap on vertices (decimate) leaves parts of the surface outside; its re-meshing (preprocess) inflates
     # thin parts by half, and a closed manifold does not need it.
-    parts = coacd.run_coacd(
-        coacd.Mesh(part.vertices, part.faces.astype(np.int32)),
-        threshold=threshold,
-        preprocess_mode="off",
-        seed=0,
-    )
-    return [outer_hull(np.asarray(corners, dtype=float), max_vertices) for corners, _ in parts]
+    # In a process of its own: meshes that pass through themselves crash it or keep it for ever.
+    asked = pickle.dumps((np.asarray(part.vertices), part.faces.astype(np.int32), threshold))
+    try:
+        done = subprocess.run([sys.executable, "-c", _RUN], input=asked, capture_output=True, timeout=MOST_SECONDS)
+    except subprocess.TimeoutExpired:
+        raise InputError(f"{name}: CoACD found no convex pieces in {MOST_SECONDS:g} s; {_MEND}") from None
+    if done.returncode != 0:
+        raise InputError(f"{name}: CoACD cannot cut it into convex pieces; {_MEND}")
+    parts = pickle.loads(done.stdout)
+    return [outer_hull(np.asarray(corners, dtype=float), max_vertices) for corners in parts]

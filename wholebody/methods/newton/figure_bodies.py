@@ -227,7 +227,12 @@ class FigureBodies:
 def _axis(kind: Any) -> Array:
     name = kind.shortname()
     if name.endswith("Unaligned"):
-        return np.array(kind.extract().axis)
+        known = getattr(kind.extract(), "axis", None)
+        if known is not None:
+            return np.array(known)
+        data = kind.createData()  # of unbounded joints Pinocchio shows the axis only as their motion
+        kind.calc(data, np.array([1.0, 0.0]))
+        return np.array(data.S).ravel()[3:]
     return np.array(AXES[name[-1]])
 
 
