@@ -13,6 +13,7 @@ import numpy as np
 
 from wholebody.assessment import Assessment
 from wholebody.checks import a, number
+from wholebody.compiled import compile_seconds
 from wholebody.errors import InputError
 from wholebody.problem import Iterate
 
@@ -68,7 +69,7 @@ class Control:
         return (self._now() - self._began) / (LONGEST if self._time_limit is None else self._time_limit)
 
     def _now(self) -> float:
-        return time.thread_time() if self._time_limit is None else time.monotonic()
+        return time.thread_time() - compile_seconds() if self._time_limit is None else time.monotonic()
 
     def message(self, judgement: Assessment) -> str:
         """Why the solve was ended and what is left then; empty where it was not ended."""
