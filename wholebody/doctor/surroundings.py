@@ -48,4 +48,4 @@ def loader_folders(environ: Mapping[str, str]) -> dict[str, list[str]]:
 
 
 def _folders(environ: Mapping[str, str], variable: str) -> list[Path]:
-    return [Path(entry) for entry in environ.get(variable, "").split(os.pathsep) if entry and Path(entry).is_dir()]
+    return [Path(entry) for entry in environ.get(variable, "").split(os.pathsep) if entry and os.path.isdir(entry)]

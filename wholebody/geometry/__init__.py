@@ -1,1 +1,5 @@
 """How near things are: shapes, convex pieces, contacts, penetration, sweeps."""
+
+from wholebody.geometry.guesses import settle_boxes
+
+settle_boxes()

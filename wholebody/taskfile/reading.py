@@ -107,7 +107,7 @@ def _text(path: Path) -> str:
             raise
         if os.path.lexists(path):
             raise
-        there = sorted(file.name for file in path.parent.glob("*.toml")) if path.parent.is_dir() else []
+        there = sorted(file.name for file in path.parent.glob("*.toml")) if os.path.isdir(path.parent) else []
         raise UnknownNameError("task file", path.name, there, one_line(str(path.parent))) from None
 
 

@@ -48,7 +48,7 @@ def descriptions(folder: Path) -> list[Path]:
     Raises:
         InputError: no folder, or no description in it.
     """
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise InputError(f"{folder}: there is no such folder; give one that holds robot descriptions")
     found = sorted(folder.rglob("*.urdf")) + sorted(path for path in folder.rglob("*.xml") if _is_mjcf(path))
     if not found:
