@@ -81,6 +81,7 @@ class Tracker:
         """
         self.problem = check_problem(problem, "tracker: problem")
         self.dt = time_step(dt, "dt")
+        solver.load()  # not in the middle of a drag
         self._working_set = WorkingSet(solver)
         self._within = LEAST_WITHIN
         self._alone = OneAtATime("tracker")
