@@ -60,7 +60,7 @@ class QPSolver(ABC):
 
     def load(self) -> None:
         """Import what `solve_cold` needs, for those who cannot wait for it later: most programs are closed without."""
-        return None
+        return
 
     @abstractmethod
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
