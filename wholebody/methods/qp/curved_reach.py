@@ -49,6 +49,9 @@ class CurvedReach:
         self._problem, self._lineariser, self._control = problem, lineariser, control
         self._subproblem = Subproblem(problem, lineariser.state)
         self._solver = solver
+        model = lineariser.state.model
+        free = [joint.idx_v for joint in model.joints if joint.shortname() == "JointModelFreeFlyer"]
+        self._walk = np.array([first + k for first in free for k in range(3)], dtype=np.intp)
 
     def through_everything(self, start: Array, enough: float, most: int) -> Local:
         """Descend from a posture (nq,) within limits and constraints, as if nothing were there.
@@ -86,8 +89,13 @@ class CurvedReach:
             )
             self._lineariser.state.update(here.at.q)
             bend, weight = self._curvature(rows, push)
+            lower, upper = program.lower.copy(), program.upper.copy()
+            if not within:  # where nothing is in the way, and a translation bends nothing
+                lower[self._walk], upper[self._walk] = here.at.lower[self._walk], here.at.upper[self._walk]
             program = replace(
                 program,
+                lower=lower,
+                upper=upper,
                 diagonal=np.maximum(program.diagonal, DAMPING * float(weight.max(initial=0.0))),
                 rows=np.vstack([program.rows, bend]),
                 target=np.concatenate([program.target, np.zeros(len(bend))]),
