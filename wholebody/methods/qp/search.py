@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wholebody.linearisation import Lineariser
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
 from wholebody.methods.qp.curved_reach import CurvedReach
@@ -155,10 +156,8 @@ class Search:
             depth: by which pieces may be inside of each other, metres.
         """
         most = max(min(self._left, SCOUT), 1)
-        asked = self.lineariser.clearances
-        self.lineariser.clearances = asked - depth
-        local = self._descent(most, None, "scout", measures=False, hasty=True).run(start)
-        self.lineariser.clearances = asked
+        lineariser = self.lineariser if depth == 0.0 else self.lineariser.relaxed(depth)
+        local = self._descent(most, None, "scout", measures=False, hasty=True, lineariser=lineariser).run(start)
         self.spent += local.iterations
         self._left -= local.iterations
         return local
@@ -289,10 +288,11 @@ class Search:
         measures: bool = True,
         hasty: bool = False,
         eager: bool = False,
+        lineariser: Lineariser | None = None,
     ) -> Descent:
         return Descent(
-            self.subproblem, self.lineariser, self.solver, self.settings.tolerance, iterations, offset, self.trace,
-            note, measures and self.settings.measures, hasty, eager, self.control,
+            self.subproblem, lineariser or self.lineariser, self.solver, self.settings.tolerance, iterations, offset,
+            self.trace, note, measures and self.settings.measures, hasty, eager, self.control,
         )  # fmt: skip
 
     def _accept(self, local: Local, how: str) -> bool:
