@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -22,11 +23,18 @@ time.sleep(60)
 """
 
 
+@pytest.fixture
+def short() -> Iterator[Path]:
+    """Return a folder with a short name: Chromium's socket in it may have 107 characters, which tmp_path can use up."""
+    with tempfile.TemporaryDirectory(prefix="wb-") as folder:
+        yield Path(folder)
+
+
 @pytest.mark.browser
 @pytest.mark.usefixtures("chromium")
-def test_a_killed_programs_browser_ends_and_its_folder_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+def test_a_killed_programs_browser_ends_and_its_folder_goes(short: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(short))
+    environment = {**os.environ, "TMPDIR": str(short)}
     program = subprocess.Popen([sys.executable, "-c", BROWSING], stdout=subprocess.PIPE, text=True, env=environment)
     try:
         assert program.stdout is not None
@@ -41,7 +49,7 @@ def test_a_killed_programs_browser_ends_and_its_folder_goes(tmp_path: Path, monk
         assert not running(int(pid))
         with Browser((64, 64)):
             assert not Path(folder).exists()
-        assert not list(tmp_path.glob("wholebody-*"))
+        assert not list(short.glob("wholebody-*"))
     finally:
         program.kill()
         program.wait()

@@ -15,8 +15,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-TIMEOUT = 120.0
-"""Seconds for one child; a trial takes one or two, on a machine that is busy more."""
+TIMEOUT = 300.0
+"""Seconds for one child; a trial takes one or two, on a machine that is busy more, and the first compiles the loops."""
 
 _CHILD = "import sys; sys.path[:1] = []; sys.path.append({root!r}); from wholebody.doctor.trials import child; child()"
 
