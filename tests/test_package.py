@@ -40,6 +40,8 @@ ROOMS = (
 """From the ground up; a room imports only from those before it."""
 DOORS = {("scene", "wholebody.simplification.simplify")}
 """Methods that only hand on to a room above their own, which they import when they are called: `scene.simplified`."""
+DOCUMENTED = {"_replace", "_asdict", "_fields", "_exit", "_SubParsersAction"}
+"""Underscored names that the standard library documents: of named tuples, of `os`, of `argparse`."""
 
 
 @pytest.mark.parametrize("name", wholebody.__all__)
@@ -94,6 +96,21 @@ def running(tree: ast.AST) -> list[ast.AST]:
         for inner in ast.walk(node)
     }
     return [node for node in ast.walk(tree) if id(node) not in unseen]
+
+
+def private_reads(tree: ast.AST) -> set[str]:
+    """Underscored attributes that a module reads of objects whose class it does not define itself."""
+    nodes = list(ast.walk(tree))
+    own = {node.name for node in nodes if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
+    own |= {node.target.id for node in nodes if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)}
+    reads = [node for node in nodes if isinstance(node, ast.Attribute) and node.attr.startswith("_")]
+    own |= {node.attr for node in reads if isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")}
+    return {node.attr for node in reads if not node.attr.startswith("__")} - own - DOCUMENTED
+
+
+@pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_a_module_reads_nothing_private_of_another(path: Path) -> None:
+    assert not private_reads(ast.parse(path.read_text()))
 
 
 def room_of(module: str) -> str | None:
