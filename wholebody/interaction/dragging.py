@@ -24,7 +24,8 @@ from wholebody.interaction.scripts import FRAME
 from wholebody.methods.drag import Drag
 from wholebody.methods.moving_goals import moving_goal, own_copy, retarget
 from wholebody.methods.solve import Method
-from wholebody.problem import Problem, Solution
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 from wholebody.tasks import Point
 
 Array = NDArray[np.float64]

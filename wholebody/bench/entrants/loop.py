@@ -20,7 +20,8 @@ from wholebody.errors import InputError
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.methods.contradictions import explanation
 from wholebody.methods.control import Control, Progress
-from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.problem import Problem
+from wholebody.solution import Iterate, Solution, Status
 from wholebody.tasks import Displacement, Effort, Hold
 from wholebody.workspace import Workspace
 
