@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.doctor import examination, packages, trials
+from wholebody.doctor import checks, examination, packages
+from wholebody.doctor.checks import Outcome
 from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
-from wholebody.doctor.trials import Outcome
 
 Fake = Callable[..., None]
 
@@ -29,7 +29,7 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> Fake:
             return {name: Outcome(name not in failing, failing.get(name, answer)) for name in names}
 
         monkeypatch.setattr(packages, "installed", lambda names: everything)
-        monkeypatch.setattr(trials, "run", run)
+        monkeypatch.setattr(checks, "run", run)
 
     return arrange
 

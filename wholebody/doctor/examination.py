@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from wholebody.doctor import packages, surroundings, trials
+from wholebody.doctor import checks, environment, packages
 from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
 
 State = Literal["works", "absent", "broken"]
@@ -84,7 +84,7 @@ def examine(environ: Mapping[str, str] = os.environ) -> Report:
 
 
 def _packages(have: Mapping[str, Distribution]) -> Iterator[Entry]:
-    outcomes = trials.run("import", list(MODULES.values()))
+    outcomes = checks.run("import", list(MODULES.values()))
     for name, module in MODULES.items():
         found, outcome = have.get(packages.normal(name)), outcomes[module]
         if found is None and not outcome.works:
@@ -108,7 +108,7 @@ def _packages(have: Mapping[str, Distribution]) -> Iterator[Entry]:
 
 def _solvers(have: Mapping[str, Distribution]) -> Iterator[Entry]:
     present = [name for name, package in SOLVERS.items() if package in have]
-    outcomes = trials.run("program", present)
+    outcomes = checks.run("program", present)
     for name, package in SOLVERS.items():
         if name in outcomes:
             mend = "" if outcomes[name].works else f"pip install --force-reinstall {package}"
@@ -119,11 +119,11 @@ def _solvers(have: Mapping[str, Distribution]) -> Iterator[Entry]:
 
 
 def _methods() -> Iterator[Entry]:
-    listed = trials.run("methods", [""])[""]
+    listed = checks.run("methods", [""])[""]
     if not listed.works:
         yield Entry("method", "all", "broken", listed.detail, mend=AGAIN)
         return
-    for name, outcome in trials.run("pose", listed.detail.split()).items():
+    for name, outcome in checks.run("pose", listed.detail.split()).items():
         if outcome.works:
             yield Entry("method", name, "works", outcome.detail)
         else:
@@ -131,7 +131,7 @@ def _methods() -> Iterator[Entry]:
 
 
 def _tools() -> Iterator[Entry]:
-    for name, outcome in trials.run("tool", list(TOOLS)).items():
+    for name, outcome in checks.run("tool", list(TOOLS)).items():
         use, mend = TOOLS[name]
         if outcome.works:
             yield Entry("tool", name, "works", f"{outcome.detail}, {use}", False)
@@ -153,7 +153,7 @@ def _cache() -> Entry:
 
 
 def _python() -> Iterator[tuple[str, str]]:
-    fault = surroundings.python_fault()
+    fault = environment.python_fault()
     if fault:
         yield fault, "make an environment with one of them: python3.12 -m venv .venv"
 
@@ -164,8 +164,8 @@ def _conflicts(have: Mapping[str, Distribution]) -> Iterator[tuple[str, str]]:
 
 
 def _paths(environ: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    for folder, hidden in surroundings.shadowing_folders(environ, MODULES.values()).items():
+    for folder, hidden in environment.shadowing_folders(environ, MODULES.values()).items():
         yield f"PYTHONPATH names {folder}, whose {', '.join(hidden)} hide the installed ones", "unset PYTHONPATH"
-    for folder, hidden in surroundings.loader_folders(environ).items():
+    for folder, hidden in environment.loader_folders(environ).items():
         sentence = f"LD_LIBRARY_PATH names {folder}, whose {', '.join(hidden)} replace the installed ones"
         yield sentence, "unset LD_LIBRARY_PATH"

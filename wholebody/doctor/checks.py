@@ -16,13 +16,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 TIMEOUT = 120.0
-"""Seconds for one child; a trial takes one or two, on a machine that is busy more."""
+"""Seconds for one child; a check takes one or two, on a machine that is busy more."""
 
-_CHILD = "import sys; sys.path[:1] = []; sys.path.append({root!r}); from wholebody.doctor.trials import child; child()"
+_CHILD = "import sys; sys.path[:1] = []; sys.path.append({root!r}); from wholebody.doctor.checks import child; child()"
 
 
 class Outcome(NamedTuple):
-    """What came of a trial.
+    """What came of a check.
 
     Attributes:
         works: whether it did what it should.
@@ -95,7 +95,7 @@ def list_methods(_: str) -> str:
     return " ".join(METHODS)
 
 
-TRIALS: dict[str, Callable[[str], str]] = {
+CHECKS: dict[str, Callable[[str], str]] = {
     "import": import_module,
     "program": solve_program,
     "pose": pose_person,
@@ -108,7 +108,7 @@ def run(kind: str, names: Sequence[str], timeout: float = TIMEOUT) -> dict[str, 
     """Try names one after the other.
 
     Args:
-        kind: a key of `TRIALS`.
+        kind: a key of `CHECKS`.
         names: what to try.
         timeout: seconds after which a child is ended.
 
@@ -133,7 +133,7 @@ def child() -> None:
     os.dup2(2, 1)  # whatever the packages print is not a report
     for name in names:
         try:
-            outcome = Outcome(True, TRIALS[kind](name))
+            outcome = Outcome(True, CHECKS[kind](name))
         except Exception as error:  # any failure at all is what is being looked for
             outcome = Outcome(False, f"{type(error).__name__}: {error}".strip().splitlines()[0])
         print(json.dumps([name, outcome]), file=reports, flush=True)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.doctor.surroundings import loader_folders, python_fault, shadowing_folders
+from wholebody.doctor.environment import loader_folders, python_fault, shadowing_folders
 
 
 @pytest.mark.parametrize("version", [(3, 10), (3, 11), (3, 12), (3, 13)])
