@@ -486,7 +486,7 @@ BROWSER = ["open", "wait", "wait_until_closed", "sync", "picture", "movie", "clo
 def fed(name: str) -> bool:
     """Whether a name of the surface is fed here."""
     owner, _, method = name.partition(".")
-    if name in ANSWERS or (owner == "Viewer" and method in BROWSER) or name == "write_strip":
+    if name in ANSWERS or (owner == "Viewer" and method in BROWSER) or name == "write_filmstrip":
         return False
     if name in OF_METHODS or owner == "Workspace":
         return False

@@ -15,7 +15,7 @@ from wholebody.errors import InputError
 Array = NDArray[np.float64]
 
 
-def checked_subject(scene: Any) -> Any:
+def checked_scene(scene: Any) -> Any:
     """What a viewer shows.
 
     Raises:
@@ -35,7 +35,7 @@ def checked_subject(scene: Any) -> Any:
     raise InputError(f"Viewer: scene is {a(type(scene))}, not a Scene; {mend}")
 
 
-class Touching(Protocol):
+class ViewedContacts(Protocol):
     """Pairs of pieces near each other; k rows each."""
 
     @property
@@ -59,7 +59,7 @@ class Touching(Protocol):
         """(k, 3) witness point on the second piece."""
 
 
-class Subject(Protocol):
+class ViewedScene(Protocol):
     """A figure among things, as `wholebody.Scene` is."""
 
     @property
@@ -86,5 +86,5 @@ class Subject(Protocol):
     def revision(self) -> int:
         """A number that changes whenever things come or go."""
 
-    def contacts(self, q: Array, within: float = ...) -> Touching:
+    def contacts(self, q: Array, within: float = ...) -> ViewedContacts:
         """Pairs nearer than `within` metres at the posture q, nearest first."""

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from wholebody.figures.state import State
 from wholebody.view import style
-from wholebody.view.stage import Marker, Moment
-from wholebody.view.subject import Subject, Touching
+from wholebody.view.scene_graph import Keyframe, Marker
+from wholebody.view.viewed_scene import ViewedContacts, ViewedScene
 
 Array = NDArray[np.float64]
 
@@ -20,11 +20,13 @@ MOST = 4  # of the hardest are marked; more labels hide each other
 _BALL = Marker("ball", style.BLOCKER, style.BLOCKER_RADIUS)
 
 
-def mark_blockers(moment: Moment, scene: Subject, state: State, contacts: Touching, blockers: Sequence[Any]) -> None:
+def mark_blockers(
+    keyframe: Keyframe, scene: ViewedScene, state: State, contacts: ViewedContacts, blockers: Sequence[Any]
+) -> None:
     """Mark each of the hardest blockers by a ball and its name.
 
     Args:
-        moment: what is shown.
+        keyframe: what is shown.
         scene: whose figure and things they are.
         state: of the figure, where it is shown.
         contacts: pairs near each other there.
@@ -37,16 +39,16 @@ def mark_blockers(moment: Moment, scene: Subject, state: State, contacts: Touchi
         matrix = np.eye(4)
         matrix[:3, 3] = place
         root = f"{style.BLOCKER_NODE}/{number}"
-        moment.markers[f"{root}/ball"] = (_BALL, matrix)
+        keyframe.markers[f"{root}/ball"] = (_BALL, matrix)
         above = matrix.copy()
         above[2, 3] += 2.0 * style.BLOCKER_RADIUS
-        moment.markers[f"{root}/text"] = (
+        keyframe.markers[f"{root}/text"] = (
             Marker("label", style.BLOCKER_LABEL, style.LABEL_SIZE, f"in the way: {blocker}"),
             above,
         )
 
 
-def _place(scene: Subject, state: State, contacts: Touching, blocker: Any) -> Array | None:
+def _place(scene: ViewedScene, state: State, contacts: ViewedContacts, blocker: Any) -> Array | None:
     """Where a blocker is (3,), or None for one that is nowhere, such as a balance."""
     if blocker.kind == "contact":
         owners = scene.piece_owner

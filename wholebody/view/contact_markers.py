@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from wholebody.view import drawing, style
 from wholebody.view.bodies import Bodies
-from wholebody.view.stage import Marker, Moment
-from wholebody.view.subject import Touching
+from wholebody.view.scene_graph import Keyframe, Marker
+from wholebody.view.viewed_scene import ViewedContacts
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ _WITNESS = Marker("ball", style.WITNESS, style.WITNESS_RADIUS)
 _DEPTH = Marker("arrow", style.DEPTH, 1.3)
 
 
-def color_contacts(moment: Moment, bodies: Bodies, contacts: Touching) -> None:
+def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) -> None:
     """Give every piece that touches the colour of its state; penetration outweighs contact."""
     for pairs, state in (
         (contacts.pair, style.CONTACT),
@@ -34,10 +34,10 @@ def color_contacts(moment: Moment, bodies: Bodies, contacts: Touching) -> None:
     ):
         for index in np.unique(pairs):
             body = bodies.all[int(index)]
-            moment.colors[body.path] = body.state_color(state)
+            keyframe.colors[body.path] = body.state_color(state)
 
 
-def mark_contacts(moment: Moment, bodies: Bodies, contacts: Touching) -> None:
+def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) -> None:
     """Mark witness points and normals; for penetrations the vector by which the figure's piece would come out.
 
     A normal starts at the first piece's witness point and leads to the second piece. A penetration vector is as long as
@@ -48,20 +48,20 @@ def mark_contacts(moment: Moment, bodies: Bodies, contacts: Touching) -> None:
         distance, normal = float(contacts.distance[row]), np.asarray(contacts.normal[row])
         start, end = np.asarray(contacts.point_a[row]), np.asarray(contacts.point_b[row])
         for name, point in (("a", start), ("b", end)):
-            moment.markers[f"{root}/{name}"] = (_WITNESS, _at(point))
+            keyframe.markers[f"{root}/{name}"] = (_WITNESS, _at(point))
         if distance >= INSIDE:
             place = drawing.arrow_placement(start, normal, style.NORMAL_LENGTH)
-            moment.markers[f"{root}/normal"] = (_NORMAL, place)
+            keyframe.markers[f"{root}/normal"] = (_NORMAL, place)
             continue
         first, second = (bodies.all[int(index)] for index in contacts.pair[row])
         out, origin = -normal, start
         if first.joint == 0 or (first.thing is not None and second.thing is None):
             out, origin = normal, end
         length = max(-distance, style.SHORTEST_DEPTH)
-        moment.markers[f"{root}/depth"] = (_DEPTH, drawing.arrow_placement(origin, out, length))
+        keyframe.markers[f"{root}/depth"] = (_DEPTH, drawing.arrow_placement(origin, out, length))
         if row < LABELLED:
             text = Marker("label", style.DEPTH_LABEL, style.LABEL_SIZE, f"{-1000 * distance:.1f} mm")
-            moment.markers[f"{root}/text"] = (text, _at(origin + out * length))
+            keyframe.markers[f"{root}/text"] = (text, _at(origin + out * length))
 
 
 def _at(point: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What is on the page: keeps it, tells the live page of changes only, and turns moments into a motion."""
+"""The page's content as a scene graph: tells the live page of changes only, and turns keyframes into an animation."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class Marker:
 
 
 @dataclass
-class Moment:
+class Keyframe:
     """Everything that can differ from one posture to the next.
 
     Attributes:
         transforms: placement (4, 4) by node, relative to the node above.
         colors: by node.
-        markers: marker and placement (4, 4) by node. Markers of earlier moments that are not named are hidden.
+        markers: marker and placement (4, 4) by node. Markers of earlier keyframes that are not named are hidden.
     """
 
     transforms: dict[str, Array] = field(default_factory=dict)
@@ -50,7 +50,7 @@ class Moment:
     markers: dict[str, tuple[Marker, Array]] = field(default_factory=dict)
 
 
-class Stage:
+class SceneGraph:
     """The page's content. Without a connection it is only kept, ready to be saved."""
 
     def __init__(self) -> None:
@@ -94,32 +94,32 @@ class Stage:
             self._sender.send(self._waiting)
         self._waiting.clear()
 
-    def show(self, moment: Moment) -> None:
-        """Make the page show this moment."""
+    def show(self, keyframe: Keyframe) -> None:
+        """Make the page show this keyframe."""
         if self.store.animation is not None:
             self.do(commands.stop_animation())
-        for path, (marker, _) in moment.markers.items():
+        for path, (marker, _) in keyframe.markers.items():
             self._provide(path, marker)
-        for path, matrix in moment.transforms.items():
+        for path, matrix in keyframe.transforms.items():
             self.place(path, matrix)
-        for path, color in moment.colors.items():
+        for path, color in keyframe.colors.items():
             self.set(path, "color", color)
         for path in self._markers:
-            shown = path in moment.markers
+            shown = path in keyframe.markers
             self.set(path, "visible", shown)
             if shown:
-                self.place(path, moment.markers[path][1])
+                self.place(path, keyframe.markers[path][1])
         self.flush()
 
-    def play(self, moments: Sequence[Moment], dt: float, repetitions: float) -> None:
-        """Let the page play these moments, dt seconds apart. A marker that changes its looks is left out."""
-        for moment in moments[1:]:
-            for path, (marker, _) in moment.markers.items():
-                if path not in moments[0].markers:
+    def play(self, keyframes: Sequence[Keyframe], dt: float, repetitions: float) -> None:
+        """Let the page play these keyframes, dt seconds apart. A marker that changes its looks is left out."""
+        for keyframe in keyframes[1:]:
+            for path, (marker, _) in keyframe.markers.items():
+                if path not in keyframes[0].markers:
                     self._provide(path, marker)
-        self.show(moments[0])
-        tracks = [*_placements(moments), *_colors(moments), *self._appearances(moments)]
-        self.do(commands.set_animation(tracks, dt, len(moments), repetitions))
+        self.show(keyframes[0])
+        tracks = [*_placements(keyframes), *_colors(keyframes), *self._appearances(keyframes)]
+        self.do(commands.set_animation(tracks, dt, len(keyframes), repetitions))
         self.flush()
 
     def do(self, command: Command) -> None:
@@ -144,11 +144,11 @@ class Stage:
         else:
             self.put(path, drawing.ball(path, marker.color, marker.size))
 
-    def _appearances(self, moments: Sequence[Moment]) -> list[Track]:
+    def _appearances(self, keyframes: Sequence[Keyframe]) -> list[Track]:
         """Tracks of the markers: when they are seen, and where."""
         tracks: list[Track] = []
         for path, marker in self._markers.items():
-            found = [moment.markers.get(path) for moment in moments]
+            found = [keyframe.markers.get(path) for keyframe in keyframes]
             places = [entry[1] if entry is not None and entry[0] == marker else None for entry in found]
             if all(place is None for place in places):
                 continue
@@ -160,20 +160,20 @@ class Stage:
         return tracks
 
 
-def _placements(moments: Sequence[Moment]) -> list[Track]:
+def _placements(keyframes: Sequence[Keyframe]) -> list[Track]:
     """Tracks of the nodes that move."""
     return [
         track
-        for path in moments[0].transforms
-        for track in _motion(path, np.array([moment.transforms[path] for moment in moments]))
+        for path in keyframes[0].transforms
+        for track in _motion(path, np.array([keyframe.transforms[path] for keyframe in keyframes]))
     ]
 
 
-def _colors(moments: Sequence[Moment]) -> list[Track]:
+def _colors(keyframes: Sequence[Keyframe]) -> list[Track]:
     """Tracks of the pieces whose colour changes; opacity stays as it is."""
     tracks = []
-    for path in moments[0].colors:
-        colors = np.array([moment.colors[path][:3] for moment in moments])
+    for path in keyframes[0].colors:
+        colors = np.array([keyframe.colors[path][:3] for keyframe in keyframes])
         if (colors != colors[0]).any():
             tracks.append(Track(f"{path}/<object>", "material.color", "color", colors, steps=True))
     return tracks

@@ -14,7 +14,7 @@ NEAR = 0.3
 """How far around the figure things are kept in the picture, metres; a wall is as long as it likes."""
 
 
-def aim(figure: Array, things: Array, direction: Array | None = None) -> Command:
+def camera_on(figure: Array, things: Array, direction: Array | None = None) -> Command:
     """Look at the figure from its front right, from as far away as it takes to see it and what is near it.
 
     Args:

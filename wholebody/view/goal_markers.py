@@ -14,8 +14,8 @@ from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import placement
 from wholebody.view import drawing, style
-from wholebody.view.stage import Marker, Moment
-from wholebody.view.subject import Subject
+from wholebody.view.scene_graph import Keyframe, Marker
+from wholebody.view.viewed_scene import ViewedScene
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ _MISS = Marker("rod", style.MISS)
 class Goals:
     """The goals of a problem, drawn at any posture."""
 
-    def __init__(self, scene: Subject, problem: Any) -> None:
+    def __init__(self, scene: ViewedScene, problem: Any) -> None:
         """Take the goals of a `wholebody.Problem`, which has resolved them on its scene.
 
         Raises:
@@ -38,7 +38,7 @@ class Goals:
             raise InputError(f"problem is {a(type(problem))}, not a Problem; state one with wb.Problem(scene)")
         self.goals = goals
 
-    def mark(self, moment: Moment, state: State) -> None:
+    def mark(self, keyframe: Keyframe, state: State) -> None:
         """Mark each goal that has a place: target, the way to it, axes where it asks for an orientation, the error."""
         for number, goal in enumerate(self.goals):
             root = f"{style.GOAL_NODE}/{number}"
@@ -47,17 +47,17 @@ class Goals:
             if here is None or target is None:
                 continue
             if np.linalg.norm(target.translation - here.translation) > 1e-9 or not (directed or hasattr(goal, "axis")):
-                moment.markers[f"{root}/target"] = (_TARGET, _at(target.translation))
+                keyframe.markers[f"{root}/target"] = (_TARGET, _at(target.translation))
             line = drawing.rod_placement(here.translation, target.translation, style.LINE_RADIUS)
             if line is not None:
-                moment.markers[f"{root}/line"] = (_MISS, line)
+                keyframe.markers[f"{root}/line"] = (_MISS, line)
             if directed:
-                _triad(moment, f"{root}/axes", target, style.AXES_LENGTH)
-                _triad(moment, f"{root}/frame", here, style.AXES_LENGTH / 2)
-            self._point(moment, root, goal, here)
+                _triad(keyframe, f"{root}/axes", target, style.AXES_LENGTH)
+                _triad(keyframe, f"{root}/frame", here, style.AXES_LENGTH / 2)
+            self._point(keyframe, root, goal, here)
             text = f"{getattr(goal, 'frame', 'centre of mass')}  {left(goal, state)}"
             label = Marker("label", style.GOAL_LABEL, style.LABEL_SIZE, text)
-            moment.markers[f"{root}/text"] = (label, _at(target.translation))
+            keyframe.markers[f"{root}/text"] = (label, _at(target.translation))
 
     def targets(self, state: State) -> Array:
         """Places (n, 3) that should be in the picture."""
@@ -80,7 +80,7 @@ class Goals:
             return pin.SE3(np.eye(3), state.center_of_mass())
         return None
 
-    def _point(self, moment: Moment, root: str, goal: Any, here: pin.SE3) -> None:
+    def _point(self, keyframe: Keyframe, root: str, goal: Any, here: pin.SE3) -> None:
         """The axis that a goal points somewhere, and where it should point."""
         axis = getattr(goal, "axis", None)
         if axis is None:
@@ -90,7 +90,7 @@ class Goals:
         blue, green = style.AXES[2], style.TARGET
         for name, color, way in (("is", blue, now), ("wanted", green, wanted)):
             place = drawing.arrow_placement(here.translation, way / np.linalg.norm(way), 2.5 * style.AXES_LENGTH)
-            moment.markers[f"{root}/{name}"] = (Marker("arrow", color, 0.35), place)
+            keyframe.markers[f"{root}/{name}"] = (Marker("arrow", color, 0.35), place)
 
 
 def _wanted(goal: Any, here: pin.SE3) -> Array:
@@ -99,7 +99,7 @@ def _wanted(goal: Any, here: pin.SE3) -> Array:
     return np.asarray(np.asarray(goal.toward, dtype=float) - here.translation)
 
 
-def _target(goal: Any, here: pin.SE3 | None, state: State, scene: Subject) -> tuple[pin.SE3 | None, bool]:
+def _target(goal: Any, here: pin.SE3 | None, state: State, scene: ViewedScene) -> tuple[pin.SE3 | None, bool]:
     """Where the goal wants its frame, and whether it asks for an orientation too."""
     if here is None:
         return None, False
@@ -136,10 +136,10 @@ def left(goal: Any, state: State) -> str:
     return "  ".join(part for part in parts if part)
 
 
-def _triad(moment: Moment, path: str, place: pin.SE3, length: float) -> None:
+def _triad(keyframe: Keyframe, path: str, place: pin.SE3, length: float) -> None:
     for name, color, direction in zip("xyz", style.AXES, place.rotation.T, strict=True):
         arrow = drawing.arrow_placement(place.translation, direction, length)
-        moment.markers[f"{path}/{name}"] = (Marker("arrow", color, 0.7), arrow)
+        keyframe.markers[f"{path}/{name}"] = (Marker("arrow", color, 0.7), arrow)
 
 
 def _at(point: Array) -> Array:

@@ -24,7 +24,7 @@ def check_size(size: Any) -> tuple[int, int]:
     return whole(given[0], "the width of size", 16, LARGEST), whole(given[1], "the height of size", 16, LARGEST)
 
 
-class Studio:
+class Screenshots:
     """A headless browser and what it is used for here."""
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""A film strip: several postures of a scene side by side in one picture."""
+"""A filmstrip: several postures of a scene side by side in one picture."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from wholebody.checks import a, listed
 from wholebody.checks import path as checked_path
 from wholebody.errors import InputError
 from wholebody.files import Scratch, check_writable, write
-from wholebody.view.studio import check_size
+from wholebody.view.screenshot import check_size
 from wholebody.view.viewer import Viewer
 
 GAP = 6  # pixels between two pictures
 
 
-def write_strip(
+def write_filmstrip(
     viewer: Viewer,
     postures: Sequence[ArrayLike],
     path: str | os.PathLike[str],
     size: tuple[int, int] = (400, 560),
 ) -> Path:
-    """Write postures as one PNG, the first one left; the camera should have been aimed with `viewer.look`.
+    """Write postures as one PNG, the first one left; the camera should have been set with `viewer.look`.
 
     Args:
         viewer: shows the postures one after the other, and the last one afterwards.
@@ -43,10 +43,10 @@ def write_strip(
     from PIL import Image
 
     if not isinstance(viewer, Viewer):
-        raise InputError(f"write_strip: viewer is {a(type(viewer))}, not a Viewer; make one with wb.Viewer(scene)")
+        raise InputError(f"write_filmstrip: viewer is {a(type(viewer))}, not a Viewer; make one with wb.Viewer(scene)")
     postures = listed(postures, "postures", "[q], each of shape (nq,)")
     if not postures:
-        raise InputError("a film strip has at least one posture; give a list of postures, each of shape (nq,)")
+        raise InputError("a filmstrip has at least one posture; give a list of postures, each of shape (nq,)")
     width, height = check_size(size)
     strip = Image.new("RGB", (len(postures) * (width + GAP) - GAP, height), "white")
     place = check_writable(checked_path(path, "path"))
