@@ -115,7 +115,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.bench.attack import files
 from wholebody.bench.attack.case import Verdict
-from wholebody.figures.shipped import task_paths
+from wholebody.figures.packaged_urdf import task_paths
 
 robot = Path(__file__).with_name("robot.urdf")
 figure = wb.load(robot)

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from wholebody.bench.tools.base import POSTURE_COST, REACH_COST, Tool
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, WITHIN, Array, Track
-from wholebody.figures.shipped import urdf_path
+from wholebody.figures.packaged_urdf import urdf_path
 
 
 class PlacoTool(Tool):

@@ -1,6 +1,6 @@
-"""A body as plain data, and its URDF text.
+"""A body as plain data, its URDF text, and Pinocchio's model and geometry of it.
 
-The builders (human, avatar, hand) write a `Blueprint`; the URDF text of it is what Pinocchio reads and what is shipped,
+The builders (human, avatar, hand) write a `BodySpec`; the URDF text of it is what Pinocchio reads and what is packaged,
 so that the figure in memory and the file on disk cannot differ.
 """
 
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -68,7 +68,7 @@ class Landmark(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Blueprint:
+class BodySpec:
     """Everything that a URDF says about a body.
 
     Attributes:
@@ -100,46 +100,49 @@ the next link outwards, so that the total is right."""
 VIRTUAL_INERTIA = 1e-9
 """Its moment of inertia about any axis, kg m^2."""
 
+SKIN = (0.85, 0.68, 0.55, 1.0)
+"""Colour of the pieces: red, green, blue, opacity."""
 
-def urdf_text(blueprint: Blueprint, extension: str = "") -> str:
-    """Return the URDF of a blueprint: metres, radians (degrees in comments), capsules marked for Pinocchio.
+
+def urdf_text(spec: BodySpec, extension: str = "") -> str:
+    """Return the URDF of a body specification: metres, radians (degrees in comments), capsules marked for Pinocchio.
 
     URDF has no capsule: a cylinder is written, with Pinocchio's ``collision_checking`` tag that makes it a capsule of
     that length between the centres of its caps.
 
     Args:
-        blueprint: the body.
+        spec: the body.
         extension: text of an element to stand at the end, see `wholebody.figures.urdf_extension`.
     """
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
-        f"<!-- {blueprint.title} -->",
-        f'<robot name="{blueprint.name}">',
+        f"<!-- {spec.title} -->",
+        f'<robot name="{spec.name}">',
     ]
-    for link in _with_virtual_masses(blueprint):
-        lines += _link(link, [solid for solid in blueprint.solids if solid.segment == link.name])
-    for joint in blueprint.joints:
+    for link in _with_virtual_masses(spec):
+        lines += _link(link, [solid for solid in spec.solids if solid.segment == link.name])
+    for joint in spec.joints:
         lines += _joint(joint)
-    for mark in blueprint.landmarks:
+    for mark in spec.landmarks:
         lines.append(f'  <link name="{mark.name}"/>')
         lines += _joint(Joint(f"{mark.name}_mount", mark.segment, mark.name, mark.placement, None))
     return "\n".join(lines) + "\n" + extension + "</robot>\n"
 
 
-def _with_virtual_masses(blueprint: Blueprint) -> list[Link]:
+def _with_virtual_masses(spec: BodySpec) -> list[Link]:
     """The links, those without mass between two joints of a ball joint with `VIRTUAL_MASS` of the next one."""
-    outwards = {joint.parent: joint.child for joint in blueprint.joints}
-    moving = {joint.child for joint in blueprint.joints}
-    masses = {link.name: link.mass for link in blueprint.links}
+    outwards = {joint.parent: joint.child for joint in spec.joints}
+    moving = {joint.child for joint in spec.joints}
+    masses = {link.name: link.mass for link in spec.links}
     taken = dict.fromkeys(masses, 0.0)
-    for link in blueprint.links:
+    for link in spec.links:
         heavy = link.name
         while not masses[heavy] and heavy in outwards:
             heavy = outwards[heavy]
         if not link.mass and link.name in moving and masses[heavy]:
             taken[heavy] += VIRTUAL_MASS
     made = []
-    for link in blueprint.links:
+    for link in spec.links:
         if not link.mass and link.name in moving:
             made.append(link._replace(mass=VIRTUAL_MASS, inertia=(VIRTUAL_INERTIA,) * 3))
         else:
@@ -225,3 +228,27 @@ def _numbers(values: Sequence[float] | Array) -> str:
 def _number(value: float) -> str:
     # Twelve digits: far below a nanometre, yet stable against the last bits of different processors.
     return f"{float(value):.12g}" if abs(value) > 1e-12 else "0"
+
+
+def model_of(spec: BodySpec) -> pin.Model:
+    """Return Pinocchio's model of a spec, with a free root, read from its URDF text (without the pieces)."""
+    model = pin.buildModelFromXML(urdf_text(replace(spec, solids=())), pin.JointModelFreeFlyer())
+    model.name = spec.name
+    return model
+
+
+def geometry_of(model: pin.Model, solids: tuple[Solid, ...], pairs: tuple[tuple[str, str], ...]) -> pin.GeometryModel:
+    """Return Pinocchio's geometry: the pieces on their segments, and the pairs that can touch."""
+    geometry = pin.GeometryModel()
+    index = {}
+    for solid in solids:
+        frame_id = model.getFrameId(solid.segment)
+        frame = model.frames[frame_id]
+        piece = pin.GeometryObject(
+            solid.name, frame.parentJoint, frame_id, frame.placement * solid.placement, solid.geometry
+        )
+        piece.meshColor[:] = SKIN
+        index[solid.name] = geometry.addGeometryObject(piece)
+    for a, b in pairs:
+        geometry.addCollisionPair(pin.CollisionPair(*sorted((index[a], index[b]))))
+    return geometry

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from wholebody.figures.anthropometry import Body
-from wholebody.figures.tables import keyed
+from wholebody.figures.anthropometry import Body, keyed
 
 RELAXED = 0.93
 """The arm's circumferences were measured flexed; relaxed they are 5 to 8 % less (estimate)."""
@@ -33,7 +32,7 @@ class Finger(NamedTuple):
     radius: float
 
 
-class Measures:
+class Dimensions:
     """Sizes of one `Body`."""
 
     def __init__(self, person: Body) -> None:
