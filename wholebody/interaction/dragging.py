@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from wholebody.assessment import assess
 from wholebody.checks import array, function, instance, numbers
 from wholebody.errors import InputError
-from wholebody.geometry.sweep import Sweep
+from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.interaction.judging import jerk
 from wholebody.interaction.scripts import FRAME
 from wholebody.methods.drag import Drag

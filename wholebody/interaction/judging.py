@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wholebody.checks import instance
 from wholebody.figures.state import State
-from wholebody.geometry.sweep import Sweep
+from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.interaction.recording import Recording
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones

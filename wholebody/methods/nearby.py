@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.assessment import assess
-from wholebody.geometry.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.ccd.method import CCD
 from wholebody.methods.moving_goals import begun_at
 from wholebody.methods.newton.method import Newton
 from wholebody.methods.newton.tracking import NewtonTracker
-from wholebody.methods.passage import jumps
 from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import Method, as_method
 from wholebody.problem import Problem, Solution
@@ -85,4 +85,4 @@ def _jumps(problem: Problem, before: Array, after: Array) -> bool:
     """Whether something is jumped over on the way between two postures (nq,)."""
     with problem.lend() as workspace:
         first, last = (Placed(workspace.near(q, WITHIN), WITHIN) for q in (before, after))
-        return jumps(workspace, first, last, before, after)
+        return passes_through(workspace, first, last, before, after)

@@ -16,8 +16,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.errors import InputError
+from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.passing_through import first_passed
 from wholebody.methods.ccd.drawing import Drawer
-from wholebody.methods.ccd.passing import jump
 from wholebody.methods.ccd.pushing import SKIN
 from wholebody.methods.ccd.remover import Remover, Tally
 from wholebody.scene import Scene
@@ -35,6 +36,9 @@ SHAKES = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things came upon and t
 APART = 0.02  # m: how far a tip moves between two looks at the straight way from one shown posture to the next
 MOST_LOOKS = 5
 DIP = 4e-4  # m: how deep it may go in there
+PASSED = (
+    2e-3  # m: overlap of a single step, not of what is shown, that does not count; the way shown is swept more closely
+)
 WIDE = 5e-3  # m: how far what is to come back to a free posture is pushed out, so that it has room to turn
 TINY = 1e-12  # rad, m
 
@@ -120,11 +124,11 @@ class Frames:
                 break
         if overlaps:
             return self._result(q if remover.look(wanted) else wanted)
-        before = self._remover.placements
+        before = self._remover.placed
         shown = None
         self._drawer.free = not remover.look(wanted)
         remover.skin = WIDE if self._drawer.free else SKIN
-        if self._drawer.free and not self._jumps(before, q, wanted):
+        if self._drawer.free and not self._passes_through(before, q, wanted):
             shown = self._toward(q, wanted)
         self._drawer.limit = remover.tally.work + ENOUGH + TOO_MANY
         for self._drawer.step in (STEP, SMALL_STEP) if shown is None else ():
@@ -138,7 +142,7 @@ class Frames:
         self._swept = shown is not None and not pushed
         return self._result(q if shown is None else shown)
 
-    def _approach(self, q: Array, wanted: Array, before: Array, rng: np.random.Generator) -> list[Array]:
+    def _approach(self, q: Array, wanted: Array, before: Placed, rng: np.random.Generator) -> list[Array]:
         """From a free posture towards the wanted one, step by step: the postures on the way."""
         remover = self._remover
         settled = [False] * len(self._parts)
@@ -156,11 +160,11 @@ class Frames:
             trial, overlaps = remover.separate(drawn[0], rng, self._drawer.limit)
             if overlaps:
                 trial = self._interpolate(q, trial)
-            if self._jumps(before, q, trial):
+            if self._passes_through(before, q, trial):
                 trial = self._interpolate(q, self._hit)
             q = self._drawer.keep_gains(q, trial, wanted, drawn[1], settled)
             way.append(q)
-            before = self._remover.placements
+            before = self._remover.placed
         return way
 
     def _toward(self, q0: Array, q1: Array) -> Array | None:
@@ -211,10 +215,9 @@ class Frames:
         self._remover.look(result)
         return result
 
-    def _jumps(self, before: Array, q0: Array, q1: Array) -> bool:
+    def _passes_through(self, before: Placed, q0: Array, q1: Array) -> bool:
         """Whether the motion passes through something; `_hit` is then where it meets it first."""
-        remover = self._remover
-        hit = jump(self._workspace, before, remover.placements, q0, q1, ~remover.overlapping)
+        hit = first_passed(self._workspace, before, self._remover.placed, q0, q1, PASSED)
         if hit is not None:
             self._hit = hit.q
         return hit is not None

@@ -12,6 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.figures.figure import Figure
+from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.ccd.links import Overlap
 from wholebody.methods.ccd.pushing import SKIN, ChainPusher
@@ -50,11 +51,10 @@ class Remover:
 
     Attributes:
         workspace: of the run.
-        placements: (n, 4, 3) of the pieces at the last look.
+        placed: the pieces and pairs at the last look.
         tally: what was done since it was last set.
         deepest: deepest overlap found by the last look, metres, against the distance asked of the pair.
         skin: how far outside links are pushed, metres.
-        overlapping: (pairs,) bool: which collision pairs overlapped at the last look.
     """
 
     def __init__(
@@ -86,10 +86,8 @@ class Remover:
         self._within = 0.0 if clearances is None else float(clearances.max(initial=0.0))
         self._data = scene.model.createData()
         self._joints = workspace.table.joint.tolist()
-        self.placements: Array = np.zeros((len(self._joints), 4, 3))
         self.tally = Tally()
         self.deepest = 0.0
-        self.overlapping = np.zeros(len(workspace.table.pairs), dtype=bool)
         self._fixed, self._cones = fixed, cones
 
     @cached_property
@@ -114,15 +112,13 @@ class Remover:
         self.tally.looks += 1
         pin.forwardKinematics(self.scene.model, self._data, q)
         near = self.workspace.proximity.near(self._data, self._within)
-        self.placements = near.placements
+        self.placed = Placed(near, self._within)
         depth = -near.distance if self.clearances is None else self.clearances[near.number] - near.distance
         self.deepest = float(depth.max(initial=0.0))
-        self.overlapping[:] = False
         found: list[Overlap] = []
         if self.deepest > self.touch:
             rows = np.flatnonzero(depth > self.touch)
             rows = rows[np.argsort(-depth[rows], kind="stable")]
-            self.overlapping[near.number[rows]] = True
             for pair, size, normal, a, b in zip(
                 near.pair[rows].tolist(),
                 depth[rows].tolist(),

@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.geometry.moved_pairs import Placed
-from wholebody.methods.passage import doubtful_pairs, jumps
+from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.passing_through import doubtful_pairs, first_passed, passes_through
 
 WITHIN = 0.05
 
@@ -25,7 +25,13 @@ def doubted(scene, q0, q1):
 def jumped(scene, q0, q1):
     before, after = placed(scene, q0), placed(scene, q1)
     with scene.lend() as workspace:
-        return jumps(workspace, before, after, q0, q1)
+        return passes_through(workspace, before, after, q0, q1)
+
+
+def passed_first(scene, q0, q1, overlap=2e-4):
+    before, after = placed(scene, q0), placed(scene, q1)
+    with scene.lend() as workspace:
+        return first_passed(workspace, before, after, q0, q1, overlap)
 
 
 def depth_on_the_way(scene, q0, q1, count=400):
@@ -54,6 +60,10 @@ def test_a_fast_piece_through_a_plate_is_caught_at_any_length(free_bodies, radiu
             assert len(doubted(scene, q0, q1)) == 1
             assert jumped(scene, q0, q1)
             assert jumped(scene, q1, q0)
+            hit = passed_first(scene, q0, q1)
+            surface = radius + 0.5 * thickness
+            assert hit.pair in ((0, 1), (1, 0))
+            assert -surface - 1e-9 <= hit.q[0] <= -surface + 4e-4
 
 
 def test_a_slow_piece_and_one_that_goes_along_are_not_doubted(free_bodies):
@@ -72,6 +82,7 @@ def test_bumping_into_a_plate_is_no_jump(free_bodies):
     q0, q1 = scene.figure.neutral, scene.figure.neutral
     q0[0], q1[0] = -0.3, -0.06
     assert not jumped(scene, q0, q1)
+    assert passed_first(scene, q0, q1) is None
 
 
 def test_no_jump_is_missed_by_an_arm_among_plates(planar_arm):
@@ -92,9 +103,11 @@ def test_no_jump_is_missed_by_an_arm_among_plates(planar_arm):
             continue
         if least < -0.002:
             assert jumped(scene, q0, q1)
+            assert passed_first(scene, q0, q1) is not None
             through += 1
         elif least > 0.0:
             assert not jumped(scene, q0, q1)
+            assert passed_first(scene, q0, q1) is None
             free += 1
     assert min(through, free) > 20
 

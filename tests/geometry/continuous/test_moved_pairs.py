@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.geometry.moved_pairs import Placed, compiled_kernel, far_moved, far_moved_in_arrays
+from wholebody.geometry.continuous.moved_pairs import Placed, compiled_kernel, far_moved, far_moved_in_arrays
 
 WITHIN = 0.05
 

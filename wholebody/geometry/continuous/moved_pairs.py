@@ -52,7 +52,7 @@ def far_moved(table: PairTable, before: Placed, after: Placed) -> Indices:
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops where numba is installed (the extra "fast"), else None."""
-    moved_pairs_kernel = compiled_module("wholebody.geometry.moved_pairs_kernel")
+    moved_pairs_kernel = compiled_module("wholebody.geometry.continuous.moved_pairs_kernel")
     if moved_pairs_kernel is None:
         return None
     none, places, pairs = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)

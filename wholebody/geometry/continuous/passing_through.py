@@ -1,20 +1,24 @@
-"""Whether a step may have jumped over something: proof for most pairs, a continuous sweep for the others.
+"""Whether a motion passes through something: proof for most pairs, a continuous sweep for the others.
 
-Two convex pieces that are d0 apart before a step and d1 after it can only have changed sides if they moved against each
-other by d0 + d1 and the widths of both. Where a step is longer (a fast hand, a thin plate), the plane that parts them
-before the step, carried along by one piece, may still part them after it, up to the height of the arcs that points
+Two convex pieces that are d0 apart before a motion and d1 after it can only have changed sides if they moved against
+each other by d0 + d1 and the widths of both. Where a motion is longer (a fast hand, a thin plate), the plane that parts
+them before it, carried along by one piece, may still part them after it, up to the height of the arcs that points
 describe. What is left is swept.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Protocol
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.geometry.moved_pairs import Placed, distances, far_moved
-from wholebody.geometry.proximity import Indices, PairTable
-from wholebody.workspace import Workspace
+from wholebody.geometry.continuous.moved_pairs import Placed, distances, far_moved
+from wholebody.geometry.proximity import Contacts, Indices, PairTable
+
+if TYPE_CHECKING:
+    from wholebody.geometry.continuous.sweep import FirstContact, Sweep
 
 Array = NDArray[np.float64]
 
@@ -23,52 +27,74 @@ OVERLAP = 2e-4  # m: overlap on the way that does not count; finer than any piec
 HALVINGS = 3  # of a way before what is still in doubt is swept
 
 
-def jumps(workspace: Workspace, before: Placed, after: Placed, q0: Array, q1: Array) -> bool:
-    """Whether some pair is on other sides of each other after a step than before it.
+class Queries(Protocol):
+    """What is asked about postures between the two, as `wholebody.workspace.Workspace` answers it."""
+
+    @property
+    def model(self) -> pin.Model:
+        """The model of the figure."""
+
+    @property
+    def table(self) -> PairTable:
+        """The pieces and pairs."""
+
+    @property
+    def sweep(self) -> Sweep:
+        """Conservative advancement with the pieces where they stand now."""
+
+    def near(self, q: Array, within: float) -> Contacts:
+        """Every pair nearer than `within` metres at a posture (nq,)."""
+
+    def placements(self, q: Array) -> Array:
+        """Where all pieces are at a posture (nq,); see `Contacts.placements`."""
+
+
+def passes_through(queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array) -> bool:
+    """Whether some pair is on other sides of each other after a motion than before it.
 
     A pair that touches on the way and still does at the end was bumped into, which its distance tells; one that is
-    apart again was jumped over. The way is halved a few times, which parts most pairs beyond doubt at a tenth of the
+    apart again was passed through. The way is halved a few times, which parts most pairs beyond doubt at a tenth of the
     cost of a sweep; what remains is swept.
 
     Args:
-        workspace: of the run that makes the step; its state is moved.
-        before: where the pieces are before the step.
+        queries: of the run that makes the motion; its state is moved.
+        before: where the pieces are before the motion.
         after: where they are after it.
-        q0: (nq,) posture before the step.
+        q0: (nq,) posture before the motion.
         q1: (nq,) posture after it.
     """
-    table = workspace.table
+    table = queries.table
     moved = far_moved(table, before, after)
     if not len(moved):
         return False
-    moved = moved[~_passing_by(workspace, before, after, q0, q1, moved)]
+    moved = moved[~_passing_by(queries, before, after, q0, q1, moved)]
     doubtful = _not_parted(table, before, after, moved)
-    return bool(len(doubtful)) and _jumps(workspace, before, after, q0, q1, doubtful, HALVINGS)
+    return bool(len(doubtful)) and _halved(queries, before, after, q0, q1, doubtful, HALVINGS)
 
 
-def _jumps(
-    workspace: Workspace, before: Placed, after: Placed, q0: Array, q1: Array, doubtful: Indices, halvings: int
+def _halved(
+    queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array, doubtful: Indices, halvings: int
 ) -> bool:
-    table = workspace.table
+    table = queries.table
     end = distances(after, len(table.pairs))
     if not halvings:
-        return _sweep_jumps(workspace, q0, q1, doubtful, end)
-    q = pin.interpolate(workspace.model, q0, q1, 0.5)
-    middle = Placed(workspace.near(q, before.within), before.within)
+        return _swept_through(queries, q0, q1, doubtful, end)
+    q = pin.interpolate(queries.model, q0, q1, 0.5)
+    middle = Placed(queries.near(q, before.within), before.within)
     inside = distances(middle, len(table.pairs))[doubtful] < -OVERLAP
     if (inside & (end[doubtful] > -OVERLAP)).any():
         return True
     for first, last, start, stop in ((before, middle, q0, q), (middle, after, q, q1)):
         still = np.intersect1d(doubtful_pairs(table, first, last), doubtful, assume_unique=True)
-        if len(still) and _jumps(workspace, first, last, start, stop, still, halvings - 1):
+        if len(still) and _halved(queries, first, last, start, stop, still, halvings - 1):
             return True
     return False
 
 
-def _sweep_jumps(workspace: Workspace, q0: Array, q1: Array, doubtful: Indices, end: Array) -> bool:
+def _swept_through(queries: Queries, q0: Array, q1: Array, doubtful: Indices, end: Array) -> bool:
     """By continuous collision detection of these pairs; `end` are the distances (pairs,) after the way."""
     while len(doubtful):
-        hit = workspace.sweep.first_contact(q0, q1, workspace.table.pairs[doubtful], OVERLAP)
+        hit = queries.sweep.first_contact(q0, q1, queries.table.pairs[doubtful], OVERLAP)
         if hit is None:
             return False
         if end[hit.index] > -OVERLAP:
@@ -77,21 +103,40 @@ def _sweep_jumps(workspace: Workspace, q0: Array, q1: Array, doubtful: Indices, 
     return False
 
 
+def first_passed(
+    queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array, overlap: float
+) -> FirstContact | None:
+    """First contact of a pair that may have changed sides, and is apart after the motion; None where there is none.
+
+    Args:
+        queries: of the run.
+        before: where the pieces are before the motion.
+        after: where they are after it.
+        q0: (nq,) posture before the motion.
+        q1: (nq,) posture after it.
+        overlap: m of overlap on the way that does not count.
+    """
+    table = queries.table
+    moved = far_moved(table, before, after)
+    doubtful = moved[distances(after, len(table.pairs))[moved] > -overlap]
+    return queries.sweep.first_contact(q0, q1, table.pairs[doubtful], overlap) if len(doubtful) else None
+
+
 def doubtful_pairs(table: PairTable, before: Placed, after: Placed) -> Indices:
     """Pairs (indices into the collision pairs) that may have changed sides between two postures."""
     return _not_parted(table, before, after, far_moved(table, before, after))
 
 
 def _passing_by(
-    workspace: Workspace, before: Placed, after: Placed, q0: Array, q1: Array, pairs: Indices
+    queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array, pairs: Indices
 ) -> NDArray[np.bool_]:
     """Which of these pairs keep their bounding spheres apart all the way, as a look at its middle has it.
 
     The centres' way against each other is taken for the two chords that meet in the middle; what it leaves them by is
     a quarter of what the middle is off the whole chord where the way is a parabola, and taken for twice that.
     """
-    table, state = workspace.table, workspace.state
-    halfway = workspace.proximity.placements(state.update(pin.interpolate(workspace.model, q0, q1, 0.5)).data)
+    table = queries.table
+    halfway = queries.placements(np.asarray(pin.interpolate(queries.model, q0, q1, 0.5)))
     first, second = table.pairs[pairs, 0], table.pairs[pairs, 1]
     start, middle, end = (
         placements[first, 3] - placements[second, 3] for placements in (before.placements, halfway, after.placements)
@@ -119,7 +164,7 @@ def _not_parted(table: PairTable, before: Placed, after: Placed, doubtful: Indic
 
 
 def _parted(table: PairTable, before: Placed, after: Placed, contact: int) -> bool:
-    """Whether the plane between two pieces before the step still parts them after it, carried by either."""
+    """Whether the plane between two pieces before the motion still parts them after it, carried by either."""
     if contact < 0:
         return False
     first, second = before.contacts.pair[contact]

@@ -1,9 +1,9 @@
 """The first contact on the way from one posture to another, by conservative advancement.
 
 Each pair is safe for as long as its distance, divided by the most speed with which it can shrink
-(`wholebody.geometry.motion_bounds`), says. The motion jumps to the end of the shortest such time, asks coal again for
-the pairs that are due, and so on: nothing can be passed between two questions, however thin (Mirtich 1996; Zhang, Lee
-and Kim 2006).
+(`wholebody.geometry.continuous.motion_bounds`), says. The motion jumps to the end of the shortest such time, asks coal
+again for the pairs that are due, and so on: nothing can be passed between two questions, however thin (Mirtich 1996;
+Zhang, Lee and Kim 2006).
 
 Pieces that slide on each other would be asked again and again. For them the distance to a plane that moves with one of
 the two pieces is bounded to second order: heights, their exact rates and a bound of their acceleration; the plane
@@ -19,10 +19,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.errors import InputError
+from wholebody.geometry.continuous.motion_bounds import MotionBounds
 from wholebody.geometry.cores import core_of
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, read_result
-from wholebody.geometry.motion_bounds import MotionBounds
 from wholebody.geometry.pieces import Array
 from wholebody.geometry.proximity import SINGLY
 
