@@ -11,7 +11,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.interaction import FrameLoop, Track, follow
-from wholebody.interaction.nearest import CLEARANCE
+from wholebody.interaction.qp_strategy import CLEARANCE
 from wholebody.tasks import ReachCones
 
 

@@ -11,8 +11,8 @@ import pytest
 
 import wholebody as wb
 from wholebody.geometry.penetration import global_depth
-from wholebody.methods.ccd.overlap import remove_overlap
-from wholebody.methods.ccd.remover import Remover
+from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
+from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
 
 
 def _wall(figure: wb.Figure) -> tuple[wb.Scene, list[Any]]:
@@ -65,7 +65,7 @@ def test_no_frame_overlaps_and_the_last_is_what_is_tracked(
     rng, q, wanted_inside, pushed = np.random.default_rng(0), frames[0], 0.0, 0
     for wanted in frames + [frames[-1]] * 30:
         before = q
-        result = remove_overlap(scene, q, wanted, rng)
+        result = resolve_overlap(scene, q, wanted, rng)
         q = result.q
         assert np.isfinite(q).all()
         assert deepest(scene, q) <= 1e-3
@@ -91,7 +91,7 @@ def test_a_hand_slides_along_what_stops_it(avatar: wb.Figure, track: Callable[..
 
     shown, tracked = [], []
     for wanted in track(avatar, *postures[:3]):
-        q = remove_overlap(scene, q, wanted, rng).q
+        q = resolve_overlap(scene, q, wanted, rng).q
         shown.append(tip(q)[1])
         tracked.append(tip(wanted)[1])
     way = tracked[-1] - tracked[40]
@@ -105,7 +105,7 @@ def test_the_same_seed_gives_the_same_frames(avatar: wb.Figure, track: Callable[
         scene, postures = _arms(avatar)
         rng, q = np.random.default_rng(8), postures[0]
         for wanted in track(avatar, *postures, frames=15):
-            q = remove_overlap(scene, q, wanted, rng).q
+            q = resolve_overlap(scene, q, wanted, rng).q
         runs.append(q)
     assert (runs[0] == runs[1]).all()
 
@@ -115,7 +115,7 @@ def test_things_that_come_over_a_limb_push_it_out(avatar: wb.Figure, deepest: Ca
     q, rng = avatar.posture("arms_forward"), np.random.default_rng(0)
     for k in range(30):
         scene.move("box", at=(1.0 - 0.01 * k, -0.25, 1.38))
-        q = remove_overlap(scene, q, avatar.posture("arms_forward"), rng).q
+        q = resolve_overlap(scene, q, avatar.posture("arms_forward"), rng).q
         assert deepest(scene, q) <= 1e-3
 
 
@@ -129,7 +129,7 @@ def test_what_is_left_is_said_of_the_posture_that_is_shown(avatar: wb.Figure, de
         nearest = min(box, key=lambda k: float(contacts.distance[k]))
         assert "pelvis" in {scene.piece_owner[i] for i in contacts.pair[nearest]}
         scene.move("box", at=(-0.5 + float(contacts.distance[nearest]) + depth, 0.0, 0.95))
-        result = remove_overlap(scene, standing, avatar.posture("arms_forward"), np.random.default_rng(0))
+        result = resolve_overlap(scene, standing, avatar.posture("arms_forward"), np.random.default_rng(0))
         assert deepest(scene, result.q) > 1e-4
         assert result.deepest == pytest.approx(deepest(scene, result.q), abs=5e-6)
 
@@ -145,7 +145,7 @@ def test_cancelling_normals_do_not_hold_a_link_inside(
     contacts = scene.contacts(straight, within=0.0)
     assert len(contacts.distance) == 2
     assert global_depth(-contacts.distance, contacts.normal) == pytest.approx(np.zeros(3), abs=1e-6)
-    q, left = Remover(scene, scene.workspace()).separate(straight, np.random.default_rng(0))
+    q, left = OverlapResolver(scene, scene.workspace()).resolve(straight, np.random.default_rng(0))
     assert not left
     assert deepest(scene, q) <= 1e-4
     assert np.abs(q).max() < 0.4
@@ -154,4 +154,4 @@ def test_cancelling_normals_do_not_hold_a_link_inside(
 @pytest.mark.parametrize("bad", [np.zeros(3), np.full(38, np.nan)])
 def test_postures_that_are_none_are_refused(bad: Any, avatar: wb.Figure) -> None:
     with pytest.raises(wb.InputError, match="q_wanted"):
-        remove_overlap(wb.Scene(avatar), avatar.neutral, bad, np.random.default_rng(0))
+        resolve_overlap(wb.Scene(avatar), avatar.neutral, bad, np.random.default_rng(0))

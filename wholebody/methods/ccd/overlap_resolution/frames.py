@@ -1,7 +1,7 @@
 """Removal of overlap from frame to frame: the posture shown is as near to the tracked one as contact allows.
 
 Each frame goes from the last posture without overlap towards the tracked one, in steps short enough that what they
-overlap is shallow, and every step is pushed out again by the loop of `remover`. So the joints are drawn to the tracked
+overlap is shallow, and every step is pushed out again by the loop of `resolver`. So joints are attracted to the tracked
 ones in every frame, also at rest (the coach and trainee of Boulic and others 1997), limbs slide along what stops them,
 and the global penetration is asked only where it is a good estimate. A step that cannot be pushed out is shortened by
 interpolation with the last posture without overlap (algorithm 1, step 4, of Schmidl and Lin).
@@ -18,23 +18,23 @@ from numpy.typing import NDArray
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.geometry.continuous.passing_through import first_passed
-from wholebody.methods.ccd.drawing import Drawer
-from wholebody.methods.ccd.pushing import SKIN
-from wholebody.methods.ccd.remover import Remover, Tally
+from wholebody.methods.ccd.attraction import Attraction
+from wholebody.methods.ccd.overlap_resolution.chain import MARGIN
+from wholebody.methods.ccd.overlap_resolution.resolver import Counts, OverlapResolver
 from wholebody.scene import Scene
 
 Array = NDArray[np.float64]
 
-STEP = 0.03  # m: farthest that a chain's tip is drawn at once; half of a forearm's width
+STEP = 0.03  # m: farthest that a chain's tip moves at once; half of a forearm's width
 SMALL_STEP = 0.006  # m: where steps of that length lead around a bulge that the straight way cuts
 STEPS = 8  # most steps of one frame
-ENOUGH = 42  # looks and goals after which a frame makes no further step, and the next one goes on: some 3 ms
-LEAST = 15  # looks and goals for small steps, where larger ones led nowhere straight
-TOO_MANY = 16  # looks and goals beyond these after which no chain has another turn
+BUDGET = 42  # queries and goals after which a frame makes no further step, and the next one goes on: some 3 ms
+SMALL_STEP_BUDGET = 15  # queries and goals for small steps, where larger ones led nowhere straight
+OVERRUN = 16  # queries and goals beyond these after which no chain has another turn
 HALVINGS = 7  # of an interpolation: a step of 3 cm to a quarter of a millimetre
-SHAKES = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things came upon and that no joint's best value frees
-APART = 0.02  # m: how far a tip moves between two looks at the straight way from one shown posture to the next
-MOST_LOOKS = 5
+PERTURBATIONS = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things came upon and that no joint's best value frees
+APART = 0.02  # m: how far a tip moves between two queries on the straight way from one shown posture to the next
+MOST_QUERIES = 5
 DIP = 4e-4  # m: how deep it may go in there
 PASSED = (
     2e-3  # m: overlap of a single step, not of what is shown, that does not count; the way shown is swept more closely
@@ -70,7 +70,7 @@ class OverlapResult:
     swept: bool
 
 
-def remove_overlap(
+def resolve_overlap(
     scene: Scene, q_free: Array, q_wanted: Array, rng: np.random.Generator, pace: Array | None = None
 ) -> OverlapResult:
     """The posture nearest to the wanted one that this frame can reach without overlap.
@@ -91,48 +91,48 @@ def remove_overlap(
         InputError: a posture of the wrong shape, or a value that is not finite.
     """
     checked = [_posture(scene, q, what) for q, what in ((q_free, "q_free"), (q_wanted, "q_wanted"))]
-    with scene.built.pool(Frames, lambda: Frames(scene)).lend() as frames:
+    with scene.built.pool(FrameResolver, lambda: FrameResolver(scene)).lend() as frames:
         return frames.remove(checked[0], checked[1], rng, pace)
 
 
-class Frames:
+class FrameResolver:
     """Removal of overlap from frame to frame in one scene."""
 
     def __init__(self, scene: Scene) -> None:
         """Prepare the chains, and which degrees of freedom are of which."""
         self._model, self._figure, self._workspace = scene.model, scene.figure, scene.workspace()
-        self._remover = Remover(scene, self._workspace, exact=False)
-        self._drawer = Drawer(scene, self._remover)
-        self._parts = self._drawer.parts
+        self._resolver = OverlapResolver(scene, self._workspace, exact=False)
+        self._attraction = Attraction(scene, self._resolver)
+        self._parts = self._attraction.parts
 
     def remove(
         self, q_free: Array, q_wanted: Array, rng: np.random.Generator, pace: Array | None = None
     ) -> OverlapResult:
-        """See `remove_overlap`."""
+        """See `resolve_overlap`."""
         self._workspace.begin()
         self._pace = np.full(self._model.nv, np.inf) if pace is None else pace
-        remover = self._remover
-        remover.tally, remover.skin = Tally(), SKIN
-        wanted = remover.into_cones(self._figure.clamp(q_wanted))
+        resolver = self._resolver
+        resolver.counts, resolver.margin = Counts(), MARGIN
+        wanted = resolver.into_cones(self._figure.clamp(q_wanted))
         self._fell_back = self._swept = False
-        q, overlaps = remover.separate(q_free, rng, TOO_MANY)
-        pushed = remover.tally.iterations > 0
-        for size in SHAKES if overlaps else ():
-            shaken, still = remover.separate(self._shaken(q_free, size, rng), rng, remover.tally.work + TOO_MANY)
+        q, overlaps = resolver.resolve(q_free, rng, OVERRUN)
+        pushed = resolver.counts.iterations > 0
+        for size in PERTURBATIONS if overlaps else ():
+            perturbed, still = resolver.resolve(self._perturbed(q_free, size, rng), rng, resolver.counts.work + OVERRUN)
             if not still:
-                q, overlaps = shaken, still
+                q, overlaps = perturbed, still
                 break
         if overlaps:
-            return self._result(q if remover.look(wanted) else wanted)
-        before = self._remover.placed
+            return self._result(q if resolver.query(wanted) else wanted)
+        before = self._resolver.placed
         shown = None
-        self._drawer.free = not remover.look(wanted)
-        remover.skin = WIDE if self._drawer.free else SKIN
-        if self._drawer.free and not self._passes_through(before, q, wanted):
+        self._attraction.free = not resolver.query(wanted)
+        resolver.margin = WIDE if self._attraction.free else MARGIN
+        if self._attraction.free and not self._passes_through(before, q, wanted):
             shown = self._toward(q, wanted)
-        self._drawer.limit = remover.tally.work + ENOUGH + TOO_MANY
-        for self._drawer.step in (STEP, SMALL_STEP) if shown is None else ():
-            self._drawer.limit = max(self._drawer.limit, remover.tally.work + LEAST + TOO_MANY)
+        self._attraction.limit = resolver.counts.work + BUDGET + OVERRUN
+        for self._attraction.step_length in (STEP, SMALL_STEP) if shown is None else ():
+            self._attraction.limit = max(self._attraction.limit, resolver.counts.work + SMALL_STEP_BUDGET + OVERRUN)
             way = self._approach(q, wanted, before, rng)
             chosen = dict.fromkeys((len(way) - 1, len(way) // 2, 0)) if way else ()
             found = (self._toward(q, way[k]) for k in chosen)
@@ -144,27 +144,29 @@ class Frames:
 
     def _approach(self, q: Array, wanted: Array, before: Placed, rng: np.random.Generator) -> list[Array]:
         """From a free posture towards the wanted one, step by step: the postures on the way."""
-        remover = self._remover
+        resolver = self._resolver
         settled = [False] * len(self._parts)
-        settled[-1] = later = self._drawer.free  # limbs that are pressed at something leave it before the root goes on
+        settled[-1] = later = (
+            self._attraction.free
+        )  # limbs that are pressed at something leave it before the root goes on
         way = []
         for _ in range(STEPS):
-            if remover.tally.work > self._drawer.limit - TOO_MANY:
+            if resolver.counts.work > self._attraction.limit - OVERRUN:
                 break
-            drawn = self._drawer.draw(q, wanted, settled)
-            if drawn is None and later:
+            moved = self._attraction.step(q, wanted, settled)
+            if moved is None and later:
                 settled[-1] = later = False
-                drawn = self._drawer.draw(q, wanted, settled)
-            if drawn is None:
+                moved = self._attraction.step(q, wanted, settled)
+            if moved is None:
                 break
-            trial, overlaps = remover.separate(drawn[0], rng, self._drawer.limit)
+            trial, overlaps = resolver.resolve(moved[0], rng, self._attraction.limit)
             if overlaps:
                 trial = self._interpolate(q, trial)
             if self._passes_through(before, q, trial):
                 trial = self._interpolate(q, self._hit)
-            q = self._drawer.keep_gains(q, trial, wanted, drawn[1], settled)
+            q = self._attraction.keep_gains(q, trial, wanted, moved[1], settled)
             way.append(q)
-            before = self._remover.placed
+            before = self._resolver.placed
         return way
 
     def _toward(self, q0: Array, q1: Array) -> Array | None:
@@ -179,27 +181,27 @@ class Frames:
         least = float(shares.min())
         for share in (shares, least) if least < 1.0 else (1.0,):
             q = self._figure.clamp(np.asarray(pin.integrate(self._model, q0, share * way)))
-            q = self._remover.into_cones(q)
-            if not self._remover.look(q) and self._clear(q0, q):
+            q = self._resolver.into_cones(q)
+            if not self._resolver.query(q) and self._clear(q0, q):
                 return q
         return None
 
     def _clear(self, q0: Array, q1: Array) -> bool:
-        """Whether the straight way between two shown postures does not dip in; looks are cheap, the sweep is sure."""
+        """Whether the straight way between two shown postures does not dip in; queries are cheap, the sweep is sure."""
         way = np.abs(np.asarray(pin.difference(self._model, q0, q1)))
         length = max(float(way[dofs] @ reach) for dofs, reach in self._parts)
-        looks = min(int(length / APART), MOST_LOOKS)
-        for k in range(looks):
-            self._remover.look(np.asarray(pin.interpolate(self._model, q0, q1, (k + 1) / (looks + 1))))
-            if self._remover.deepest > DIP:
+        queries = min(int(length / APART), MOST_QUERIES)
+        for k in range(queries):
+            self._resolver.query(np.asarray(pin.interpolate(self._model, q0, q1, (k + 1) / (queries + 1))))
+            if self._resolver.deepest > DIP:
                 return False
         return self._workspace.sweep.first_contact(q0, q1, None, 2.0 * DIP) is None
 
-    def _shaken(self, q: Array, size: float, rng: np.random.Generator) -> Array:
+    def _perturbed(self, q: Array, size: float, rng: np.random.Generator) -> Array:
         """Copy of a posture q (nq,) with its joints moved at random: a straight arm pushed along itself must bend."""
         step = size * rng.normal(size=self._model.nv)
         step[self._parts[-1][0]] = 0.0
-        return self._remover.into_cones(self._figure.clamp(np.asarray(pin.integrate(self._model, q, step))))
+        return self._resolver.into_cones(self._figure.clamp(np.asarray(pin.integrate(self._model, q, step))))
 
     def _interpolate(self, free: Array, q: Array) -> Array:
         """The last free posture on the way from a free one, by halving."""
@@ -207,33 +209,33 @@ class Frames:
         inside, outside = 0.0, 1.0
         for _ in range(HALVINGS):
             middle = 0.5 * (inside + outside)
-            if self._remover.look(np.asarray(pin.interpolate(self._model, free, q, middle))):
+            if self._resolver.query(np.asarray(pin.interpolate(self._model, free, q, middle))):
                 outside = middle
             else:
                 inside = middle
         result = np.asarray(pin.interpolate(self._model, free, q, inside))
-        self._remover.look(result)
+        self._resolver.query(result)
         return result
 
     def _passes_through(self, before: Placed, q0: Array, q1: Array) -> bool:
         """Whether the motion passes through something; `_hit` is then where it meets it first."""
-        hit = first_passed(self._workspace, before, self._remover.placed, q0, q1, PASSED)
+        hit = first_passed(self._workspace, before, self._resolver.placed, q0, q1, PASSED)
         if hit is not None:
             self._hit = hit.q
         return hit is not None
 
     def _result(self, q: Array) -> OverlapResult:
-        tally = self._remover.tally
-        self._remover.look(q)
+        counts = self._resolver.counts
+        self._resolver.query(q)
         return OverlapResult(
             q=q,
-            iterations=tally.iterations,
-            joints=tally.joints,
-            pairs=len(tally.pairs),
-            contact_seconds=tally.contact_seconds,
-            ik_seconds=tally.ik_seconds,
+            iterations=counts.iterations,
+            joints=counts.joints,
+            pairs=len(counts.pairs),
+            contact_seconds=counts.contact_seconds,
+            ik_seconds=counts.ik_seconds,
             fell_back=self._fell_back,
-            deepest=self._remover.deepest,
+            deepest=self._resolver.deepest,
             swept=self._swept,
         )
 

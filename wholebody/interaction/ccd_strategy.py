@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.interaction.removal import Removal
-from wholebody.methods.ccd.overlap import remove_overlap
+from wholebody.interaction.overlap_strategy import Resolution
+from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
 from wholebody.scene import Scene
 
 Array = NDArray[np.float64]
@@ -22,10 +22,10 @@ half a second, and slow enough not to look like a jump."""
 ROOT_SPEED = 2.0  # m/s
 
 
-class LimbByLimb:
-    """Follows tracked postures by the loop of Schmidl and Lin, see `wholebody.methods.ccd.overlap`."""
+class CCDStrategy:
+    """Follows tracked postures by the loop of Schmidl and Lin (`wholebody.methods.ccd.overlap_resolution`)."""
 
-    graze = 8e-4
+    sweep_tolerance = 8e-4
 
     def __init__(self, scene: Scene, shown: Array, dt: float, seed: int) -> None:
         """Set up for frames of `dt` seconds.
@@ -43,14 +43,14 @@ class LimbByLimb:
         self._tracked = shown
         self._rng = np.random.default_rng(seed)
 
-    def remove(self, shown: Array, tracked: Array) -> Removal:
+    def resolve(self, shown: Array, tracked: Array) -> Resolution:
         """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""
         pace = self._pace + np.abs(pin.difference(self.scene.model, self._tracked, tracked))
         self._tracked = tracked
-        result = remove_overlap(self.scene, shown, tracked, self._rng, pace)
+        result = resolve_overlap(self.scene, shown, tracked, self._rng, pace)
         note = f"{1e3 * result.deepest:.1f} mm of overlap are left" if result.deepest > NOTED else ""
-        return Removal(
-            ways=(result.q,),
+        return Resolution(
+            candidates=(result.q,),
             contact_seconds=result.contact_seconds,
             solve_seconds=result.ik_seconds,
             iterations=result.iterations,

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from wholebody.methods.ccd.cones import guards
 from wholebody.methods.ccd.limbs import Limbs, moved, rotated, seen_from
-from wholebody.methods.ccd.links import Link, LinkFinder, Overlap, Vector
+from wholebody.methods.ccd.overlap_resolution.links import Link, LinkFinder, Overlap, Vector
 from wholebody.methods.ccd.sweep import Aims, sweep
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
-SKIN = 2e-4  # m: how far outside a goal lies, so that the next look finds nothing
+MARGIN = 2e-4  # m: how far outside a goal lies, so that the next query finds nothing
 CLOSE = 1e-4  # m: a goal nearer than this is reached
 SWEEPS = 5  # for one goal; it is set anew afterwards, so more is lost time
 SLOW = 0.9  # a sweep that leaves more than this share of the distance is the last one
@@ -25,7 +25,7 @@ PARALLEL = 0.26  # sine of 15 degrees: a bone at a smaller angle to the obstacle
 SHORT = 0.02  # m: a link shorter than this has no direction worth the name
 
 
-class ChainPusher:
+class ChainResolver:
     """A chain of the figure with its links, limits and cones.
 
     Attributes:
@@ -104,13 +104,13 @@ class ChainPusher:
         """The overlapping link nearest to the root; see `LinkFinder.find`."""
         return self._finder.find(overlaps)
 
-    def push(self, link: Link, skin: float = SKIN) -> tuple[int, ...]:
-        """Turn the chain so that the link leaves, to `skin` metres; the nodes that took part. `read` comes before."""
+    def push(self, link: Link, margin: float = MARGIN) -> tuple[int, ...]:
+        """Turn the chain so that the link leaves, to `margin` metres; the nodes that took part. `read` comes before."""
         x, y, z = link.push
         length = (x * x + y * y + z * z) ** 0.5
         if length < 1e-9:
             return ()
-        grow = 1.0 + skin / length
+        grow = 1.0 + margin / length
         push = (grow * x, grow * y, grow * z)
         inner = self._inner(link)
         if inner and self._parallel(link, push):

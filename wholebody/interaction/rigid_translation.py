@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from wholebody.errors import InputError
 from wholebody.geometry.penetration import global_depth
-from wholebody.interaction.removal import Removal
+from wholebody.interaction.overlap_strategy import Resolution
 from wholebody.scene import Scene
 
 Array = NDArray[np.float64]
@@ -34,10 +34,10 @@ HALVINGS = 8
 GAIN = 1e-5  # m, rad: a step that brings the hand no nearer than this ends the frame
 
 
-class AsAWhole:
+class RigidTranslation:
     """Follows tracked postures of a figure with a free root that is taken for rigid."""
 
-    graze = 2e-4
+    sweep_tolerance = 2e-4
 
     def __init__(self, scene: Scene) -> None:
         """Set up.
@@ -53,7 +53,7 @@ class AsAWhole:
         owners = list(dict.fromkeys(scene.piece_owner))
         self._owner = np.array([owners.index(owner) for owner in scene.piece_owner])
 
-    def remove(self, shown: Array, tracked: Array) -> Removal:
+    def resolve(self, shown: Array, tracked: Array) -> Resolution:
         """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""
         self._workspace.refresh()
         began, queried = time.perf_counter(), self._workspace.proximity.seconds
@@ -69,7 +69,7 @@ class AsAWhole:
             q = following
         queried = self._workspace.proximity.seconds - queried
         spent = time.perf_counter() - began - queried
-        return Removal((q,), queried, spent, self._displacements, 0, self._pairs, note)
+        return Resolution((q,), queried, spent, self._displacements, 0, self._pairs, note)
 
     def _with_glove(self, shown: Array, tracked: Array) -> Array | None:
         """The shown hand with the tracked fingers, displaced out of what they go into; None where that fails."""

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.methods.ccd.limbs import movable
-from wholebody.methods.ccd.links import Overlap
-from wholebody.methods.ccd.pushing import SKIN, ChainPusher
+from wholebody.methods.ccd.overlap_resolution.chain import MARGIN, ChainResolver
+from wholebody.methods.ccd.overlap_resolution.links import Overlap
 from wholebody.methods.control import Control
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
-TOUCH = 1e-4  # m: an overlap that does not count; coal's own accuracy is a hundredth of it
+TOLERANCE = 1e-4  # m: an overlap that does not count; coal's own accuracy is a hundredth of it
 GOALS = 8  # most goals for one chain before the next has its turn
 PASSES = 4  # most times that every chain has its turn
 SLOW = 0.8  # a goal that leaves more than this share of the link's overlap is the last one of the turn
@@ -30,10 +30,10 @@ GAIN = 0.98  # a pass that leaves more than this share of the deepest overlap le
 
 
 @dataclass
-class Tally:
+class Counts:
     """What a removal did, summed over its parts; a joint counts once for each goal that moved it."""
 
-    looks: int = 0
+    queries: int = 0
     iterations: int = 0
     joints: int = 0
     pairs: set[tuple[int, int]] = field(default_factory=set)
@@ -43,18 +43,18 @@ class Tally:
     @property
     def work(self) -> int:
         """Looks and goals together; each takes some 60 us."""
-        return self.looks + self.iterations
+        return self.queries + self.iterations
 
 
-class Remover:
+class OverlapResolver:
     """Takes overlap out of postures of one scene, re-used from posture to posture.
 
     Attributes:
         workspace: of the run.
-        placed: the pieces and pairs at the last look.
-        tally: what was done since it was last set.
-        deepest: deepest overlap found by the last look, metres, against the distance asked of the pair.
-        skin: how far outside links are pushed, metres.
+        placed: the pieces and pairs at the last query.
+        counts: what was done since it was last set.
+        deepest: deepest overlap found by the last query, metres, against the distance asked of the pair.
+        margin: how far outside links are pushed, metres.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Remover:
         clearances: Array | None = None,
         fixed: frozenset[int] = frozenset(),
         cones: Sequence[str] | None = None,
-        touch: float = TOUCH,
+        tolerance: float = TOLERANCE,
         exact: bool = True,
         control: Control | None = None,
     ) -> None:
@@ -76,22 +76,22 @@ class Remover:
             clearances: (pairs,) distance asked of every collision pair, metres; zero where None.
             fixed: Pinocchio's indices of joints that must not move.
             cones: names of the reach cones that are kept; all of the figure's where None.
-            touch: overlap that does not count, metres.
+            tolerance: overlap that does not count, metres.
             exact: where PD_g cancels, look for the least translation that separates, which takes up to 0.1 s.
             control: what may end the pushing.
         """
         self.control = Control(np.inf) if control is None else control
-        self.exact, self.skin = exact, SKIN
-        self.scene, self.workspace, self.clearances, self.touch = scene, workspace, clearances, touch
+        self.exact, self.margin = exact, MARGIN
+        self.scene, self.workspace, self.clearances, self.tolerance = scene, workspace, clearances, tolerance
         self._within = 0.0 if clearances is None else float(clearances.max(initial=0.0))
         self._data = scene.model.createData()
         self._joints = workspace.table.joint.tolist()
-        self.tally = Tally()
+        self.counts = Counts()
         self.deepest = 0.0
         self._fixed, self._cones = fixed, cones
 
     @cached_property
-    def chains(self) -> dict[str, ChainPusher]:
+    def chains(self) -> dict[str, ChainResolver]:
         """Name to chain, in the figure's order; made when something overlaps first."""
         named = {
             name: ([joint for joint in joints if joint not in self._fixed], tip)
@@ -99,25 +99,25 @@ class Remover:
         }
         everything = frozenset(joint for joints, _ in named.values() for joint in joints)
         return {
-            name: ChainPusher(
+            name: ChainResolver(
                 self.scene, self.workspace, name, joints, everything - set(joints), tip, self._cones, self.exact
             )
             for name, (joints, tip) in named.items()
             if joints
         }
 
-    def look(self, q: Array) -> list[Overlap]:
+    def query(self, q: Array) -> list[Overlap]:
         """What overlaps at a posture q (nq,), the deepest first."""
         began = time.perf_counter()
-        self.tally.looks += 1
+        self.counts.queries += 1
         pin.forwardKinematics(self.scene.model, self._data, q)
         near = self.workspace.proximity.near(self._data, self._within)
         self.placed = Placed(near, self._within)
         depth = -near.distance if self.clearances is None else self.clearances[near.number] - near.distance
         self.deepest = float(depth.max(initial=0.0))
         found: list[Overlap] = []
-        if self.deepest > self.touch:
-            rows = np.flatnonzero(depth > self.touch)
+        if self.deepest > self.tolerance:
+            rows = np.flatnonzero(depth > self.tolerance)
             rows = rows[np.argsort(-depth[rows], kind="stable")]
             for pair, size, normal, a, b in zip(
                 near.pair[rows].tolist(),
@@ -130,37 +130,37 @@ class Remover:
                 first, second = pair
                 joints = self._joints[first], self._joints[second]
                 found.append(Overlap(first, second, *joints, size, tuple(normal), tuple(a), tuple(b)))
-                self.tally.pairs.add((first, second))
-        self.tally.contact_seconds += time.perf_counter() - began
+                self.counts.pairs.add((first, second))
+        self.counts.contact_seconds += time.perf_counter() - began
         return found
 
-    def separate(self, q: Array, rng: np.random.Generator, most_work: float = np.inf) -> tuple[Array, list[Overlap]]:
+    def resolve(self, q: Array, rng: np.random.Generator, most_work: float = np.inf) -> tuple[Array, list[Overlap]]:
         """Push links out until nothing overlaps or nothing gains.
 
         Args:
             q: (nq,) posture.
             rng: of the order in which the chains have their turns.
-            most_work: of the tally, at which no further chain has its turn.
+            most_work: of the counts, at which no further chain has its turn.
 
         Returns:
             The posture, and what still overlaps in it.
         """
         q = q.copy()
-        overlaps = self.look(q)
+        overlaps = self.query(q)
         names = list(self.chains)
         for _ in range(PASSES):
             if not overlaps:
                 break
             before = self.deepest
             for k in rng.permutation(len(names)).tolist():
-                if self.tally.work > most_work or self.control.over:
+                if self.counts.work > most_work or self.control.over:
                     break
                 overlaps = self._leave(self.chains[names[k]], q, overlaps)
             if overlaps and self.deepest > GAIN * before:
                 break
         return q, overlaps
 
-    def _leave(self, chain: ChainPusher, q: Array, overlaps: list[Overlap]) -> list[Overlap]:
+    def _leave(self, chain: ChainResolver, q: Array, overlaps: list[Overlap]) -> list[Overlap]:
         """One chain leaves what it overlaps, with its goal set anew every time; q is changed in place."""
         worst, node = np.inf, -1
         for _ in range(GOALS):
@@ -170,12 +170,12 @@ class Remover:
             worst, node = link.depth, link.node
             began = time.perf_counter()
             chain.read(q, self._data)
-            nodes = chain.push(link, self.skin)
+            nodes = chain.push(link, self.margin)
             chain.limbs.write(q)
-            self.tally.ik_seconds += time.perf_counter() - began
-            self.tally.iterations += 1
-            self.tally.joints += len(nodes)
-            overlaps = self.look(q)
+            self.counts.ik_seconds += time.perf_counter() - began
+            self.counts.iterations += 1
+            self.counts.joints += len(nodes)
+            overlaps = self.query(q)
             if not nodes:
                 break
         return overlaps

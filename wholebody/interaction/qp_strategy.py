@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.interaction.attraction import Attraction, Pace
-from wholebody.interaction.removal import Removal
-from wholebody.methods.ccd.remover import Remover
+from wholebody.interaction.overlap_strategy import Resolution
+from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene import Scene
@@ -39,10 +39,10 @@ RIGID_WEIGHT = 100.0
 8 cm long then takes a ten-thousandth of a displacement."""
 
 
-class NearestPosture:
+class QPStrategy:
     """Follows tracked postures by a tracker of `QP`."""
 
-    graze = 5e-5
+    sweep_tolerance = 5e-5
 
     def __init__(self, scene: Scene, start: Array, dt: float, rigid: bool) -> None:
         """Set up for frames of `dt` seconds, from the overlap-free posture `start`, (nq,).
@@ -61,9 +61,9 @@ class NearestPosture:
             scene, start, constraints=[self._pace, *cones], measures=[self._attraction], clearance=CLEARANCE
         )
         self._tracker = QP().tracker(self.problem, dt)
-        self._into_cones = Remover(scene, scene.workspace()).into_cones if cones else np.array
+        self._into_cones = OverlapResolver(scene, scene.workspace()).into_cones if cones else np.array
 
-    def remove(self, shown: Array, tracked: Array) -> Removal:
+    def resolve(self, shown: Array, tracked: Array) -> Resolution:
         """One frame: from the posture that is shown towards the tracked one, as near as it can be.
 
         Args:
@@ -76,19 +76,19 @@ class NearestPosture:
         self._attraction.toward(self._into_cones(tracked))
         self._pace.begin(shown)
         q = shown
-        ways: list[Array] = []
-        while len(ways) < STEPS:
+        candidates: list[Array] = []
+        while len(candidates) < STEPS:
             step = self._tracker.step(q)
             q = self._into_cones(step.q)  # rows are exact to first order only, and a corner of a cone is no edge
-            ways.append(q)
+            candidates.append(q)
             if np.abs(step.displacement).max() < SETTLED or not step.rows:
                 break
         contacts = workspace.near(q, 1.01 * CLEARANCE)
         pairs = int((contacts.distance < self.problem.clearances[contacts.number] + 0.01 * CLEARANCE).sum())
         queried = proximity.seconds - queried
         whole = time.perf_counter() - began
-        joints = len(ways) * (self.scene.model.njoints - 1) if pairs else 0
-        return Removal(tuple(ways[::-1]), queried, whole - queried, len(ways), joints, pairs, "")
+        joints = len(candidates) * (self.scene.model.njoints - 1) if pairs else 0
+        return Resolution(tuple(candidates[::-1]), queried, whole - queried, len(candidates), joints, pairs, "")
 
 
 def weights(scene: Scene, rigid: bool) -> Array:

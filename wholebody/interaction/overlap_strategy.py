@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-class Removal(NamedTuple):
+class Resolution(NamedTuple):
     """How the overlap of one frame was removed; the other attributes are those of `wholebody.interaction.Frame`.
 
     Attributes:
-        ways: postures (nq,) to show, the best one first; the next is taken if the way to one is not free.
+        candidates: postures (nq,) to show, the best one first; the next is taken if the way to one is not free.
         swept: the way to the first of them was swept and is free.
     """
 
-    ways: tuple[Array, ...]
+    candidates: tuple[Array, ...]
     contact_seconds: float
     solve_seconds: float
     iterations: int
@@ -28,12 +28,12 @@ class Removal(NamedTuple):
     swept: bool = False
 
 
-class Remover(Protocol):
+class OverlapStrategy(Protocol):
     """A way to remove overlap."""
 
     @property
-    def graze(self) -> float:
+    def sweep_tolerance(self) -> float:
         """Depth, metres, to which the way from frame to frame may go in: less than what its postures may keep."""
 
-    def remove(self, shown: Array, tracked: Array) -> Removal:
+    def resolve(self, shown: Array, tracked: Array) -> Resolution:
         """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""

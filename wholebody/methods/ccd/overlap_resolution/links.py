@@ -117,9 +117,9 @@ class LinkFinder:
         for _ in range(ROUNDS if len(pushes) > 1 else 0):
             for px, py, pz in pushes:
                 square = px * px + py * py + pz * pz
-                lack = 1.0 - (x * px + y * py + z * pz) / square if square > 0.0 else 0.0
-                if lack > 0.0:
-                    x, y, z = x + lack * px, y + lack * py, z + lack * pz
+                shortfall = 1.0 - (x * px + y * py + z * pz) / square if square > 0.0 else 0.0
+                if shortfall > 0.0:
+                    x, y, z = x + shortfall * px, y + shortfall * py, z + shortfall * pz
         return x, y, z
 
     def _global_depth(self, owner: str, group: Sequence[tuple[Overlap, bool]]) -> Vector:

@@ -1,4 +1,4 @@
-"""The pull of the tracked posture: parts of the figure are drawn to it in short steps, or else joint by joint.
+"""Attraction to the tracked posture: parts of the figure move to it in short steps, or else joint by joint.
 
 The joints that are displaced are attracted back in every frame, as far as contact allows (the coach and trainee of
 Boulic and others 1997).
@@ -10,33 +10,33 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.methods.ccd.remover import Remover
+from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
 from wholebody.scene import Scene
 
 Array = NDArray[np.float64]
 
 LEAST_GAIN = 1e-7  # rad^2: a part that gets no nearer than this to the tracked posture stays where it is
-HELD_UP = 0.4  # a part that gains less than this share of what drawing alone would have is held up (2 is all of it)
+BLOCKED = 0.4  # a part that gains less than this share of what attraction alone would have is blocked (2 is all of it)
 ARRIVED = 1e-12  # rad^2: a part this near is there
 
 
-class Drawer:
-    """Draws the chains of one figure, and what belongs to none (the root and trunk) as one part more.
+class Attraction:
+    """Moves the chains of one figure, and what belongs to none (the root and trunk) as one part more.
 
     Attributes:
         parts: degrees of freedom (k,) of each part, and how far from each of them its farthest point can be, (k,).
-        step: m that a part's tip is drawn at the most.
+        step_length: m that a part's tip moves in one step at the most.
         free: the wanted posture overlaps nothing: then a part may go a longer way round to it.
-        limit: of work in the remover's tally, beyond which joints are not tried one by one.
+        limit: of work in the resolver's counts, beyond which joints are not tried one by one.
     """
 
-    def __init__(self, scene: Scene, remover: Remover) -> None:
+    def __init__(self, scene: Scene, resolver: OverlapResolver) -> None:
         """Say which degrees of freedom are of which chain."""
-        self._model, self._remover = scene.model, remover
-        self.step, self.limit, self.free = 0.0, 0, False
+        self._model, self._resolver = scene.model, resolver
+        self.step_length, self.limit, self.free = 0.0, 0, False
         self.parts: list[tuple[NDArray[np.intp], Array]] = []
         rest = np.ones(scene.model.nv, dtype=bool)
-        for chain in remover.chains.values():
+        for chain in resolver.chains.values():
             joints = [scene.model.joints[joint] for joint in chain.limbs.joints]
             dofs = np.array([joint.idx_v for joint in joints], dtype=np.intp)
             fresh = rest[dofs]
@@ -49,11 +49,11 @@ class Drawer:
             reach[others < 3] = 1.0
         self.parts.append((others, reach))
 
-    def draw(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
-        """Draw every part that is not settled a step towards the wanted posture; None where none is left to draw.
+    def step(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
+        """Move every part that is not settled a step towards the wanted posture; None where none is left to move.
 
         Returns:
-            The posture drawn, (nq,), and the share of its way that each part was drawn, (parts,).
+            The posture there, (nq,), and the share of its way that each part went, (parts,).
         """
         way = np.asarray(pin.difference(self._model, q, wanted))
         shares = np.zeros(len(self.parts))
@@ -61,16 +61,16 @@ class Drawer:
             part = way[dofs]
             length = float(np.abs(part) @ reach)
             if not settled[k] and float(part @ part) >= ARRIVED:
-                shares[k] = min(1.0, self.step / length)
+                shares[k] = min(1.0, self.step_length / length)
             way[dofs] = part * shares[k]
         if not shares.any():
             return None
         return np.asarray(pin.integrate(self._model, q, way)), shares
 
     def keep_gains(self, q: Array, trial: Array, wanted: Array, shares: Array, settled: list[bool]) -> Array:
-        """Undo what brought a part no nearer to the wanted posture, and draw joints one by one where a part is held up.
+        """Undo what brought a part no nearer to the wanted posture, and move joints one by one where a part is blocked.
 
-        Where pushing undoes what drawing did, single joints may still be free: a shoulder that draws the whole arm
+        Where pushing undoes what attraction did, single joints may still be free: a shoulder that takes the whole arm
         back, although the wrist cannot straighten yet. A part for which this gains nothing either is settled.
         """
         before = np.asarray(pin.difference(self._model, q, wanted))
@@ -81,30 +81,30 @@ class Drawer:
             old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
             if shares[k] and old - new < LEAST_GAIN and not self.free:
                 back[dofs] = True
-            if shares[k] and old - new < HELD_UP * shares[k] * old:
+            if shares[k] and old - new < BLOCKED * shares[k] * old:
                 slow.append(k)
         if back.any():
             way = np.asarray(pin.difference(self._model, trial, q))
             kept = np.asarray(pin.integrate(self._model, trial, np.where(back, way, 0.0)))
-            if not self._remover.look(kept):
+            if not self._resolver.query(kept):
                 trial = kept
         for k in slow:
-            trial, gained = self._draw_joints(trial, wanted, k)
+            trial, gained = self._attract_joints(trial, wanted, k)
             settled[k] = not gained
         if len(slow) or back.any():
-            self._remover.look(trial)
+            self._resolver.query(trial)
         return trial
 
-    def _draw_joints(self, q: Array, wanted: Array, part: int) -> tuple[Array, bool]:
-        """Draw one joint after the other, from the root outwards, where that is free; whether any moved."""
+    def _attract_joints(self, q: Array, wanted: Array, part: int) -> tuple[Array, bool]:
+        """Move one joint after the other, from the root outwards, where that is free; whether any moved."""
         gained = False
         for dof, reach in zip(*self.parts[part], strict=True):
             way = float(pin.difference(self._model, q, wanted)[dof])
-            if way * way < LEAST_GAIN or self._remover.tally.work > self.limit:
+            if way * way < LEAST_GAIN or self._resolver.counts.work > self.limit:
                 continue
             step = np.zeros(self._model.nv)
-            step[dof] = min(max(way, -self.step / reach), self.step / reach)
+            step[dof] = min(max(way, -self.step_length / reach), self.step_length / reach)
             trial = np.asarray(pin.integrate(self._model, q, step))
-            if not self._remover.look(trial):
+            if not self._resolver.query(trial):
                 q, gained = trial, True
         return q, gained
