@@ -296,7 +296,7 @@ def test_round_shapes_and_far_ones_need_no_more_than_the_witness(free_bodies):
 
 
 def slowly(scene, q, contacts):
-    """The rows of every pair in plain loops over core points and faces, for boxes and hulls: (gap, point) by pair."""
+    """The rows of every pair in plain loops over swept points and faces, for boxes and hulls: (gap, point) by pair."""
     placed = placed_at(scene, q)
     piece = scene.geometry.geometryObjects
     found = []

@@ -14,7 +14,7 @@ from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
-from wholebody.geometry.cores import core_of
+from wholebody.geometry.swept_points import swept_points
 from wholebody.simplification.lifting import LiftedConstraint, LiftedGoal
 from wholebody.simplification.outer_pieces import coarser
 from wholebody.simplification.participation import participation
@@ -299,7 +299,7 @@ def test_coarser_pieces_hold_the_finer_ones_and_say_how_far_they_reach_out() -> 
     made = coarser(fine, 0.02)
     assert made is not None
     coarse, out = made
-    a, b = core_of(coarse.geometry), core_of(fine.geometry)
+    a, b = swept_points(coarse.geometry), swept_points(fine.geometry)
     assert len(a.points) < 0.2 * len(b.points)
     inner = coarse.placement.actInv(fine.placement)
     planes = a.faces
@@ -338,8 +338,8 @@ def test_a_thing_can_be_moved_in_the_smaller_scene(human: Figure) -> None:
     state = scene.state(human.neutral)
     fine, coarse = scene.geometry.geometryObjects[-1], small.geometry.geometryObjects[-1]
     inner = coarse.placement.actInv(fine.placement)
-    planes = core_of(coarse.geometry).faces
-    there = core_of(fine.geometry).points @ inner.rotation.T + inner.translation
+    planes = swept_points(coarse.geometry).faces
+    there = swept_points(fine.geometry).points @ inner.rotation.T + inner.translation
     assert (there @ planes[:, :3].T <= planes[:, 3] + 1e-9).all()
     assert state is not None
 

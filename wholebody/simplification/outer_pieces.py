@@ -10,9 +10,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.geometry.hull import hull_piece
-from wholebody.geometry.outer_hull import outer_hull
 from wholebody.geometry.pieces import Piece
 from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.geometry.simplified_hull import simplified_hull
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def _around(corners: bytes, growth: float) -> tuple[Piece, float] | None:
     points = np.frombuffer(corners).reshape(-1, 3)
     whole = hull_piece(points)
     for most in CORNERS:
-        outer = outer_hull(points, most)
+        outer = simplified_hull(points, most)
         out = farthest(outer - whole.placement.translation, whole.geometry)
         if out <= growth:
             return hull_piece(outer), out

@@ -51,7 +51,7 @@ def test_compiled_loops_find_the_pairs_that_array_code_finds(scene):
 def test_a_pair_that_is_left_out_had_more_room_than_its_points_moved(scene):
     """Corners of the pieces, followed in the world and seen from the other piece; distances from Pinocchio's loop."""
     table = scene.pair_table
-    points = [core.points for core in table.cores]
+    points = [swept.points for swept in table.swept]
     left_out = 0
     for q0, q1 in ways(scene, np.random.default_rng(5), 10):
         before, after = placed(scene, q0), placed(scene, q1)

@@ -173,19 +173,19 @@ def _parted(table: PairTable, before: Placed, after: Placed, contact: int) -> bo
         (first, second, normal, before.contacts.point_a[contact]),
         (second, first, -normal, before.contacts.point_b[contact]),
     ):
-        core = table.cores[other]
-        if not len(core.points):
+        swept = table.swept[other]
+        if not len(swept.points):
             continue
         local_normal = before.placements[carrier, :3] @ direction
         local_point = before.placements[carrier, :3] @ (point - before.placements[carrier, 3])
         heights = []
         for placed in (before.placements, after.placements):
-            world = core.points @ placed[other, :3] + placed[other, 3]
+            world = swept.points @ placed[other, :3] + placed[other, 3]
             local = (world - placed[carrier, 3]) @ placed[carrier, :3].T
-            heights.append(float(((local - local_point) @ local_normal).min()) - core.radius)
+            heights.append(float(((local - local_point) @ local_normal).min()) - swept.radius)
         turned = after.placements[[carrier, other], :3] - before.placements[[carrier, other], :3]
         angle = float(np.sqrt(0.5 * np.einsum("ijk,ijk->i", turned, turned)).sum())
-        arc = 0.125 * angle**2 * (core.reach + float(np.linalg.norm(before.placements[other, 3] - point)))
+        arc = 0.125 * angle**2 * (swept.reach + float(np.linalg.norm(before.placements[other, 3] - point)))
         if min(heights) - arc > -DIP:
             return True
     return False

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
-from wholebody.geometry.cores import core_of
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, read_result
 from wholebody.geometry.pieces import Array
 from wholebody.geometry.proximity import SINGLY
+from wholebody.geometry.swept_points import swept_points
 
 Indices = NDArray[np.intp]
 
@@ -74,9 +74,9 @@ class Sweep:
         """
         self.model, self.geometry = model, geometry
         self._data, self._results = model.createData(), pin.GeometryData(geometry)
-        self._cores = [core_of(piece.geometry) for piece in geometry.geometryObjects]
+        self._swept = [swept_points(piece.geometry) for piece in geometry.geometryObjects]
         joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
-        reach = np.array([core.reach for core in self._cores], dtype=float)
+        reach = np.array([swept.reach for swept in self._swept], dtype=float)
         self._bounds = MotionBounds(model, joint, reach)
         pairs = [[pair.first, pair.second] for pair in geometry.collisionPairs]
         self._pairs: Indices = np.array(pairs, dtype=np.intp).reshape(-1, 2)
@@ -181,8 +181,8 @@ class Sweep:
             return 0.0
         best = 0.0
         for points, plane, out in ((first, second, -normal), (second, first, normal)):
-            if len(self._cores[points].points) and (
-                len(self._cores[plane].points) or np.isinf(self._cores[plane].reach)
+            if len(self._swept[points].points) and (
+                len(self._swept[plane].points) or np.isinf(self._swept[plane].reach)
             ):
                 best = max(best, self._planes_keep(points, plane, self._planes(plane, out), float(row[0]), level))
         return best
@@ -193,23 +193,23 @@ class Sweep:
         Any direction gives a true bound, and a wide face a useless one if it is not met exactly: where faces touch,
         coal's normal can be 1e-4 rad off.
         """
-        core, rotation = self._cores[piece], self._results.oMg[piece].rotation
-        if not len(core.faces):
+        swept, rotation = self._swept[piece], self._results.oMg[piece].rotation
+        if not len(swept.faces):
             return normal[None]
-        faces = core.faces[:, :3] @ rotation.T
+        faces = swept.faces[:, :3] @ rotation.T
         face = faces[int(np.argmax(faces @ normal))]
-        return face[None] if np.isinf(core.reach) else np.array([face, normal])
+        return face[None] if np.isinf(swept.reach) else np.array([face, normal])
 
     def _planes_keep(self, points: int, plane: int, normals: Array, distance: float, level: float) -> float:
-        """Time until a core point of `points` can come down to `level` over supporting planes (k, 3) of `plane`."""
-        core, base = self._cores[points], self._cores[plane]
+        """Time until a swept point of `points` can come down to `level` over supporting planes (k, 3) of `plane`."""
+        swept, base = self._swept[points], self._swept[plane]
         at, below = self._results.oMg[points], self._results.oMg[plane]
         if np.isinf(base.reach):
             heights = base.faces[0, 3] + normals @ below.translation
         else:
             heights = (base.points @ below.rotation.T @ normals.T).max(axis=0) + normals @ below.translation
-        corners = core.points @ at.rotation.T + at.translation
-        room = corners @ normals.T - (heights + core.radius + base.radius + level)
+        corners = swept.points @ at.rotation.T + at.translation
+        room = corners @ normals.T - (heights + swept.radius + base.radius + level)
         above = room.min(axis=0) > 0.0
         if not above.any():
             return 0.0

@@ -46,7 +46,7 @@ class ContactSet:
         self._names = tuple(piece.name for piece in workspace.geometry.geometryObjects)
         self._labels: list[str] = []
         self._joint = table.joint[table.pairs].reshape(-1, 2)
-        thin = np.array([core.width for core in table.cores])[table.pairs].reshape(-1, 2).min(axis=1)
+        thin = np.array([swept.width for swept in table.swept])[table.pairs].reshape(-1, 2).min(axis=1)
         self._bearable = np.minimum(DEEPEST, SHALLOW * thin)
         self._here: Placed | None = None
         self._there: Placed | None = None

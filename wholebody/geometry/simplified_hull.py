@@ -16,7 +16,7 @@ SAME_NORMAL = 0.02
 """Radians: of faces whose normals differ by less, one is tried."""
 
 
-def outer_hull(points: Array, max_vertices: int) -> Array:
+def simplified_hull(points: Array, max_vertices: int) -> Array:
     """Vertices of a convex polytope that holds points and has few vertices.
 
     The polytope is cut out by planes of the points' own hull: first a box about their principal axes, then again and
