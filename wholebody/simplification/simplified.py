@@ -8,7 +8,7 @@ import numpy as np
 
 from wholebody.assessment import assess
 from wholebody.problem import Array, Problem, Solution
-from wholebody.simplification.lifting import Embedding
+from wholebody.simplification.embedding import Embedding
 
 HOLDS = 1e-4  # m, rad: to this limits, constraints and clearances of the whole problem must hold for "solved"
 
@@ -49,7 +49,7 @@ class LeftOut:
 
     @property
     def exact(self) -> bool:
-        """Whether nothing is changed at all: no joint locked that could matter, no piece coarser."""
+        """Whether nothing is changed at all: no joint locked that could matter, no piece simplified."""
         return not self.locked and not self.pieces
 
     def __str__(self) -> str:
@@ -94,7 +94,7 @@ class Simplified:
         Args:
             q: (small nq,).
         """
-        return self._embedding.lift(np.asarray(q, dtype=float))
+        return self._embedding.embed(np.asarray(q, dtype=float))
 
     def restored(self, solution: Solution) -> Solution:
         """The same answer for the whole problem: its posture, judged by the whole problem's assessment.

@@ -32,8 +32,8 @@ INSIDE = 1e-6  # m: what a pair may miss of its clearance at the start, from coa
 
 
 @dataclass(frozen=True)
-class Participation:
-    """Joints by what they are needed for.
+class ActiveJoints:
+    """Joints of a problem, by what they are needed for.
 
     Attributes:
         moving: (njoints,) which joints take part.
@@ -48,7 +48,7 @@ class Participation:
     excess: float
 
 
-def participation(problem: Problem, lock: bool = True) -> Participation:
+def active_joints(problem: Problem, lock: bool = True) -> ActiveJoints:
     """Find the joints that take part in a problem: those that it needs, or with `lock` off all that are not frozen."""
     model = problem.scene.model
     walk = _Walk(problem)
@@ -70,7 +70,7 @@ def participation(problem: Problem, lock: bool = True) -> Participation:
         joints[0] = False
     locked = ~joints[joint_of] & ~frozen[joint_of]
     helpers = [type(term).__name__ for term, columns, equal, _ in rows if columns[~equal][:, locked].any()]
-    return Participation(joints, frozen, tuple(dict.fromkeys(helpers)), _excess(problem, locked))
+    return ActiveJoints(joints, frozen, tuple(dict.fromkeys(helpers)), _excess(problem, locked))
 
 
 def _closed(moving: Mask, rows: list[tuple[Constraint, Mask, Mask, Mask]], frozen: Mask) -> Mask:

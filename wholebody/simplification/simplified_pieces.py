@@ -21,7 +21,7 @@ CORNERS = (8, 16, 32, 48)  # tried in turn
 PROBE = 1e-4  # m: radius of the ball that stands for a point in coal
 
 
-def coarser(piece: pin.GeometryObject, growth: float) -> tuple[pin.GeometryObject, float] | None:
+def simplified_piece(piece: pin.GeometryObject, growth: float) -> tuple[pin.GeometryObject, float] | None:
     """A piece with fewer corners around a hull.
 
     Args:

@@ -1,4 +1,4 @@
-"""From the postures of a smaller figure to those of the whole one, and terms of the whole one asked on the smaller.
+"""Terms of the whole figure on a smaller one, whose postures are embedded in those of the whole one.
 
 The smaller figure has the same joints without the locked ones. A term is stated on it anew by its names. Where that
 would not be the same function (joints it names are gone, a posture it takes is too long, its weights are shares of what
@@ -42,7 +42,7 @@ class Embedding:
         self._model = whole
         self._start: Array = np.array(start, dtype=float)
 
-    def lift(self, q: Array) -> Array:
+    def embed(self, q: Array) -> Array:
         """Whole posture (nq,) of a small one."""
         whole: Array = self._start.copy()
         whole[self.idx_q] = q
@@ -50,7 +50,7 @@ class Embedding:
 
     def whole(self, state: State) -> State:
         """The whole figure at the posture of the small one; it belongs to whoever the small state belongs to."""
-        q, whole = self.lift(state.q), state.companion(self, self._model)
+        q, whole = self.embed(state.q), state.companion(self, self._model)
         return whole if np.array_equal(q, whole.q) else whole.update(q)
 
     def rows(self, term: Goal | Constraint, state: State) -> Array:
@@ -59,7 +59,7 @@ class Embedding:
         return np.asarray(_dense(term.jacobian(whole), whole)[:, self.idx_v])
 
 
-class LiftedGoal(Goal):
+class EmbeddedGoal(Goal):
     """A goal of the whole figure."""
 
     def __init__(self, term: Goal, embedding: Embedding) -> None:
@@ -84,7 +84,7 @@ class LiftedGoal(Goal):
         return self.embedding.rows(self.term, state)
 
 
-class LiftedConstraint(Constraint):
+class EmbeddedConstraint(Constraint):
     """A constraint of the whole figure."""
 
     def __init__(self, term: Constraint, embedding: Embedding) -> None:
@@ -114,7 +114,7 @@ class LiftedConstraint(Constraint):
         return self.embedding.rows(self.term, state)
 
 
-class LiftedMeasure(Measure):
+class EmbeddedMeasure(Measure):
     """A measure of the whole figure; the share of the locked joints is part of its value."""
 
     def __init__(self, term: Measure, embedding: Embedding) -> None:
@@ -138,7 +138,7 @@ class LiftedMeasure(Measure):
         return np.asarray(self.term.curvature(self.embedding.whole(state))[self.embedding.idx_v])
 
 
-class LiftedBound(Bound):
+class EmbeddedBound(Bound):
     """A bound of the whole figure."""
 
     def __init__(self, term: Bound, embedding: Embedding) -> None:
@@ -150,8 +150,8 @@ class LiftedBound(Bound):
         return np.asarray(low)[self.embedding.idx_v], np.asarray(high)[self.embedding.idx_v]
 
 
-def on_smaller(term: _T, scene: Surroundings, start: Array, embedding: Embedding) -> Term | None:
-    """The term on the smaller figure: stated anew where that is the same function, else lifted.
+def restated_term(term: _T, scene: Surroundings, start: Array, embedding: Embedding) -> Term | None:
+    """The term on the smaller figure: stated anew where that is the same function, else embedded.
 
     Rows of a constraint that no joint moves any more, and that hold, need not be asked; None where that is all of them.
 
@@ -161,35 +161,35 @@ def on_smaller(term: _T, scene: Surroundings, start: Array, embedding: Embedding
         start: (small nq,).
         embedding: of the smaller in the whole figure.
     """
-    lifted: Term
+    embedded: Term
     if isinstance(term, Goal):
-        lifted = LiftedGoal(term, embedding)
+        embedded = EmbeddedGoal(term, embedding)
     elif isinstance(term, Constraint):
-        lifted = LiftedConstraint(term, embedding)
+        embedded = EmbeddedConstraint(term, embedding)
     elif isinstance(term, Measure):
-        lifted = LiftedMeasure(term, embedding)
+        embedded = EmbeddedMeasure(term, embedding)
     else:
         assert isinstance(term, Bound)
-        return LiftedBound(term, embedding)
+        return EmbeddedBound(term, embedding)
     state = State(scene.model)
-    wanted = _said(lifted, state, start)
-    if isinstance(lifted, Constraint):
+    wanted = _values(embedded, state, start)
+    if isinstance(embedded, Constraint):
         wanted, rows = _moving_rows(wanted)
         if not rows:
             return None
     try:
         anew = term.resolve(scene, start)
-        said = _said(anew, state, start)
+        values = _values(anew, state, start)
     except Exception:  # a term is anyone's code, and may fail in any way on a figure it was not meant for
-        return lifted
-    alike = len(said) == len(wanted) and all(
+        return embedded
+    alike = len(values) == len(wanted) and all(
         a.shape == b.shape and np.abs(a - b).max(initial=0.0) <= SAME * (1.0 + np.abs(b).max(initial=0.0))
-        for a, b in zip(said, wanted, strict=True)
+        for a, b in zip(values, wanted, strict=True)
     )
-    return anew if alike else lifted
+    return anew if alike else embedded
 
 
-def _said(term: Term, state: State, start: Array) -> list[Array]:
+def _values(term: Term, state: State, start: Array) -> list[Array]:
     """What a term says at a few postures: all that a method reads, but for what is constant in a measure."""
     postures = [start, *random_postures(state.model, SAMPLES, seed=1)]
     ask: list[Callable[[], object]] = []
@@ -200,19 +200,19 @@ def _said(term: Term, state: State, start: Array) -> list[Array]:
         ask += [lambda: _wide(term.lower, term, state), lambda: _wide(term.upper, term, state)]
     elif isinstance(term, Measure):
         ask = [lambda: term.gradient(state), lambda: term.curvature(state)]
-    said = []
+    values = []
     for q in postures:
         state.update(q)
-        said += [np.nan_to_num(np.array(question(), dtype=float), posinf=1e300, neginf=-1e300) for question in ask]
-    return said
+        values += [np.nan_to_num(np.array(question(), dtype=float), posinf=1e300, neginf=-1e300) for question in ask]
+    return values
 
 
-def _moving_rows(said: list[Array]) -> tuple[list[Array], int]:
+def _moving_rows(values: list[Array]) -> tuple[list[Array], int]:
     """What a constraint says, without the rows that hold and that nothing moves; and how many rows are left."""
-    value, lower, upper = said[0], said[2], said[3]
-    moves = np.any([np.abs(jacobian).max(axis=1, initial=0.0) > SAME for jacobian in said[1::4]], axis=0)
+    value, lower, upper = values[0], values[2], values[3]
+    moves = np.any([np.abs(jacobian).max(axis=1, initial=0.0) > SAME for jacobian in values[1::4]], axis=0)
     keep = moves | (value < lower - SAME) | (value > upper + SAME)
-    return [part[keep] for part in said], int(keep.sum())
+    return [part[keep] for part in values], int(keep.sum())
 
 
 def _wide(bound: Array, term: Constraint, state: State) -> Array:
