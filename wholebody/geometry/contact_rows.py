@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.errors import InputError
-from wholebody.geometry.proximity import Contacts, PairTable
+from wholebody.geometry.proximity import COAL_ACCURACY, Contacts, PairTable
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -30,7 +30,7 @@ BAND = 0.02  # m: swept points this much farther than the witness point still ma
 LEVER_DISTANCE = 0.025  # m: pairs that are this much farther apart than they must be get their witness row only
 INSET = 5e-4  # m: how far below the plane a point must find the other piece; larger = larger patches on round pieces
 SAME_NORMAL = 1.0 - 5e-5  # cosine of 0.01 rad: nearer to a face's normal than this, coal's may be meant to be it
-COAL_ACCURACY = 2e-6  # m: of coal's distances, with some room
+NORMAL_ROOM = 2.0 * COAL_ACCURACY  # m: by which a face's normal may part the pieces by less than coal's does
 MOST_ENDS = 8  # rows of one contact beside the witness row: a round face has dozens of corners; fewer rows rock more
 SHORTEST_LEVER = 8e-3  # m: rows nearer to the witness point than this say what the witness row says
 
@@ -59,15 +59,15 @@ class ContactRowBuilder:
     def __init__(self, table: PairTable) -> None:
         """Lay the swept points and faces of all pieces in flat tables."""
         self.table = table
-        swept = table.swept
-        self._points = np.vstack([swept.points for swept in swept] or [np.zeros((0, 3))])
-        self._point_count = np.array([len(swept.points) for swept in swept], dtype=np.intp)
+        shapes = table.swept
+        self._points = np.vstack([swept.points for swept in shapes] or [np.zeros((0, 3))])
+        self._point_count = np.array([len(swept.points) for swept in shapes], dtype=np.intp)
         self._point_start = np.concatenate([[0], np.cumsum(self._point_count)])[:-1].astype(np.intp)
-        self._faces = np.vstack([swept.faces for swept in swept] or [np.zeros((0, 4))])
-        self._face_count = np.array([len(swept.faces) for swept in swept], dtype=np.intp)
+        self._faces = np.vstack([swept.faces for swept in shapes] or [np.zeros((0, 4))])
+        self._face_count = np.array([len(swept.faces) for swept in shapes], dtype=np.intp)
         self._face_start = np.concatenate([[0], np.cumsum(self._face_count)])[:-1].astype(np.intp)
-        self._radius = np.array([swept.radius for swept in swept])
-        self._axis = np.array([swept.axis for swept in swept]).reshape(-1, 3)
+        self._radius = np.array([swept.radius for swept in shapes])
+        self._axis = np.array([swept.axis for swept in shapes]).reshape(-1, 3)
         self._is_capsule: NDArray[np.bool_] = np.asarray(self._axis.any(axis=1))
         flat = (self._point_count >= 2) | np.isinf(table.reach)
         self._extended = flat[table.pairs].all(axis=1)
@@ -117,7 +117,7 @@ class ContactRowBuilder:
         self._kernel.snap_normals(
             wide, contacts.pair, contacts.distance, contacts.normal, contacts.placements, self._points,
             self._point_start, self._point_count, self._faces, self._face_start, self._face_count, self._radius,
-            SAME_NORMAL, COAL_ACCURACY,
+            SAME_NORMAL, NORMAL_ROOM,
         )  # fmt: skip
 
     def _patch_ends(self, contacts: Contacts, wide: Indices) -> tuple[Indices, Array, Array]:
@@ -140,7 +140,7 @@ def compiled_kernel() -> Any:
     pair, faces, placement = np.zeros((2, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros((2, 4, 3))
     patch_kernel.snap_normals(
         none, pair, table[:, 0], table[:, 1:4], placement, points, none, none, faces, none, none, np.zeros(0),
-        SAME_NORMAL, COAL_ACCURACY,
+        SAME_NORMAL, NORMAL_ROOM,
     )  # fmt: skip
     patch_kernel.patch_ends(
         none, pair, table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], placement, points, none, none, faces,

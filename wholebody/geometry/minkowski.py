@@ -15,6 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.geometry.pieces import Array
+from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.geometry.swept_points import SweptPoints, swept_points
 
 Placed: TypeAlias = tuple[Any, pin.SE3]
@@ -24,7 +25,7 @@ MOST_POINTS = 20_000
 """Vertices of a Minkowski difference above which its sides are sampled and no longer enumerated."""
 
 
-OVERLAP = 2e-6
+OVERLAP = 2.0 * COAL_ACCURACY
 """Depth up to which a pair counts as touching, metres: twice coal's own tolerance."""
 
 

@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 COAL_ACCURACY = 1e-6  # m: of coal's distances
+PENETRATION = (
+    1e-5  # m: deeper than this a pair is shown and named as inside of each other; what touches is solved to it
+)
 
 MANY = 60
 """Pairs that survive their spheres from which on their boxes are asked too: long walls have large spheres. It costs as
@@ -30,7 +33,7 @@ SINGLY = 3000
 takes it 50 ns for each of them."""
 
 AWAY = 10.0  # m: between pieces that stand anywhere
-ENDLESS = 1e9  # m: half the size of a half-space's box
+ENDLESS = 1e9  # m: what counts for the reach of a half-space, and half the size of its box
 
 
 class Contacts(NamedTuple):

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wholebody.checks import array, flag, function, instance, known, time_step
 from wholebody.errors import InputError
+from wholebody.geometry.proximity import PENETRATION
 from wholebody.interaction.attraction import Attraction
 from wholebody.interaction.overlap_strategy import OverlapStrategy, Resolution
 from wholebody.interaction.qp_strategy import CLEARANCE, QPStrategy, weights
@@ -35,8 +36,6 @@ OVERLAPS = ("qp", "ccd")
 
 SHARES = (0.5, 0.25)
 """Of the way, tried when all of it is not free: what keeps to a surface leaves it by the square of the share."""
-
-INSIDE = 1e-5  # m: deeper than this a posture is called inside of something
 
 
 def check_scene(scene: object, what: str) -> None:
@@ -203,7 +202,7 @@ def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
 
 def deepest_overlap(scene: Scene, q: Array) -> str:
     """The deepest overlap at q in words, or "" where there is none."""
-    contacts = scene.contacts(q, within=-INSIDE)
+    contacts = scene.contacts(q, within=-PENETRATION)
     if not len(contacts.distance):
         return ""
     first, second = (scene.piece_owner[piece] for piece in contacts.pair[0])

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State, Wrench
+from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.problem import Problem
 from wholebody.tasks.base import Constraint, Goal, Measure
 from wholebody.tasks.discomfort import Discomfort
@@ -28,7 +29,6 @@ SEPARABLE = (Effort, Displacement, Discomfort)  # measures that are a sum over j
 SAMPLES = 6  # postures at which rows that are no wrenches are asked which joints they move with
 NOTHING = 1e-9  # entries of a Jacobian below this are rounding
 STEPS = 200  # of the way between a joint's limits along which its own best value is looked for
-INSIDE = 1e-6  # m: what a pair may miss of its clearance at the start, from coal's accuracy
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def _kinds(term: Constraint, state: State) -> tuple[Mask, Mask]:
     """Which rows are equalities, and which do not hold at the start."""
     value = np.atleast_1d(term.value(state))
     lower, upper = np.broadcast_to(term.lower, value.shape), np.broadcast_to(term.upper, value.shape)
-    return lower == upper, (value < lower - INSIDE) | (value > upper + INSIDE)
+    return lower == upper, (value < lower - COAL_ACCURACY) | (value > upper + COAL_ACCURACY)
 
 
 def _frozen(problem: Problem, joint_of: NDArray[np.intp]) -> Mask:
@@ -153,8 +153,8 @@ def _too_near(problem: Problem) -> Mask:
     """Degrees of freedom between the pieces of pairs that begin nearer than they may be."""
     scene = problem.scene
     state = scene.state(problem.start)
-    near = scene.contacts(problem.start, problem.clearance + INSIDE)
-    wrong = near.pair[near.distance < problem.clearances[near.number] - INSIDE]
+    near = scene.contacts(problem.start, problem.clearance + COAL_ACCURACY)
+    wrong = near.pair[near.distance < problem.clearances[near.number] - COAL_ACCURACY]
     joint = scene.pair_table.joint
     between = state.support[joint[wrong[:, 0]]] != state.support[joint[wrong[:, 1]]]
     return _dofs(state, between.any(axis=0))

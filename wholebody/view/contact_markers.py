@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.geometry.proximity import PENETRATION
 from wholebody.view import drawing, style
 from wholebody.view.bodies import Bodies
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.viewed_scene import ViewedContacts
 
 Array = NDArray[np.float64]
-
-INSIDE = -1e-5
-"""Distance, metres, below which a contact counts as penetration: what touches is solved to about this."""
 
 MOST = 60
 """Markers are drawn for this many of the nearest contacts; a page with thousands of nodes stutters."""
@@ -30,7 +28,7 @@ def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts)
     """Give every piece that touches the colour of its state; penetration outweighs contact."""
     for pairs, state in (
         (contacts.pair, style.CONTACT),
-        (contacts.pair[np.asarray(contacts.distance) < INSIDE], style.PENETRATION),
+        (contacts.pair[np.asarray(contacts.distance) < -PENETRATION], style.PENETRATION),
     ):
         for index in np.unique(pairs):
             body = bodies.all[int(index)]
@@ -49,7 +47,7 @@ def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) 
         start, end = np.asarray(contacts.point_a[row]), np.asarray(contacts.point_b[row])
         for name, point in (("a", start), ("b", end)):
             keyframe.markers[f"{root}/{name}"] = (_WITNESS, _at(point))
-        if distance >= INSIDE:
+        if distance >= -PENETRATION:
             place = drawing.arrow_placement(start, normal, style.NORMAL_LENGTH)
             keyframe.markers[f"{root}/normal"] = (_NORMAL, place)
             continue

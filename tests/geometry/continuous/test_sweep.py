@@ -178,7 +178,7 @@ def test_bounds_hold_for_every_point() -> None:
         sweep._place(q0, velocity)
         bounds.update(sweep._data, velocity, np.array([m.translation for m in sweep._results.oMg]))
         for first, second in ((5, 0), (0, 5), (4, 6), (3, 1)):
-            point = sweep._cores[first].points[0]
+            point = sweep._swept[first].points[0]
             h, places = 1e-3, []
             for t in 0.3 + h * np.arange(-1, 2):
                 sweep._place(pin.integrate(arena.model, q0, t * velocity), velocity)

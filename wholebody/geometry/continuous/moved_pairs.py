@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.errors import InputError
-from wholebody.geometry.proximity import Array, Contacts, Indices, PairTable
+from wholebody.geometry.proximity import ENDLESS, Array, Contacts, Indices, PairTable
 
 ARC = 1.1  # length of an arc over its chord, at the most, for the turns that one step makes
-ENDLESS = 1e9  # m: what counts for the reach of a half-space
 
 
 class Placed(NamedTuple):
