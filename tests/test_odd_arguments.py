@@ -223,7 +223,6 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Scene.lend", Call(there.lend, {})
     yield "Scene.workspace", Call(there.workspace, {})
     yield "Scene.remove", Call(lambda **given: scene(path).remove(**given), {"name": "ball"})
-    yield "Scene.simplified", Call(ask.scene.simplified, {"problem": ask, "lock": True})
     yield "Scene.state", Call(there.state, {"q": q})
     yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4})
 
@@ -297,6 +296,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Problem.retarget", Call(retarget, {"goals": [wb.Point("link4", at)]})
     yield "solve", Call(wb.solve, {"problem": ask, "method": "qp", "progress": print})
     yield "assess", Call(wb.assess, {"problem": ask, "q": q})
+    yield "simplify", Call(wb.simplify, {"problem": ask, "lock": True})
     judged = wb.assess(ask, q)
     yield "Assessment.holds", Call(judged.holds, {"tolerance": 0.1})
     yield "Assessment.met", Call(judged.met, {"tolerance": 0.1})

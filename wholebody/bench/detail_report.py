@@ -126,7 +126,7 @@ def report(rows: Sequence[DetailRow], refused: Sequence[str], facts: Mapping[str
         "clearance, a goal its place, and how far the effort is above that of the finest model's own answer (below "
         "it where another local optimum was found). Medians over the cases, of "
         "the faster of two solves by the clock; what is left out is left out once "
-        f"for a problem, before. *Simplified* is `scene.simplified`, its coarser pieces at most {1e3 * GROWTH:g} mm "
+        f"for a problem, before. *Simplified* is `wb.simplify`, its coarser pieces at most {1e3 * GROWTH:g} mm "
         "larger.",
         table,
     ]

@@ -18,7 +18,7 @@ from wholebody.errors import InputError
 from wholebody.figures import hulls
 from wholebody.figures.anthropometry import Body, body, describe, keyed
 from wholebody.figures.body_spec import Array, BodySpec, Joint, Landmark, Link, Solid, geometry_of, model_of, place
-from wholebody.figures.description import Chain, Description, ExcludedPair
+from wholebody.figures.description import Articulated, Chain, Description, ExcludedPair
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.figure import Figure
 
@@ -199,7 +199,7 @@ def _pairs(solids: tuple[Solid, ...]) -> tuple[tuple[tuple[str, str], ...], tupl
     return tuple(tested), tuple(excluded)
 
 
-def _posture(figure: Figure, side: str, degrees: dict[str, float]) -> Array:
+def _posture(figure: Articulated, side: str, degrees: dict[str, float]) -> Array:
     """Wrist above the origin, palm down, fingers forward, lowest part on z = 0."""
     from wholebody.figures.postures import lowest
 

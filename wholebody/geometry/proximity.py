@@ -20,9 +20,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 COAL_ACCURACY = 1e-6  # m: of coal's distances
-PENETRATION = (
-    1e-5  # m: deeper than this a pair is shown and named as inside of each other; what touches is solved to it
-)
+PENETRATION = 1e-5  # m: deeper than this a pair is called inside of each other; what touches is solved to it
 
 MANY = 60
 """Pairs that survive their spheres from which on their boxes are asked too: long walls have large spheres. It costs as

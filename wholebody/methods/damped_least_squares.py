@@ -29,7 +29,8 @@ from wholebody.figures.state import State, Wrench
 from wholebody.methods.contradictions import explanation
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_problem, check_settings
-from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.problem import Problem
+from wholebody.solution import Iterate, Solution, Status
 from wholebody.tasks.base import Constraint, Goal
 
 Array = NDArray[np.float64]

@@ -24,7 +24,8 @@ from wholebody.methods.qp.method import QP
 from wholebody.methods.qp.tracking import Tracker
 from wholebody.methods.solve import Method
 from wholebody.pool import OneAtATime
-from wholebody.problem import Problem, Solution
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 from wholebody.tasks import Frame, Point, StepLimit
 from wholebody.workspace import Workspace
 

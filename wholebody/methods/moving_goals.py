@@ -89,8 +89,8 @@ def retarget(problem: Problem, number: int, target: Any) -> None:
 def part_way(goal: Point | Frame, error: Array, share: float) -> Any:
     """A target on the way of a goal's frame from where it has this error: a share of what is left."""
     if isinstance(goal, Point):
-        return goal._target + (1.0 - share) * error
-    target = goal._target
+        return goal.resolved_target + (1.0 - share) * error
+    target = goal.resolved_target
     here = pin.SE3(pin.exp3(error[3:]) @ target.rotation, target.translation + error[:3])
     turned = here.rotation @ pin.exp3(share * pin.log3(here.rotation.T @ target.rotation))
     return pin.SE3(turned, here.translation + share * (target.translation - here.translation))

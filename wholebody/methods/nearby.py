@@ -16,7 +16,8 @@ from wholebody.methods.newton.method import Newton
 from wholebody.methods.newton.tracking import NewtonTracker
 from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import Method, as_method
-from wholebody.problem import Problem, Solution
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 
 Array = NDArray[np.float64]
 

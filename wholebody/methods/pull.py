@@ -17,7 +17,8 @@ from wholebody.methods.inputs import check_problem
 from wholebody.methods.moving_goals import moving_goal, own_copy, refuse_assembly, retarget
 from wholebody.methods.nearby import Nearby, for_motions
 from wholebody.methods.solve import Method
-from wholebody.problem import Problem, Solution
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 from wholebody.tasks import Point
 from wholebody.tasks.inputs import FARTHEST, point
 

@@ -9,7 +9,8 @@ from wholebody.errors import InputError, UnknownNameError
 from wholebody.methods import METHODS
 from wholebody.methods.control import Progress
 from wholebody.methods.inputs import check_problem
-from wholebody.problem import Problem, Solution
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 
 
 class Method(Protocol):

@@ -12,7 +12,7 @@ from tests.reference import active_set as reference
 from wholebody import UnknownNameError
 from wholebody.methods.qp.active_set import guess_active_set, minimise_on_face, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet
-from wholebody.methods.qp.solvers.base import make_solver, solver_names
+from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 from wholebody.methods.qp.solvers.split_form import split
 
 

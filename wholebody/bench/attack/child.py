@@ -14,7 +14,8 @@ import traceback
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from wholebody.bench.attack.case import SCRIPT, Verdict, Written, write
+from wholebody.bench.attack.case import SCRIPT, Verdict, Written
+from wholebody.bench.attack.writing import write
 from wholebody.errors import WholebodyError
 from wholebody.files import Scratch
 

@@ -20,7 +20,8 @@ from wholebody.errors import InputError
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.methods.contradictions import explanation
 from wholebody.methods.control import Control, Progress
-from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.problem import Problem
+from wholebody.solution import Iterate, Solution, Status
 from wholebody.tasks import Displacement, Effort, Hold
 from wholebody.workspace import Workspace
 
@@ -174,8 +175,8 @@ def pulls(problem: Problem) -> list[Pull]:
     found = []
     for measure in problem.measures:
         if isinstance(measure, (Effort, Displacement)):
-            weights = measure._distance.weights
-            found.append(Pull(measure._distance.reference, measure.weight * weights / max(float(weights.max()), 1e-12)))
+            weights = measure.distance.weights
+            found.append(Pull(measure.distance.reference, measure.weight * weights / max(float(weights.max()), 1e-12)))
     return found
 
 
@@ -189,7 +190,7 @@ def kept_apart(problem: Problem) -> list[tuple[int, int, float]]:
     still = {0}
     for term in problem.constraints:
         if isinstance(term, Hold) and term.relative_to is None and term.orientation:
-            still.add(term._residual.place.joint)
+            still.add(term.residual.place.joint)
     pairs = zip(problem.scene.geometry.collisionPairs, problem.clearances.tolist(), strict=True)
     return [
         (pair.first, pair.second, clearance)

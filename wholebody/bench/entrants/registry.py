@@ -81,7 +81,7 @@ def _mink() -> Entrant:
 
 
 def _rows() -> dict[str, _Row]:
-    from wholebody.methods.qp.solvers.base import solver_names
+    from wholebody.methods.qp.solvers.registry import solver_names
 
     rows = {f"qp/{solver}": _Row(partial(qp_entrant, solver)) for solver in ("osqp", "daqp")}
     for solver, module in SOLVERS.items():

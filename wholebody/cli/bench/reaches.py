@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.reaches import run
     from wholebody.bench.report import reaches_report
     from wholebody.bench.tables import write_rows
-    from wholebody.methods.qp.solvers.base import make_solver
+    from wholebody.methods.qp.solvers.registry import make_solver
 
     count = 10 if arguments.quick else arguments.count
     check_count(count, "--count")

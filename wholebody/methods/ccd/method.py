@@ -19,7 +19,8 @@ from wholebody.methods.ccd.terms import read
 from wholebody.methods.contradictions import Contradiction, contradictions, in_words, proven
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, check_problem, check_settings
-from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.problem import Problem
+from wholebody.solution import Iterate, Solution, Status
 from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]

@@ -49,19 +49,19 @@ def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]
     for number, goal in enumerate(goals):
         label = f"goals[{number}], {type(goal).__name__}"
         if isinstance(goal, Point):
-            place = goal._place
-            point = _local(problem, place.frame).act(goal._offset)
-            result.coincide(place.joint - 1, -1, label, point, goal._target, goal=True, weight=goal.weight)
+            place = goal.place
+            point = _local(problem, place.frame).act(goal.resolved_offset)
+            result.coincide(place.joint - 1, -1, label, point, goal.resolved_target, goal=True, weight=goal.weight)
         elif isinstance(goal, (Frame, Orientation, Relative)):
-            _placement(result, problem, goal._residual, label, goal=True, weight=goal.weight)
+            _placement(result, problem, goal.residual, label, goal=True, weight=goal.weight)
         elif isinstance(goal, Axis):
             _axis(result, problem, goal, label)
         elif isinstance(goal, CenterOfMass):
             directions = np.eye(3)[: len(goal.axes)]
-            make = partial(_mass_center, bodies, label, directions, goal._target)
+            make = partial(_mass_center, bodies, label, directions, goal.resolved_target)
             result.add(make, "mass center", goal=True, weight=goal.weight)
         elif isinstance(goal, Posture):
-            bodies.ask(result, label, goal._q, set(goal._dofs.tolist()), goal.weight)
+            bodies.ask(result, label, goal.resolved_target, set(goal.dofs.tolist()), goal.weight)
         else:
             raise _refused(label)
     return result
@@ -77,14 +77,14 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
     for number, term in enumerate(problem.constraints):
         label = f"constraints[{number}], {type(term).__name__}"
         if isinstance(term, Hold):
-            _placement(result, problem, term._residual, label)
+            _placement(result, problem, term.residual, label)
         elif isinstance(term, Plane):
-            place = np.array(_local(problem, term._place.frame).translation)
+            place = np.array(_local(problem, term.place.frame).translation)
             above = term.side == "above"
-            result.slide(-1, term._place.joint - 1, label, term._normal, place, term._height, above=above)
+            result.slide(-1, term.place.joint - 1, label, term.resolved_normal, place, term.height, above=above)
         elif isinstance(term, Balance):
-            normals = np.column_stack([term._normals, np.zeros(len(term._normals))])
-            make = partial(_mass_center, bodies, label, normals, term._offsets + term.margin)
+            normals = np.column_stack([term.normals, np.zeros(len(term.normals))])
+            make = partial(_mass_center, bodies, label, normals, term.offsets + term.margin)
             result.add(make, "mass center", one_sided=True)
         elif isinstance(term, ReachCones):
             result.add(partial(_cones, problem, term, label), "cone", one_sided=True)
@@ -114,13 +114,13 @@ def bound_equations(problem: Problem, state: State) -> EquationSet:
 
 def _axis(equations: EquationSet, problem: Problem, goal: Axis, label: str) -> None:
     """An axis along a direction, or towards a place."""
-    local, joint = _local(problem, goal._place.frame), goal._place.joint
+    local, joint = _local(problem, goal.place.frame), goal.place.joint
     if goal.toward is None:
-        ours = pin.Quaternion(axes_with_z((local.rotation @ goal._basis[2])[None])[0])
-        wanted = pin.Quaternion(axes_with_z(goal._wanted[None])[0])
+        ours = pin.Quaternion(axes_with_z((local.rotation @ goal.basis[2])[None])[0])
+        wanted = pin.Quaternion(axes_with_z(goal.resolved_target[None])[0])
         equations.turn(joint - 1, -1, label, ours, wanted, 2, goal=True, weight=goal.weight)
         return
-    axes, point, place = goal._basis @ local.rotation.T, np.array(local.translation), goal._wanted
+    axes, point, place = goal.basis @ local.rotation.T, np.array(local.translation), goal.resolved_target
 
     def make(world: int) -> Batch:
         body = np.array([[joint - 1 if joint else world]])
@@ -138,7 +138,7 @@ def _mass_center(bodies: FigureBodies, label: str, directions: Array, height: Ar
 
 
 def _cones(problem: Problem, term: ReachCones, label: str, world: int) -> Batch:
-    limbs = term._limbs
+    limbs = term.limbs
     pairs = np.array([(limb.reference.joint - 1, limb.limb.joint - 1) for limb in limbs], dtype=np.intp)
     pairs[pairs < 0] = world
     turns = np.array([_local(problem, limb.reference.frame).rotation for limb in limbs])

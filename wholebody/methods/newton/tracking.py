@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from wholebody.checks import number, posture, time_step
 from wholebody.methods.inputs import TOLERANCE, check_problem
+from wholebody.methods.newton.answer import answer
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.linear_algebra.base import Pattern
-from wholebody.methods.newton.method import answer
 from wholebody.methods.newton.reaching import reach
 from wholebody.methods.newton.search import SHARPER, Search, Settings
 from wholebody.pool import OneAtATime
-from wholebody.problem import Problem, Solution
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
 
 Array = NDArray[np.float64]

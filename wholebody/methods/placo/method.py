@@ -17,7 +17,8 @@ from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, check, named_frames
-from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.problem import Problem
+from wholebody.solution import Iterate, Solution, Status
 from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]

@@ -13,10 +13,12 @@ from wholebody.methods.contradictions import in_words, proven
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.qp.search import Search, Settings
-from wholebody.methods.qp.solvers.base import QPSolver, make_solver
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.tracking import Tracker
 from wholebody.methods.qp.visit import Local
-from wholebody.problem import Problem, Solution, Status
+from wholebody.problem import Problem
+from wholebody.solution import Solution, Status
 
 
 @dataclass(frozen=True)
