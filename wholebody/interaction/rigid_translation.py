@@ -15,6 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.errors import InputError
+from wholebody.geometry.continuous.bisection import last_free
 from wholebody.geometry.penetration import global_depth
 from wholebody.interaction.overlap_strategy import Resolution
 from wholebody.scene import Scene
@@ -93,14 +94,7 @@ class RigidTranslation:
         displaced = self._displaced(drawn)
         if displaced is not None:
             return displaced
-        inside, outside = 0.0, 1.0
-        for _ in range(HALVINGS):
-            middle = 0.5 * (inside + outside)
-            if len(self._overlaps(np.asarray(pin.interpolate(self.model, free, drawn, middle)))[0]):
-                outside = middle
-            else:
-                inside = middle
-        return np.asarray(pin.interpolate(self.model, free, drawn, inside))
+        return last_free(self.model, free, drawn, lambda q: len(self._overlaps(q)[0]), HALVINGS)
 
     def _displaced(self, q: Array) -> Array | None:
         """The hand displaced by PD_g until nothing overlaps; None where that does not end."""

@@ -1,17 +1,48 @@
-"""Where the camera looks: at the figure, with what is near it."""
+"""Where the camera stands and looks: as it was told, or at the figure with what is near it."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.view import commands, style
-from wholebody.view.server import Command
+from wholebody.view.server import CAMERA, Command
 
 Array = NDArray[np.float64]
 
 NEAR = 0.3
 """How far around the figure things are kept in the picture, metres; a wall is as long as it likes."""
+
+
+def look(
+    target: Array,
+    fov: float,
+    *,
+    eye: Array | None = None,
+    direction: Array | None = None,
+    points: Array | None = None,
+    margin: float = 1.0,
+) -> Command:
+    """Turn the camera to a target, from `eye`, or from `direction` so that all `points` (n, 3) are in the picture.
+
+    Args:
+        target: (3,) what is in the middle.
+        fov: vertical angle of view, degrees.
+        eye: (3,) where the camera is.
+        direction: (3,) from the target towards the camera.
+        points: (n, 3) what must be seen.
+        margin: how much wider than the points the picture is, 1 being exact.
+    """
+    command: dict[str, Any] = {"type": "look", "target": np.asarray(target, dtype=float).tolist(), "fov": float(fov)}
+    if eye is not None:
+        command["eye"] = np.asarray(eye, dtype=float).tolist()
+    else:
+        command["direction"] = np.asarray(direction, dtype=float).tolist()
+        command["points"] = np.asarray(points, dtype=float).round(6).ravel().tolist()
+        command["margin"] = float(margin)
+    return Command(CAMERA, "", "", commands.pack(command))
 
 
 def camera_on(figure: Array, things: Array, direction: Array | None = None) -> Command:
@@ -29,4 +60,4 @@ def camera_on(figure: Array, things: Array, direction: Array | None = None) -> C
     points = np.concatenate([figure, near])
     target = (points.min(axis=0) + points.max(axis=0)) / 2
     way = np.asarray(style.DIRECTION if direction is None else direction, dtype=float)
-    return commands.look(target, style.FIELD_OF_VIEW, direction=way, points=points, margin=style.MARGIN)
+    return look(target, style.FIELD_OF_VIEW, direction=way, points=points, margin=style.MARGIN)

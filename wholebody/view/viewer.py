@@ -20,7 +20,7 @@ from wholebody.files import check_writable, write
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
 from wholebody.view import style
-from wholebody.view.commands import look
+from wholebody.view.camera import look
 from wholebody.view.composition import Composition
 from wholebody.view.movie import check_movie, frame_times, movie
 from wholebody.view.page import live_page, static_page

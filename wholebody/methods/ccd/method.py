@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
 from wholebody.checks import posture
+from wholebody.geometry.continuous.bisection import last_free
 from wholebody.methods.ccd.overlap_resolution.frames import PERTURBATIONS
 from wholebody.methods.ccd.overlap_resolution.resolver import TOLERANCE, OverlapResolver
 from wholebody.methods.ccd.reaching import Reach
@@ -221,7 +222,7 @@ class _Search:
                 q, left = self._resolver.resolve(q, self._rng)
                 trial = _Trial(q, self._resolver.deepest, self._error(q), reached.rested)
             if left and free is not None:
-                back = self._interpolate(free, q)
+                back = last_free(self._problem.scene.model, free, q, self._resolver.query, HALVINGS)
                 self._resolver.query(back)
                 trial = _Trial(back, self._resolver.deepest, self._error(back), True)
             step = float(np.abs(pin.difference(self._problem.scene.model, before, q)).max(initial=0.0))
@@ -238,18 +239,6 @@ class _Search:
     def _error(self, q: Array) -> float:
         """Largest error of the goals at a posture q (nq,)."""
         return self._reach.run(q, inf, 0)[1].error
-
-    def _interpolate(self, free: Array, q: Array) -> Array:
-        """The last posture without overlap on the way from a free one, by halving."""
-        model = self._problem.scene.model
-        inside, outside = 0.0, 1.0
-        for _ in range(HALVINGS):
-            middle = 0.5 * (inside + outside)
-            if self._resolver.query(np.asarray(pin.interpolate(model, free, q, middle))):
-                outside = middle
-            else:
-                inside = middle
-        return np.asarray(pin.interpolate(model, free, q, inside))
 
 
 def _message(status: Status, judgement: Assessment, turns: int) -> str:

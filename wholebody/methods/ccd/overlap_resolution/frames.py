@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.errors import InputError
+from wholebody.geometry.continuous.bisection import last_free
 from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.geometry.continuous.passing_through import first_passed
 from wholebody.methods.ccd.attraction import Attraction
@@ -206,14 +207,7 @@ class FrameResolver:
     def _interpolate(self, free: Array, q: Array) -> Array:
         """The last free posture on the way from a free one, by halving."""
         self._fell_back = True
-        inside, outside = 0.0, 1.0
-        for _ in range(HALVINGS):
-            middle = 0.5 * (inside + outside)
-            if self._resolver.query(np.asarray(pin.interpolate(self._model, free, q, middle))):
-                outside = middle
-            else:
-                inside = middle
-        result = np.asarray(pin.interpolate(self._model, free, q, inside))
+        result = last_free(self._model, free, q, self._resolver.query, HALVINGS)
         self._resolver.query(result)
         return result
 
