@@ -1,4 +1,4 @@
-"""The whole examination: what is there, what works, and every fault with its mend."""
+"""The whole examination: what is there, what works, and every fault with its repair."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Entry:
         state: "works", "absent" or "broken".
         detail: version, time, place or reason.
         needed: whether wholebody cannot do without it.
-        mend: the command or the deed that repairs it; empty where nothing is to be done.
+        repair: the command or the deed that repairs it; empty where nothing is to be done.
     """
 
     kind: str
@@ -43,7 +43,7 @@ class Entry:
     state: State
     detail: str
     needed: bool = True
-    mend: str = ""
+    repair: str = ""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Report:
     Attributes:
         python: version and place of the interpreter.
         entries: everything that was looked at.
-        faults: what is wrong, with its mend: (sentence, mend).
+        faults: what is wrong, with its repair: (sentence, repair).
     """
 
     python: str
@@ -76,7 +76,7 @@ def examine(environ: Mapping[str, str] = os.environ) -> Report:
     entries = [*_packages(have), *_solvers(have), *_methods(), *_tools(), _cache()]
     faults = [*_python(), *_conflicts(have), *_paths(environ)]
     faults += [
-        (f"the {entry.kind} {entry.name} is {entry.state}: {entry.detail}", entry.mend)
+        (f"the {entry.kind} {entry.name} is {entry.state}: {entry.detail}", entry.repair)
         for entry in entries
         if entry.state == "broken" or (entry.needed and entry.state == "absent")
     ]
@@ -88,15 +88,15 @@ def _packages(have: Mapping[str, Distribution]) -> Iterator[Entry]:
     for name, module in MODULES.items():
         found, outcome = have.get(packages.normal(name)), outcomes[module]
         if found is None and not outcome.works:
-            yield Entry("package", name, "absent", "not installed", mend=AGAIN)
+            yield Entry("package", name, "absent", "not installed", repair=AGAIN)
         elif not outcome.works:
             version = found.version if found else ""
-            yield Entry("package", name, "broken", f"{version}: import fails, {outcome.detail}", mend=AGAIN)
+            yield Entry("package", name, "broken", f"{version}: import fails, {outcome.detail}", repair=AGAIN)
         elif found is None:
             yield Entry("package", name, "works", f"not from a package, {outcome.detail}")
         elif (folder := packages.shadow(found, outcome.detail)) is not None:
             detail = f"{found.version} is installed, but {folder} hides it"
-            yield Entry("package", name, "broken", detail, mend="unset PYTHONPATH")
+            yield Entry("package", name, "broken", detail, repair="unset PYTHONPATH")
         else:
             yield Entry("package", name, "works", found.version)
     for name, extra in EXTRAS.items():
@@ -111,9 +111,9 @@ def _solvers(have: Mapping[str, Distribution]) -> Iterator[Entry]:
     outcomes = checks.run("program", present)
     for name, package in SOLVERS.items():
         if name in outcomes:
-            mend = "" if outcomes[name].works else f"pip install --force-reinstall {package}"
+            repair = "" if outcomes[name].works else f"pip install --force-reinstall {package}"
             state: State = "works" if outcomes[name].works else "broken"
-            yield Entry("QP solver", name, state, outcomes[name].detail, name == "osqp", mend)
+            yield Entry("QP solver", name, state, outcomes[name].detail, name == "osqp", repair)
         else:
             yield Entry("QP solver", name, "absent", "not installed", name == "osqp", f"pip install {package}")
 
@@ -121,24 +121,24 @@ def _solvers(have: Mapping[str, Distribution]) -> Iterator[Entry]:
 def _methods() -> Iterator[Entry]:
     listed = checks.run("methods", [""])[""]
     if not listed.works:
-        yield Entry("method", "all", "broken", listed.detail, mend=AGAIN)
+        yield Entry("method", "all", "broken", listed.detail, repair=AGAIN)
         return
     for name, outcome in checks.run("pose", listed.detail.split()).items():
         if outcome.works:
             yield Entry("method", name, "works", outcome.detail)
         else:
-            yield Entry("method", name, "broken", outcome.detail, mend=AGAIN)
+            yield Entry("method", name, "broken", outcome.detail, repair=AGAIN)
 
 
 def _tools() -> Iterator[Entry]:
     for name, outcome in checks.run("tool", list(TOOLS)).items():
-        use, mend = TOOLS[name]
+        use, repair = TOOLS[name]
         if outcome.works:
             yield Entry("tool", name, "works", f"{outcome.detail}, {use}", False)
         elif outcome.detail.endswith("not found"):
-            yield Entry("tool", name, "absent", use, False, mend)
+            yield Entry("tool", name, "absent", use, False, repair)
         else:
-            yield Entry("tool", name, "broken", outcome.detail, False, mend)
+            yield Entry("tool", name, "broken", outcome.detail, False, repair)
 
 
 def _cache() -> Entry:
@@ -160,7 +160,7 @@ def _python() -> Iterator[tuple[str, str]]:
 
 def _conflicts(have: Mapping[str, Distribution]) -> Iterator[tuple[str, str]]:
     for conflict in packages.conflicts(have):
-        yield str(conflict), conflict.mend
+        yield str(conflict), conflict.repair
 
 
 def _paths(environ: Mapping[str, str]) -> Iterator[tuple[str, str]]:

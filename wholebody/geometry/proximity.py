@@ -228,10 +228,10 @@ class Proximity:
         pair = self.table.pairs[index]
         broken = table[:, 0] <= self.table.points_meet[index]
         if broken.any():
-            self._mend_normals(placements, table, pair, np.flatnonzero(broken))
+            self._repair_normals(placements, table, pair, np.flatnonzero(broken))
         return Contacts(pair, table[:, 0], normal, table[:, 4:7], table[:, 7:10], index, placements)
 
-    def _mend_normals(self, placements: Array, table: Array, pair: Indices, rows: Indices) -> None:
+    def _repair_normals(self, placements: Array, table: Array, pair: Indices, rows: Indices) -> None:
         """Give a normal to pairs where coal has none: capsule axes that cross exactly, concentric spheres."""
         for row in rows:
             first, second = pair[row]

@@ -83,7 +83,7 @@ class OverlapResolver:
         self.control = Control(np.inf) if control is None else control
         self.exact, self.margin = exact, MARGIN
         self.scene, self.workspace, self.clearances, self.tolerance = scene, workspace, clearances, tolerance
-        self._within = 0.0 if clearances is None else float(clearances.max(initial=0.0))
+        self._query_distance = 0.0 if clearances is None else float(clearances.max(initial=0.0))
         self._data = scene.model.createData()
         self._joints = workspace.table.joint.tolist()
         self.counts = Counts()
@@ -111,8 +111,8 @@ class OverlapResolver:
         began = time.perf_counter()
         self.counts.queries += 1
         pin.forwardKinematics(self.scene.model, self._data, q)
-        near = self.workspace.proximity.near(self._data, self._within)
-        self.placed = Placed(near, self._within)
+        near = self.workspace.proximity.near(self._data, self._query_distance)
+        self.placed = Placed(near, self._query_distance)
         depth = -near.distance if self.clearances is None else self.clearances[near.number] - near.distance
         self.deepest = float(depth.max(initial=0.0))
         found: list[Overlap] = []
