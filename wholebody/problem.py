@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -114,6 +115,19 @@ class Problem:
             with self.lend() as workspace:
                 _check_goals(doubtful, workspace.state.update(self.start))
         self.goals = resolved
+
+    def with_start(self, q: Array) -> Problem:
+        """Copy that begins at another posture; what was resolved at the start stays.
+
+        Args:
+            q: (nq,) the posture.
+
+        Raises:
+            InputError: q has the wrong shape or a value that is not finite.
+        """
+        result = copy.copy(self)
+        result.start = checks.posture(q, self.scene.model.nq, "with_start: q")
+        return result
 
     @contextmanager
     def lend(self) -> Iterator[Workspace]:

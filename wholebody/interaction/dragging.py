@@ -21,9 +21,9 @@ from wholebody.errors import InputError
 from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.interaction.judging import jerk
 from wholebody.interaction.scripts import FRAME
+from wholebody.methods.base import Method
 from wholebody.methods.drag import Drag
 from wholebody.methods.moving_goals import moving_goal, own_copy, retarget
-from wholebody.methods.solve import Method
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point

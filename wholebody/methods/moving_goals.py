@@ -45,21 +45,6 @@ def refuse_assembly(problem: object, what: str) -> None:
         )
 
 
-def begun_at(problem: Problem, q: Array, *, nearest: bool = False) -> Problem:
-    """The same problem, begun at another posture q (nq,).
-
-    Args:
-        problem: what is asked; what was resolved at its start stays.
-        q: the posture.
-        nearest: whether measures count from q too, such as effort, so that the nearest answer is sought.
-    """
-    result = copy.copy(problem)
-    result.start = q
-    if nearest:
-        result.measures = tuple(term.resolve(problem.scene, q) for term in problem.measures)
-    return result
-
-
 def moving_goal(problem: Problem, number: int) -> Point | Frame:
     """The goal of this number, which can be moved.
 

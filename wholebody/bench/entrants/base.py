@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from wholebody.methods.solve import Method
+from wholebody.methods.base import Method
 from wholebody.problem import Problem
 
 Budget = tuple[float, "int | None"]

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from wholebody.bench.entrants.base import FIRST_FIT, LADDER, Budget, Entrant
-from wholebody.methods.solve import Method
+from wholebody.methods.base import Method
 
 _QP_BUDGETS: tuple[Budget, ...] = (
     *((tolerance, FIRST_FIT) for tolerance in (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),

@@ -8,9 +8,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.memory_views import placement_view
+from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.newton.angles import Angle
 from wholebody.methods.newton.equations import EquationSet
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
@@ -36,7 +36,7 @@ class FigureBodies:
         """Read the joints.
 
         Raises:
-            InputError: a joint of a type that has no equations here.
+            UnsupportedTermError: a joint of a type that has no equations here.
         """
         self.figure, self.model = figure, figure.model
         self.count = self.model.njoints - 1
@@ -204,9 +204,7 @@ class FigureBodies:
                     equations.slide(a, b, f"the limit of {label[4:]}", sign * along, np.zeros(3), height, above=True)
             self._others.append(joint)
         else:
-            raise InputError(
-                f"newton has no equations for {label}, a {name}; use method='qp', or lock it with figure.reduced(...)"
-            )
+            raise UnsupportedTermError("newton", [f"{label}, a {name} (figure.reduced can lock it)"])
 
     def _weight(self) -> Array:
         """Turning a body costs what moving the farthest thing on it does."""

@@ -6,13 +6,14 @@ import time
 from dataclasses import dataclass
 
 from wholebody.checks import choice, known
+from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
-from wholebody.methods.newton.answer import answer
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.linear_algebra.choice import NAMES
 from wholebody.methods.newton.search import Search, Settings
+from wholebody.methods.newton.terms import state_equations
 from wholebody.methods.newton.tracking import NewtonTracker
 from wholebody.problem import Problem
 from wholebody.solution import Solution
@@ -65,6 +66,16 @@ class Newton:
         """Name for tables."""
         return f"newton/{self.algebra}"
 
+    def accepts(self, problem: Problem) -> str | None:
+        """None where all terms and joints have equations here; else the sentence that names what has none."""
+        check_problem(problem, "Newton.accepts: problem")
+        with problem.lend() as workspace:
+            try:
+                state_equations(problem, workspace.state)
+            except UnsupportedTermError as error:
+                return str(error)
+        return None
+
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
 
@@ -82,7 +93,7 @@ class Newton:
             course.control = control
             search = Search(course, self.settings)
             found = search.everywhere(problem.scene.figure.clamp(problem.start))
-            return answer(search, found, began)
+            return search.solution(found, began)
 
     def tracker(self, problem: Problem, dt: float | None = None) -> NewtonTracker:
         """What follows the goals of a problem that move from call to call; its equations are laid out once.
@@ -95,7 +106,7 @@ class Newton:
             InputError: the problem has a term that this method has no equations for, dt is not a positive finite
                 number, or the scene changed after the problem was stated.
         """
-        return NewtonTracker(problem, self.algebra, self.settings, dt)
+        return NewtonTracker(problem, self.algebra, self.settings, dt, self)
 
     @property
     def settings(self) -> Settings:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.errors import InputError
 from wholebody.figures.state import State
+from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.newton.batches import Array, Batch
 from wholebody.methods.newton.directions import Cone, Toward
 from wholebody.methods.newton.equations import EquationSet
@@ -39,11 +39,27 @@ from wholebody.tasks.residuals import PlacementResidual
 CAN = "Point, Frame, Orientation, Relative, Axis, CenterOfMass, Posture; Hold, Plane, Balance, ReachCones; Freeze"
 
 
+def state_equations(problem: Problem, state: State) -> None:
+    """State all equations of a problem once, for what it may be refused for.
+
+    Args:
+        problem: what is asked.
+        state: it is moved to the problem's start.
+
+    Raises:
+        UnsupportedTermError: a term or a joint has no equations here.
+    """
+    bodies = FigureBodies(problem.scene.figure)
+    goal_equations(problem, bodies, problem.goals)
+    constraint_equations(problem, bodies)
+    bound_equations(problem, state)
+
+
 def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]) -> EquationSet:
     """Equations of goals.
 
     Raises:
-        InputError: a goal that has none here.
+        UnsupportedTermError: a goal that has none here.
     """
     result = EquationSet()
     for number, goal in enumerate(goals):
@@ -71,7 +87,7 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
     """Equations of constraints.
 
     Raises:
-        InputError: one that has none here.
+        UnsupportedTermError: one that has none here.
     """
     result = EquationSet()
     for number, term in enumerate(problem.constraints):
@@ -101,7 +117,7 @@ def bound_equations(problem: Problem, state: State) -> EquationSet:
         state: of the run; it is moved to the problem's start.
 
     Raises:
-        InputError: one that has none here.
+        UnsupportedTermError: one that has none here.
     """
     result = EquationSet()
     for bound in problem.bounds:
@@ -188,5 +204,5 @@ def _local(problem: Problem, frame: int) -> Any:
     return problem.scene.model.frames[frame].placement
 
 
-def _refused(label: str) -> InputError:
-    return InputError(f"newton has no equations for {label}; it takes {CAN}; use method='qp' for the others")
+def _refused(label: str) -> UnsupportedTermError:
+    return UnsupportedTermError("newton", [f"{label} (it takes {CAN})"])

@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError
-from wholebody.methods.placo.robot import Robot
+from wholebody.methods.base import named_terms
+from wholebody.methods.placo.robot import Robot, unsupported_joints
 from wholebody.problem import Problem
 from wholebody.tasks import (
     Axis,
@@ -59,26 +59,14 @@ class Tasks:
             task.configure(f"measure {number}", "soft", weight * share)
 
 
-def check(problem: Problem) -> None:
-    """Refuse what placo has no class for.
-
-    Raises:
-        InputError: naming every term.
-    """
+def unsupported(problem: Problem) -> list[str]:
+    """What placo has no class for, each with the reason: terms, and joints of another kind than its robots have."""
     refused = []
-    for group, terms in (
-        ("goals", problem.goals),
-        ("constraints", problem.constraints),
-        ("constraints", problem.bounds),
-        ("measures", problem.measures),
-    ):
-        for number, term in enumerate(terms):
-            if not _takes(term):
-                kind = type(term).__name__
-                reason = f" ({REASONS[kind]})" if kind in REASONS else ""
-                refused.append(f"{group}[{number}], {kind}{reason}")
-    if refused:
-        raise InputError(f"method 'placo' cannot take {'; '.join(refused)}; leave them out or use method='qp'")
+    for where, term in named_terms(problem):
+        if not _takes(term):
+            kind = type(term).__name__
+            refused.append(where + (f" ({REASONS[kind]})" if kind in REASONS else ""))
+    return refused + unsupported_joints(problem.scene.figure)
 
 
 def _takes(term: object) -> bool:
