@@ -336,7 +336,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Drag", Call(wb.Drag, dragged, lambda drag: drag.to(at))
     yield "Drag.to", Call(wb.Drag(ask).to, {"target": at})
     yield "Drag.finish", Call(wb.Drag(ask).finish, {})
-    yield "pull", Call(wb.pull, {"problem": ask, "path": places, "method": "qp", "goal": 0, "spacing": 0.05})
+    yield (
+        "follow_path",
+        Call(wb.follow_path, {"problem": ask, "path": places, "method": "qp", "goal": 0, "spacing": 0.05}),
+    )
 
     def solve_parts(made: Any) -> Any:
         return made.solve(iterations=3)

@@ -23,7 +23,7 @@ from wholebody.interaction.judging import jerk
 from wholebody.interaction.scripts import FRAME
 from wholebody.methods.base import Method
 from wholebody.methods.drag import Drag
-from wholebody.methods.moving_goals import moving_goal, own_copy, retarget
+from wholebody.methods.moving_goals import copied, moving_goal, retarget
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point
@@ -173,7 +173,7 @@ def _lags(left: list[float], late: int) -> bool:
 
 def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudgement:
     """Judge a drag of a problem's goal."""
-    own, model = own_copy(problem), problem.scene.model
+    own, model = copied(problem), problem.scene.model
     instance(dragged, Dragged, "judge_drag: dragged", "make one with drag_along(problem, places)")
     moving_goal(problem, goal)
     errors, judged = [], []

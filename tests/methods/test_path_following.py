@@ -21,7 +21,7 @@ def _reach(scene: wb.Scene) -> wb.Problem:
 
 @pytest.mark.parametrize("method", ["newton", "qp", "ccd"])
 def test_a_pull_stops_where_the_arm_ends(scene: wb.Scene, method: str) -> None:
-    solutions = wb.pull(_reach(scene), [(0.4, -0.3, 1.1), (2.4, -0.3, 1.1)], method, spacing=0.1)
+    solutions = wb.follow_path(_reach(scene), [(0.4, -0.3, 1.1), (2.4, -0.3, 1.1)], method, spacing=0.1)
     assert [solution.solved for solution in solutions[:-1]] == [True] * (len(solutions) - 1)
     assert all(solution.assessment.goal_error < 1.1e-5 for solution in solutions[:-1])
     assert not solutions[-1].solved
@@ -34,7 +34,7 @@ def test_a_pull_stops_before_a_plate(method: str) -> None:
     scene.add(wb.Box((1.6, 0.006, 1.6)), name="plate", at=(0.95, 0.0, 1.1))
     goals, holds = [wb.Point("right_index_tip", (0.4, -0.2, 1.2))], [wb.Freeze("root", "left_leg", "right_leg")]
     problem = wb.Problem(scene, "standing", goals=goals, constraints=holds)
-    solutions = wb.pull(problem, [(0.4, -0.2, 1.2), (0.4, 0.2, 1.2)], method, spacing=0.05)
+    solutions = wb.follow_path(problem, [(0.4, -0.2, 1.2), (0.4, 0.2, 1.2)], method, spacing=0.05)
     assert [solution.solved for solution in solutions[:-1]] == [True] * (len(solutions) - 1)
     assert not solutions[-1].solved
     assert 4 <= len(solutions) <= 6
@@ -47,8 +47,8 @@ def test_a_pull_stops_before_a_plate(method: str) -> None:
 def test_what_is_no_path_is_named(scene: wb.Scene) -> None:
     problem = _reach(scene)
     with pytest.raises(wb.InputError, match="shape"):
-        wb.pull(problem, [1.0, 2.0, 3.0])
+        wb.follow_path(problem, [1.0, 2.0, 3.0])
     with pytest.raises(wb.InputError, match="spacing"):
-        wb.pull(problem, [(0, 0, 0), (1, 0, 0)], spacing=0.0)
+        wb.follow_path(problem, [(0, 0, 0), (1, 0, 0)], spacing=0.0)
     with pytest.raises(wb.InputError, match="finite"):
-        wb.pull(problem, [(0, 0, 0), (float("nan"), 0, 0)])
+        wb.follow_path(problem, [(0, 0, 0), (float("nan"), 0, 0)])

@@ -1,7 +1,7 @@
-"""Pulling with any method: a goal that is brought along a path, from one intermediate goal to the next.
+"""Path following with any method: a goal is brought along a path, from one intermediate goal to the next.
 
-After Choi and Cremer 1999, section 3: the intermediate goals are evenly spaced, and a pull stops at the last that can
-be reached.
+After Choi and Cremer 1999, section 3: the intermediate goals are evenly spaced, and the last is the first that cannot
+be reached, or the end.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from wholebody import checks
 from wholebody.errors import InputError
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
-from wholebody.methods.moving_goals import moving_goal, own_copy, refuse_assembly, retarget
-from wholebody.methods.nearby import solve_nearby
+from wholebody.methods.moving_goals import copied, moving_goal, refuse_assembly, retarget
 from wholebody.methods.solve import method_for_motions
+from wholebody.methods.warm_start import warm_started
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point
@@ -31,10 +31,10 @@ MOST_GOALS = 10_000
 FRAME = 1.0 / 60.0  # s: of the tracker, of which only whole solves are asked here
 
 
-def pull(
+def follow_path(
     problem: Problem, path: ArrayLike, method: str | Method = "newton", *, goal: int = 0, spacing: float = SPACING
 ) -> tuple[Solution, ...]:
-    """Pull a goal along a path, through evenly spaced intermediate goals.
+    """Bring a goal along a path, through evenly spaced intermediate goals.
 
     The first corner is gone to as `solve` would. Each goal after it is solved from the posture before; one whose
     posture lies beyond something in the way counts as not reached.
@@ -53,17 +53,17 @@ def pull(
         InputError: the path is not one, the spacing is not positive, or the goal is not a `Point`.
         UnknownNameError: there is no such method.
     """
-    refuse_assembly(problem, "pull")
-    check_problem(problem, "pull: problem")
+    refuse_assembly(problem, "follow_path")
+    check_problem(problem, "follow_path: problem")
     places = _spaced(path, spacing)
     term = moving_goal(problem, goal)
     if not isinstance(term, Point):
-        raise InputError(f"pull moves a Point along a path, and goals[{goal}] is a {type(term).__name__}; use Drag")
-    own, q, found = own_copy(problem), problem.scene.figure.clamp(problem.start), []
+        raise InputError(f"follow_path moves a Point, and goals[{goal}] is a {type(term).__name__}; use Drag")
+    own, q, found = copied(problem), problem.scene.figure.clamp(problem.start), []
     tracker = method_for_motions(method).tracker(own, FRAME)
     for number, place in enumerate(places):
         retarget(own, goal, place)
-        found.append(solve_nearby(own, tracker, q) if number else tracker.solve(q))
+        found.append(warm_started(own, tracker, q) if number else tracker.solve(q))
         if not found[-1].solved:
             break
         q = found[-1].q
