@@ -7,8 +7,6 @@ from types import ModuleType
 
 import pytest
 
-pytest.importorskip("cloudpickle")
-
 from wholebody.bench.compare.messages import Build, Solve
 from wholebody.bench.compare.record import DEFAULT
 from wholebody.bench.compare.worker import Worker

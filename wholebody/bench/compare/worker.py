@@ -16,7 +16,7 @@ from typing import IO, Any
 
 import wholebody
 from wholebody.bench.compare.messages import Build, Draw, Solve, Warm, receive, send
-from wholebody.errors import MissingPackageError, WholebodyError
+from wholebody.errors import WholebodyError
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Set to 1 in the process, so that methods are compared on one core each."""
@@ -170,14 +170,8 @@ def _end_with(parent: int) -> None:
 
 
 def dumps(value: Any) -> bytes:
-    """Pickle, what is not importable by its code.
+    """Pickle, what is not importable by its code."""
+    import cloudpickle
 
-    Raises:
-        MissingPackageError: cloudpickle is not installed.
-    """
-    try:
-        import cloudpickle
-    except ImportError:
-        raise MissingPackageError("comparing needs cloudpickle; install: pip install 'wholebody[charts]'") from None
     pickled: bytes = cloudpickle.dumps(value)
     return pickled

@@ -92,7 +92,7 @@ def _rows() -> dict[str, _Row]:
         rows[f"newton/{way}"] = _Row(partial(newton_entrant, way))
     rows["ccd"] = _Row(ccd_entrant)
     rows["dls"] = _Row(dls_entrant)
-    rows["placo"] = _Row(placo_entrant, ("placo",), "compare")
+    rows["placo"] = _Row(placo_entrant, ("placo",), "placo")
     rows["pink"] = _Row(_pink, ("pink", "daqp"), "compare")
     rows["mink"] = _Row(_mink, ("mink", "mujoco", "daqp"), "compare")
     return rows

@@ -40,7 +40,8 @@ def chosen_tools(names: Iterable[str] | None) -> tuple[str, ...]:
         if name not in NEEDS:
             raise UnknownNameError("tool", name, NEEDS)
         if name not in installed_tools():
-            raise MissingPackageError(f"{name} is not installed; install it with: pip install 'wholebody[compare]'")
+            extra = "placo" if name == "placo" else "compare"
+            raise MissingPackageError(f"{name} is not installed; install it with: pip install 'wholebody[{extra}]'")
     return chosen
 
 

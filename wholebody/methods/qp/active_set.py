@@ -18,8 +18,6 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import qr_multiply, solve_triangular
-from scipy.linalg.lapack import dposv
 
 from wholebody.methods.qp.quadratic_program import ActiveSet, Array, Mask, QPSolution, QuadraticProgram
 
@@ -98,6 +96,8 @@ def minimise_on_face(program: QuadraticProgram, active: ActiveSet) -> FacePoint 
 
     Signs are read off the multipliers: weight times residual would drown them in rounding where weights are large.
     """
+    from scipy.linalg.lapack import dposv
+
     rows = np.vstack([program.rows, program.elastic[active.elastic]])
     target = np.concatenate([program.target, program.least[active.elastic]])
     weight = np.concatenate([program.weight, program.elastic_weight[active.elastic]])
@@ -129,6 +129,8 @@ def _in_columns(program: QuadraticProgram, rows: Array, target: Array, weight: A
     They minimise |W^1/2 (A x - b)|^2 + |D^1/2 x + D^-1/2 g|^2. The rows stand in the order of their weights, for which
     Householder's QR is stable row by row (Cox and Higham 1998).
     """
+    from scipy.linalg import qr_multiply, solve_triangular
+
     if not free.any():
         return np.zeros(0)
     heavy = np.argsort(-weight, kind="stable")
