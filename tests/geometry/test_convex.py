@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from wholebody import FileFormatError, InputError
+from wholebody.arrays import Array
 from wholebody.geometry.components import split_components
 from wholebody.geometry.convex import convex_pieces
 from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.meshes import read_mesh
-from wholebody.geometry.pieces import Array, Piece
+from wholebody.geometry.pieces import Piece
 from wholebody.geometry.shapes import Mesh
 from wholebody.geometry.simplified_hull import simplified_hull
 

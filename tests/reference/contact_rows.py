@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.geometry import contact_rows as module
-from wholebody.geometry.contact_rows import Array, ContactRowBuilder, Indices
+from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.proximity import Contacts
 
 

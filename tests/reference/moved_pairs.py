@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from wholebody.arrays import Array, Indices
 from wholebody.geometry.continuous.moved_pairs import ARC, ENDLESS, Placed, distances
-from wholebody.geometry.proximity import Array, Indices, PairTable
+from wholebody.geometry.proximity import PairTable
 
 
 def far_moved(table: PairTable, before: Placed, after: Placed) -> Indices:

@@ -14,12 +14,10 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import number, shown
 from wholebody.errors import InputError, UnknownNameError
-
-Array = NDArray[np.float64]
 
 STATURE_RANGE = (1.3, 2.2)
 """Metres. The fits come from adults of 1.4 to 2.0 m; beyond this range they are no longer a body."""

@@ -13,11 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 class Solid(NamedTuple):

@@ -14,10 +14,11 @@ from itertools import combinations
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures import hulls
 from wholebody.figures.anthropometry import Body, body, describe, keyed
-from wholebody.figures.body_spec import Array, BodySpec, Joint, Landmark, Link, Solid, geometry_of, model_of, place
+from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, geometry_of, model_of, place
 from wholebody.figures.description import Articulated, Chain, Description, ExcludedPair
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.figure import Figure

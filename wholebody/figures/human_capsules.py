@@ -9,7 +9,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.figures.body_spec import Array, Solid, place
+from wholebody.arrays import Array
+from wholebody.figures.body_spec import Solid, place
 from wholebody.figures.dimensions import RELAXED, Dimensions
 
 # Turns a capsule's own axis z into y.

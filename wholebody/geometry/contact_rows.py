@@ -20,11 +20,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError
 from wholebody.geometry.proximity import COAL_ACCURACY, Contacts, PairTable
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 BAND = 0.02  # m: swept points this much farther than the witness point still make a row; wider = more rows
 LEVER_DISTANCE = 0.025  # m: pairs that are this much farther apart than they must be get their witness row only

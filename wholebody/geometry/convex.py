@@ -13,11 +13,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError, MissingPackageError
 from wholebody.geometry.components import Component, enclosed_volume, split_components
 from wholebody.geometry.hull import hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, kept
-from wholebody.geometry.pieces import LARGEST, SMALLEST, Array, Piece
+from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 from wholebody.geometry.simplified_hull import simplified_hull
 
 CONVEX_VOLUME = 1e-4

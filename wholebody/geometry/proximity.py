@@ -12,12 +12,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, placement_view, read_result
 from wholebody.geometry.swept_points import SweptPoints, swept_points
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 COAL_ACCURACY = 1e-6  # m: of coal's distances
 PENETRATION = 1e-5  # m: deeper than this a pair is called inside of each other; what touches is solved to it

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.geometry.pieces import SMALLEST, Array
+from wholebody.arrays import Array
+from wholebody.geometry.pieces import SMALLEST
 
 MANY_FACES = 1000
 """Faces from which on not all of them are tried."""

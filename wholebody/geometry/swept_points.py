@@ -11,11 +11,9 @@ from typing import Any, NamedTuple
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 class SweptPoints(NamedTuple):

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.interaction.overlap_strategy import Resolution
 from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
 from wholebody.scene import Scene
-
-Array = NDArray[np.float64]
 
 NOTED = 1e-3
 """Depth left, metres, that a frame's note speaks of."""

@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from wholebody.arrays import Array
 from wholebody.assessment import assess
 from wholebody.checks import array, function, instance, numbers
 from wholebody.errors import InputError
@@ -28,7 +29,6 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.intp]
 
 SETTLED = 1e-3  # m, rad: a goal that is left by less than this when it has come to its end is met at once

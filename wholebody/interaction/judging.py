@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import instance
 from wholebody.figures.state import State
 from wholebody.geometry.continuous.sweep import Sweep
@@ -19,7 +20,6 @@ from wholebody.interaction.recording import Recording
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.intp]
 
 PASSING = {"qp": 1e-4, "ccd": 1e-3}

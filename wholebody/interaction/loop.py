@@ -13,8 +13,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from wholebody.arrays import Array
 from wholebody.checks import array, flag, function, instance, known, time_step
 from wholebody.errors import InputError
 from wholebody.geometry.proximity import PENETRATION
@@ -29,8 +30,6 @@ from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
-
-Array = NDArray[np.float64]
 
 OVERLAPS = ("qp", "ccd")
 

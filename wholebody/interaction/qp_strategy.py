@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.interaction.attraction import Attraction, Pace
 from wholebody.interaction.overlap_strategy import Resolution
 from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
@@ -14,8 +14,6 @@ from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
-
-Array = NDArray[np.float64]
 
 CLEARANCE = 1e-3
 """Metres kept between pieces. A step is exact to first order only, and what it neglects must fit in here."""

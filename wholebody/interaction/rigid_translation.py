@@ -14,13 +14,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.bisection import last_free
 from wholebody.geometry.penetration import global_depth
 from wholebody.interaction.overlap_strategy import Resolution
 from wholebody.scene import Scene
-
-Array = NDArray[np.float64]
 
 STEP = 0.01
 """Metres that the hand is drawn at once: less than half of what is thin (a table's top, a finger), so that it is not

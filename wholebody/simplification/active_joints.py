@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Mask
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.proximity import COAL_ACCURACY
@@ -22,8 +23,6 @@ from wholebody.tasks.base import Constraint, Goal, Measure
 from wholebody.tasks.discomfort import Discomfort
 from wholebody.tasks.displacement import Displacement
 from wholebody.tasks.effort import Effort
-
-Mask = NDArray[np.bool_]
 
 SEPARABLE = (Effort, Displacement, Discomfort)  # measures that are a sum over joints, so that locking one costs its own
 SAMPLES = 6  # postures at which rows that are no wrenches are asked which joints they move with

@@ -15,9 +15,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Mask
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State, Wrench
-from wholebody.tasks.base import Array, Bound, Constraint, Goal, Mask, Measure, Surroundings, Term
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings, Term
 
 SAMPLES = 3  # postures at which a term that was stated anew must say the same
 SAME = 1e-7  # largest difference in its values and derivatives there, beside their size

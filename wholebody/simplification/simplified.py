@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.assessment import assess
-from wholebody.problem import Array, Problem
+from wholebody.problem import Problem
 from wholebody.simplification.embedding import Embedding
 from wholebody.solution import Solution
 

@@ -7,14 +7,12 @@ from functools import lru_cache
 import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.geometry.hull import hull_piece
 from wholebody.geometry.pieces import Piece
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.geometry.simplified_hull import simplified_hull
-
-Array = NDArray[np.float64]
 
 FEW = 64  # corners: fewer of them in pieces with no more are nothing to be measured in a solve
 CORNERS = (8, 16, 32, 48)  # tried in turn

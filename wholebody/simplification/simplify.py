@@ -8,16 +8,16 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody import checks
+from wholebody.arrays import Array, Indices
 from wholebody.figures.description import ROOT_JOINT
 from wholebody.figures.figure import Figure
 from wholebody.geometry.large_models import geometry_model
-from wholebody.problem import Array, Problem
+from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.scene_geometry import SceneGeometry, SceneObject
 from wholebody.simplification.active_joints import ActiveJoints, active_joints
 from wholebody.simplification.embedding import Embedding, restated_term
 from wholebody.simplification.pairs import reachable_pairs
-from wholebody.simplification.reach import Indices
 from wholebody.simplification.simplified import LeftOut, Simplified
 from wholebody.simplification.simplified_pieces import simplified_piece
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term

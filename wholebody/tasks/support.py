@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.swept_points import swept_points
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Surroundings
+from wholebody.tasks.base import Surroundings
 
 STANDING_HEIGHT = 0.01
 """Height [m] above a foot's lowest point up to which its corners stand on the ground: soles are rounded by as much."""

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.view import style
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.viewed_scene import ViewedContacts, ViewedScene
-
-Array = NDArray[np.float64]
 
 MOST = 4  # of the hardest are marked; more labels hide each other
 

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.view import drawing, style
 from wholebody.view.scene_graph import Keyframe, SceneGraph
 from wholebody.view.style import Color
 from wholebody.view.viewed_scene import ViewedScene
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.view import commands, style
 from wholebody.view.server import CAMERA, Command
-
-Array = NDArray[np.float64]
 
 NEAR = 0.3
 """How far around the figure things are kept in the picture, metres; a wall is as long as it likes."""

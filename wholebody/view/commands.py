@@ -7,11 +7,10 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.view.server import ANIMATION, DELETE, OBJECT, PROPERTY, STOP, TRANSFORM, Command
 
-Array = NDArray[np.float64]
 _FLOATS, _INTEGERS = 0x17, 0x16  # msgpack extension types: Float32Array, Uint32Array
 
 

@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.view import style
@@ -19,8 +19,6 @@ from wholebody.view.goal_markers import Goals
 from wholebody.view.scene_graph import Keyframe, Marker, SceneGraph
 from wholebody.view.server import Command
 from wholebody.view.viewed_scene import ViewedScene
-
-Array = NDArray[np.float64]
 
 
 class Composition:

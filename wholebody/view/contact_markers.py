@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.geometry.proximity import PENETRATION
 from wholebody.view import drawing, style
 from wholebody.view.bodies import Bodies
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.viewed_scene import ViewedContacts
-
-Array = NDArray[np.float64]
 
 MOST = 60
 """Markers are drawn for this many of the nearest contacts; a page with thousands of nodes stutters."""

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import a
 from wholebody.errors import InputError
 from wholebody.figures.state import State
@@ -16,8 +16,6 @@ from wholebody.geometry.placement import placement
 from wholebody.view import drawing, style
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.viewed_scene import ViewedScene
-
-Array = NDArray[np.float64]
 
 _TARGET = Marker("ball", style.TARGET, style.TARGET_RADIUS)
 _MISS = Marker("rod", style.MISS)

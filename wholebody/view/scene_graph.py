@@ -7,15 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.view import commands, drawing, style
 from wholebody.view.commands import Track
 from wholebody.view.sender import Sender
 from wholebody.view.server import Command, Store
 from wholebody.view.style import Color
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

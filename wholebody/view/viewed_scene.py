@@ -9,10 +9,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import a
 from wholebody.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 def checked_scene(scene: Any) -> Any:

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wholebody import checks
+from wholebody.arrays import Array
 from wholebody.assessment import assess
 from wholebody.errors import InputError
 from wholebody.files import check_writable, write
@@ -29,8 +30,6 @@ from wholebody.view.screenshot import Screenshots
 from wholebody.view.sender import Sender
 from wholebody.view.server import ANIMATION, CAMERA, Command
 from wholebody.view.viewed_scene import ViewedScene, checked_scene
-
-Array = NDArray[np.float64]
 
 DEFAULT_DT = 1 / 30  # s: postures without a time step
 CAMERA_POSTURES = 24  # postures of a motion that the camera takes into account

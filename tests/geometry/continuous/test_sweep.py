@@ -10,9 +10,9 @@ import pinocchio as pin
 import pytest
 
 from wholebody import InputError
+from wholebody.arrays import Array
 from wholebody.geometry.continuous import sweep as module
 from wholebody.geometry.continuous.sweep import Sweep, first_contact
-from wholebody.geometry.pieces import Array
 
 
 class Arena:

@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError
-from wholebody.geometry.proximity import ENDLESS, Array, Contacts, Indices, PairTable
+from wholebody.geometry.proximity import ENDLESS, Contacts, PairTable
 
 ARC = 1.1  # length of an arc over its chord, at the most, for the turns that one step makes
 

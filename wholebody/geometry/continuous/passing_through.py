@@ -14,13 +14,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.geometry.continuous.moved_pairs import Placed, distances, far_moved
-from wholebody.geometry.proximity import Contacts, Indices, PairTable
+from wholebody.geometry.proximity import Contacts, PairTable
 
 if TYPE_CHECKING:
     from wholebody.geometry.continuous.sweep import FirstContact, Sweep
 
-Array = NDArray[np.float64]
 
 DIP = 5e-4  # m: between two postures a piece may dip in by this much; half of the thinnest plate that counts
 OVERLAP = 2e-4  # m: overlap on the way that does not count; finer than any piece is thick

@@ -16,17 +16,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, read_result
-from wholebody.geometry.pieces import Array
 from wholebody.geometry.proximity import SINGLY
 from wholebody.geometry.swept_points import swept_points
-
-Indices = NDArray[np.intp]
 
 TOLERANCE = 1e-4
 """Depth that is not yet a contact, metres."""

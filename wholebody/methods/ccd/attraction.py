@@ -10,10 +10,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
 from wholebody.scene import Scene
-
-Array = NDArray[np.float64]
 
 LEAST_GAIN = 1e-7  # rad^2: a part that gets no nearer than this to the tracked posture stays where it is
 BLOCKED = 0.4  # a part that gains less than this share of what attraction alone would have is blocked (2 is all of it)

@@ -9,8 +9,8 @@ from math import inf
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import posture
 from wholebody.geometry.continuous.bisection import last_free
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError
@@ -25,8 +25,6 @@ from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, 
 from wholebody.problem import Problem
 from wholebody.solution import Iterate, Solution
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 DISTURBANCES = (0.0, 0.05, 0.2, 0.6)  # rad: of the first starts, from the posture at hand; later ones begin anywhere
 ROUNDS = 6  # reaching and leaving overlap by turns, from one start

@@ -17,12 +17,12 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.linearisation import Lineariser
 from wholebody.methods.control import Control
-from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Rows, Subproblem
 from wholebody.methods.qp.visit import Local, Visit

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.methods.ccd.cones import guards
 from wholebody.methods.ccd.limbs import Limbs, moved, rotated, seen_from
 from wholebody.methods.ccd.overlap_resolution.links import Link, LinkFinder, Overlap, Vector
 from wholebody.methods.ccd.sweep import Aims, sweep
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 MARGIN = 2e-4  # m: how far outside a goal lies, so that the next query finds nothing
 CLOSE = 1e-4  # m: a goal nearer than this is reached

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.bisection import last_free
 from wholebody.geometry.continuous.moved_pairs import Placed
@@ -23,8 +23,6 @@ from wholebody.methods.ccd.attraction import Attraction
 from wholebody.methods.ccd.overlap_resolution.chain import MARGIN
 from wholebody.methods.ccd.overlap_resolution.resolver import Counts, OverlapResolver
 from wholebody.scene import Scene
-
-Array = NDArray[np.float64]
 
 STEP = 0.03  # m: farthest that a chain's tip moves at once; half of a forearm's width
 SMALL_STEP = 0.006  # m: where steps of that length lead around a bulge that the straight way cuts

@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.methods.ccd.limbs import movable
@@ -19,8 +19,6 @@ from wholebody.methods.ccd.overlap_resolution.links import Overlap
 from wholebody.methods.control import Control
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-4  # m: an overlap that does not count; coal's own accuracy is a hundredth of it
 GOALS = 8  # most goals for one chain before the next has its turn
