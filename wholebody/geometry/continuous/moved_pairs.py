@@ -15,7 +15,7 @@ ARC = 1.1  # length of an arc over its chord, at the most, for the turns that on
 
 
 class Placed(NamedTuple):
-    """Which pairs are near at a posture, nearer than what: what a passage is judged by."""
+    """Which pairs are near at a posture, nearer than what: what a motion is judged by."""
 
     contacts: Contacts
     within: float
