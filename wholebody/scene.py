@@ -269,8 +269,8 @@ class Scene:
         from wholebody.geometry.penetration import object_penetrations
 
         with self.lend() as workspace:
-            pairs = workspace.near(q, 0.0).nearest_first().pair
-            return object_penetrations(workspace.geometry, workspace.proximity.results, workspace.owners, pairs)
+            near = workspace.near(q, 0.0).nearest_first()
+            return object_penetrations(workspace.geometry, near.placements, workspace.owners, near.pair)
 
     def sweep(self, q0: Array, q1: Array, tolerance: float = 1e-4) -> FirstContact | None:
         """First contact on the way from q0 to q1, both (nq,), along pin.interpolate; None where there is none.

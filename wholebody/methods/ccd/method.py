@@ -19,7 +19,7 @@ from wholebody.methods.ccd.overlap_resolution.resolver import TOLERANCE, Overlap
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.terms import read
 from wholebody.methods.conclusion import Ending, concluded
-from wholebody.methods.contradictions import Contradiction, contradictions
+from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, check_problem, check_settings
 from wholebody.problem import Problem
@@ -199,11 +199,14 @@ class _Search:
             trial = self._attempt(q, free, "" if attempt == 0 else "restart")
             if best is None or trial.better(best, self._tolerance):
                 best = trial
+            if self._serves(best):
+                self.contradictions = ()
             if self._serves(best) or self._control.over:
                 break
             if attempt == 0:
                 self.contradictions = contradictions(self._problem, self._workspace)
-            if self.contradictions:
+            least = least_left(self.contradictions)
+            if least is None or (least and best.error <= NEAREST * least):
                 break
         assert best is not None
         return best if not self._control.over else replace(best, rested=False)

@@ -24,9 +24,10 @@ class Newton:
     """Newton's method in full coordinates (Choi and Cremer 1999), for trees and closed loops alike.
 
     Every body has seven variables, every joint is an equation, and each step is the least motion that meets all of
-    them. `Effort` is minimised on the way, up to what the stopping of the iteration leaves; other measures are reported
-    only, and the solution's message says so. Where the goals cannot be met, their least squares are sought with
-    everything else held.
+    them. Measures of the turning joints, your own among them, are minimised on the way, up to what the stopping of the
+    iteration leaves; one that depends on the root's place or on other joints is reported only, and the solution's
+    message says so. Goals and constraints of your own are taken where all joints turn but a free root. Where the goals
+    cannot be met, their least squares are sought with everything else held.
 
     These are settings alone: one object serves any number of problems and threads at the same time.
 

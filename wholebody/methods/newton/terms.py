@@ -1,8 +1,8 @@
-"""Goals and constraints of a problem as equations of bodies; what has none is refused by name."""
+"""Goals and constraints of a problem as equations of bodies; terms of other classes by their rows in the tangent."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -18,6 +18,7 @@ from wholebody.methods.newton.equations import EquationSet
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.mass_center import MassCenter
 from wholebody.methods.newton.quaternions import axes_with_z
+from wholebody.methods.newton.tangent_rows import constraint_rows, goal_rows
 from wholebody.problem import Problem
 from wholebody.tasks import (
     Axis,
@@ -36,8 +37,6 @@ from wholebody.tasks import (
 )  # fmt: skip
 from wholebody.tasks.base import Goal
 from wholebody.tasks.residuals import PlacementResidual
-
-CAN = "Point, Frame, Orientation, Relative, Axis, CenterOfMass, Posture; Hold, Plane, Balance, ReachCones; Freeze"
 
 
 def state_equations(problem: Problem, state: State) -> None:
@@ -80,7 +79,8 @@ def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]
         elif isinstance(goal, Posture):
             bodies.ask(result, label, goal.resolved_target, set(goal.dofs.tolist()), goal.weight)
         else:
-            raise _refused(label)
+            _check_own(bodies, label)
+            result.add(_as_made(goal_rows(bodies, goal, label)), "own", goal=True, weight=goal.weight)
     return result
 
 
@@ -106,7 +106,10 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
         elif isinstance(term, ReachCones):
             result.add(partial(_cones, problem, term, label), "cone", one_sided=True)
         else:
-            raise _refused(label)
+            _check_own(bodies, label)
+            for rows, one_sided in zip(constraint_rows(bodies, term, label), (False, True), strict=True):
+                if rows is not None:
+                    result.add(_as_made(rows), "own", one_sided=one_sided)
     return result
 
 
@@ -121,11 +124,13 @@ def bound_equations(problem: Problem, state: State) -> EquationSet:
         UnsupportedTermError: one that has none here.
     """
     result = EquationSet()
-    for bound in problem.bounds:
+    for number, bound in enumerate(problem.bounds):
         if isinstance(bound, Freeze):
             _frozen(result, problem, bound, state)
         elif not isinstance(bound, StepLimit):  # a solve is not tied to time, so a step limit bounds nothing
-            raise _refused(type(bound).__name__)
+            raise UnsupportedTermError(
+                "newton", [f"bounds[{number}], {type(bound).__name__} (it takes Freeze and StepLimit)"]
+            )
     return result
 
 
@@ -205,5 +210,16 @@ def _local(problem: Problem, frame: int) -> Any:
     return problem.scene.model.frames[frame].placement
 
 
-def _refused(label: str) -> UnsupportedTermError:
-    return UnsupportedTermError("newton", [f"{label} (it takes {CAN})"])
+def _as_made(batch: Batch) -> Callable[[int], Batch]:
+    return lambda world: batch
+
+
+def _check_own(bodies: FigureBodies, label: str) -> None:
+    """Refuse a term of another class where a figure's tangent is not a function of its bodies here.
+
+    Raises:
+        UnsupportedTermError: it has joints other than turning ones and one free root.
+    """
+    if bodies.uncharted:
+        reason = f"its rows need turning joints and one free root, and {bodies.uncharted[0]!r} is neither"
+        raise UnsupportedTermError("newton", [f"{label} ({reason})"])
