@@ -55,6 +55,13 @@ def test_the_first_compilation_is_told_once_and_kept(run, tmp_path: Path) -> Non
     assert run(**kept) == (["3.0", "4.0", "False"], [])
 
 
+def test_the_users_cache_is_taken_where_the_package_cannot_be_written_to(run, tmp_path: Path) -> None:
+    (tmp_path / "wholebody" / "__pycache__").write_text("in the way")
+    kept = {"NUMBA_CACHE_DIR": "", "HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    assert [len(run(**kept)[1]) for _ in range(2)] == [1, 0]
+    assert list((tmp_path / "cache").rglob("*.nbi"))
+
+
 def test_loops_work_where_nothing_can_be_kept(run, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     nowhere = str(tmp_path / "file" / "folder")
