@@ -288,6 +288,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     }  # fmt: skip
     yield "Problem", Call(wb.Problem, stated, wb.solve)
     yield "Problem(touching)", Call(lambda pair: wb.Problem(there, touching=[pair]), {"pair": ("link4", "ball")})
+    yield "Problem.with_start", Call(ask.with_start, {"q": q}, wb.solve)
     yield "Problem.check_fresh", Call(ask.check_fresh, {})
     lent = ask.workspace()
     yield "Problem.lineariser", Call(lambda dt: ask.lineariser(lent, dt), {"dt": 0.1})
@@ -297,6 +298,9 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "solve", Call(wb.solve, {"problem": ask, "method": "qp", "progress": print})
     yield "assess", Call(wb.assess, {"problem": ask, "q": q})
     yield "simplify", Call(wb.simplify, {"problem": ask, "lock": True})
+    part = wb.simplify(ask)
+    yield "Simplified.posture", Call(part.posture, {"q": part.problem.start})
+    yield "Simplified.restored", Call(part.restored, {"solution": wb.solve(part.problem)})
     judged = wb.assess(ask, q)
     yield "Assessment.holds", Call(judged.holds, {"tolerance": 0.1})
     yield "Assessment.met", Call(judged.met, {"tolerance": 0.1})
@@ -316,6 +320,27 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "QP.solve", Call(wb.QP().solve, {"problem": ask, "progress": print})
     yield "QP.tracker", Call(wb.QP().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
     yield "QPTracker.step", Call(wb.QP().tracker(ask, 0.1).step, {"q": q, "measures": True})
+    for name, made in {
+        "QP": wb.QP(budget=0),
+        "CCD": wb.CCD(),
+        "Newton": wb.Newton(restarts=0),
+        "Placo": wb.Placo(),
+        "DampedLeastSquares": wb.DampedLeastSquares(),
+    }.items():
+        yield f"{name}.accepts", Call(made.accepts, {"problem": ask})
+        if name in ("CCD", "Placo", "DampedLeastSquares"):
+            yield f"{name}.tracker", Call(made.tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
+    for name, made in {
+        "QPTracker": wb.QP(budget=0).tracker(ask, 0.1),
+        "NewtonTracker": wb.Newton(restarts=0).tracker(ask, 0.1),
+        "SolvingTracker": wb.DampedLeastSquares().tracker(ask, 0.1),
+    }.items():
+        yield f"{name}.frame", Call(made.frame, {"q": q, "tolerance": 1e-4})
+        for method in ("solve", "nearest", "ways_out"):
+            if (name, method) != ("NewtonTracker", "solve"):
+                yield f"{name}.{method}", Call(getattr(made, method), {"q": q})
+        if name == "SolvingTracker":
+            yield "SolvingTracker.step", Call(made.step, {"q": q})
     yield "CCD", Call(wb.CCD, {"tolerance": 1e-4, "iterations": 5, "restarts": 1, "seed": 0, "time_limit": None}, used)
     yield "CCD.solve", Call(wb.CCD().solve, {"problem": ask, "progress": print})
     yield "CCD.pushed_out", Call(wb.CCD().pushed_out, {"problem": ask, "q": q})
@@ -346,6 +371,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
 
     yield "Assembly", Call(wb.Assembly, {})
     yield "Assembly.body", Call(assembly().body, {"name": "third", "at": at, "size": 0.1}, solve_parts)
+    placed = assembly()
+    yield "Assembly.place", Call(placed.place, {"variables": placed.variables()}, solve_parts)
     yield "Assembly.drop_goals", Call(assembly().drop_goals, {})
     fixed = {"first": "crank", "second": "rod", "placement_second": at}
     yield "Assembly.fixed", Call(assembly().fixed, fixed, solve_parts)
@@ -455,7 +482,8 @@ def surface() -> list[str]:
 
 ANSWERS = (
     "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "Iterate", "Assessment",
-    "Task", "Step", "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
+    "Task", "Step", "QPStep", "Simplified", "LeftOut",
+    "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
     "Scene.of_parts",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
@@ -479,8 +507,8 @@ DERIVATIVES = (
 )
 """What problems and methods, not people, ask of terms and states; at every posture, which is too often for checks."""
 
-ABSTRACT = ("Shape", "Goal", "Constraint", "Bound", "Measure", "Figure")
-"""Classes to derive from, and the figure, which `load` builds."""
+ABSTRACT = ("Shape", "Goal", "Constraint", "Bound", "Measure", "Method", "Tracker", "Figure")
+"""Classes to derive from, protocols, and the figure, which `load` builds."""
 
 BROWSER = ["open", "wait", "wait_until_closed", "sync", "picture", "movie", "close"]
 """Methods of the viewer that need a browser or a server: see tests/view."""

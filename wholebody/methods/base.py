@@ -12,10 +12,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.checks import posture, time_step
+from wholebody.checks import number, posture, time_step
 from wholebody.errors import InputError
 from wholebody.methods.control import Progress
-from wholebody.methods.inputs import check_problem
+from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.workspace import Workspace
@@ -196,6 +196,8 @@ class SolvingTracker:
 
     def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
         """A whole solve from the posture q (nq,), as exact as the method is set; rough without a tolerance."""
+        if tolerance is not None:
+            number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
         solution = (self._rough if tolerance is None else self._method).solve(self._begun(q))
         return SolvedStep(np.asarray(solution.q, dtype=float), solution.iterations, solution.assessment.seconds)
 
@@ -209,6 +211,7 @@ class SolvingTracker:
 
     def ways_out(self, q: Array) -> Sequence[Array]:
         """None."""
+        posture(q, self.workspace.model.nq)
         return ()
 
     def _begun(self, q: Array) -> Problem:

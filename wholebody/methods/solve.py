@@ -58,22 +58,24 @@ def as_method(given: object) -> Method:
     return given  # type: ignore[return-value]
 
 
-def method_for_motions(method: object) -> Method:
+def method_for_motions(given: object) -> Method:
     """A method for motions: given by name, it is set for 1e-5 and not to restart; a configured one is taken as it is.
 
     Raises:
         UnknownNameError: there is no such method.
         InputError: it is neither a name nor a method.
     """
-    if method == "qp":
+    if not isinstance(given, str):
+        return as_method(given)
+    if given == "qp":
         from wholebody.methods.qp.method import QP
 
         return QP(restarts=0)
-    if method == "ccd":
+    if given == "ccd":
         from wholebody.methods.ccd.method import CCD
 
         return CCD(tolerance=AT_THE_END, restarts=0)
-    return as_method(method)
+    return method_named(given)
 
 
 def solve(problem: Problem, method: str | Method = "qp", progress: Progress | None = None) -> Solution:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
+from wholebody import checks
 from wholebody.arrays import Array
 from wholebody.assessment import assess
 from wholebody.problem import Problem
@@ -95,15 +94,22 @@ class Simplified:
 
         Args:
             q: (small nq,).
+
+        Raises:
+            InputError: q has the wrong shape or a value that is not finite.
         """
-        return self._embedding.embed(np.asarray(q, dtype=float))
+        return self._embedding.embed(checks.posture(q, self.problem.scene.model.nq))
 
     def restored(self, solution: Solution) -> Solution:
         """The same answer for the whole problem: its posture, judged by the whole problem's assessment.
 
         Args:
             solution: a method's answer to `problem`.
+
+        Raises:
+            InputError: it is no solution.
         """
+        checks.instance(solution, Solution, "restored: solution", "give what wb.solve(part.problem) returns")
         q = self.posture(solution.q)
         judged = assess(self.whole, q)
         status, message = solution.status, solution.message

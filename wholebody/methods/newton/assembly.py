@@ -16,7 +16,7 @@ from wholebody.geometry.pieces import check_length
 from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE
 from wholebody.methods.newton.assembly_solution import AssemblySolution, solved
-from wholebody.methods.newton.course import Course
+from wholebody.methods.newton.course import Course, unit
 from wholebody.methods.newton.equations import EquationSet, axes_along
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.joint_register import JointRegister
@@ -29,6 +29,7 @@ from wholebody.tasks.inputs import direction, point, target_placement
 Array = NDArray[np.float64]
 
 WORLD = "world"
+UNIT_TOLERANCE = 1e-3  # how far a quaternion may be from unit length before it is taken for a mistake
 FINEST = 1e-12  # m, rad: least tolerance, where all is exact but for rounding
 
 
@@ -237,9 +238,12 @@ class Assembly:
             variables: (7 n,) as `variables` returns them: of each body its origin [m] and its quaternion (x, y, z, w).
 
         Raises:
-            InputError: another number of values, or one that is not finite.
+            InputError: another number of values, one that is not finite, or a quaternion that is not of unit length.
         """
-        self._places = list(numbers(variables, (7 * len(self._places),), "place: variables").reshape(-1, 7))
+        bodies = numbers(variables, (7 * len(self._places),), "place: variables").reshape(-1, 7)
+        if (np.abs(np.linalg.norm(bodies[:, 3:], axis=1) - 1.0) > UNIT_TOLERANCE).any():
+            raise InputError("place: variables holds a quaternion that is not of unit length; divide it by its length")
+        self._places = list(unit(bodies).reshape(-1, 7))
         return self
 
     def solve(

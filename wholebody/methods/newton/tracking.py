@@ -122,6 +122,7 @@ class NewtonTracker:
 
     def ways_out(self, q: Array) -> Sequence[Array]:
         """None: the steps lead out."""
+        posture(q, self.workspace.model.nq)
         return ()
 
     def solve(self, q: Array) -> Solution:

@@ -65,6 +65,7 @@ class QP:
 
     def accepts(self, problem: Problem) -> str | None:
         """None: every term that says its values and derivatives can be taken."""
+        check_problem(problem, "QP.accepts: problem")
         return None
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:

@@ -10,11 +10,11 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.checks import flag, time_step
+from wholebody.checks import flag, number, posture, time_step
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.linearisation import Linearisation
 from wholebody.methods.base import Method, goal_error, nearest_to
-from wholebody.methods.inputs import check_problem
+from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem
@@ -151,7 +151,7 @@ class QPTracker:
         Raises:
             InputError: as for `step`.
         """
-        enough = OF_A_FRAME if tolerance is None else tolerance
+        enough = OF_A_FRAME if tolerance is None else number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
         # a bound on speeds is one of the way of a whole frame
         most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else PROGRAMS
         here, error = self.step(q).q, np.inf
@@ -175,6 +175,7 @@ class QPTracker:
 
     def ways_out(self, q: Array) -> Sequence[Array]:
         """None: the steps lead out."""
+        posture(q, self.workspace.model.nq)
         return ()
 
     def _step(self, q: Array, measures: bool) -> QPStep:
