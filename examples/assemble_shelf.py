@@ -10,8 +10,8 @@ import pinocchio as pin
 from presenting import OAK, STEEL, command_line
 
 import wholebody as wb
+from wholebody.view.filmstrip import write_filmstrip
 from wholebody.view.parts import Part, Parts
-from wholebody.view.strip import write_strip
 
 DEPTH, WIDTH, HEIGHT, THICK = 0.30, 0.80, 1.00, 0.02  # m: of the shelf, outside, and of its boards
 BOARD = (DEPTH, WIDTH - 2.0 * THICK, THICK)
@@ -115,7 +115,7 @@ def draw(stages: list[dict[str, pin.SE3]], out: Path) -> None:
         print(f"  {viewer.save(out / 'assemble_shelf.html')}")
         chosen = [postures[0], postures[2], postures[-1]]
         try:
-            print(f"  {write_strip(viewer, chosen, out / 'assemble_shelf.png', (560, 480))}")
+            print(f"  {write_filmstrip(viewer, chosen, out / 'assemble_shelf.png', (560, 480))}")
         except wb.MissingPackageError as error:
             print(f"  no picture: {error}")
 

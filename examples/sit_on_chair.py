@@ -13,7 +13,7 @@ from presenting import OAK, command_line
 
 import wholebody as wb
 from wholebody.interaction import Dragged, drag_along, judge_drag, read_path, spread
-from wholebody.view.strip import write_strip
+from wholebody.view.filmstrip import write_filmstrip
 
 SEAT = 0.386  # m: its top; buttocks touch it when the hips are as high as the knees
 SEATED = (-0.41, 0.0, 0.4898)  # m: of the pelvis, a tenth of a millimetre over the seat
@@ -78,7 +78,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> dict[str, Dragg
 
 
 def draw(scene: wb.Scene, drags: dict[str, Dragged], out: Path) -> None:
-    """Write a film strip and a page that plays the motion, for each method."""
+    """Write a filmstrip and a page that plays the motion, for each method."""
     out.mkdir(parents=True, exist_ok=True)
     for method, dragged in drags.items():
         with wb.Viewer(scene, title=f"sit_on_chair, {method}") as viewer:
@@ -87,7 +87,7 @@ def draw(scene: wb.Scene, drags: dict[str, Dragged], out: Path) -> None:
             print(f"  {viewer.save(out / f'sit_on_chair_{method}.html')}")
             stages = [dragged.q[round(share * (len(dragged.q) - 1))] for share in STAGES]
             try:
-                print(f"  {write_strip(viewer, stages, out / f'sit_on_chair_{method}.png')}")
+                print(f"  {write_filmstrip(viewer, stages, out / f'sit_on_chair_{method}.png')}")
             except wb.MissingPackageError as error:
                 print(f"  no picture: {error}")
 

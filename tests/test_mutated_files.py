@@ -15,7 +15,7 @@ import pytest
 import wholebody as wb
 from wholebody import interaction
 from wholebody.cli import result
-from wholebody.cli.demo import shipped_tasks
+from wholebody.cli.demo import packaged_tasks
 from wholebody.taskfile import task as task_module
 
 ROUNDS = 250
@@ -93,7 +93,7 @@ def sources(hand: wb.Figure, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     (folder / "hand.toml").write_text('[figure]\nname = "hand"\n')
     task = wb.read_task(folder / "hand.toml")
     answer = result.as_json(result.describe(task, wb.solve(task.problem), folder))
-    tasks = [path.read_text(encoding="utf-8") for path in shipped_tasks().values()]
+    tasks = [path.read_text(encoding="utf-8") for path in packaged_tasks().values()]
     return {
         "task": (tasks, "task.toml"),
         "track": ([interaction.write_track(track, folder / "track.csv").read_text()], "track.csv"),

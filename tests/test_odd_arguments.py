@@ -361,7 +361,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Drag", Call(wb.Drag, dragged, lambda drag: drag.to(at))
     yield "Drag.to", Call(wb.Drag(ask).to, {"target": at})
     yield "Drag.finish", Call(wb.Drag(ask).finish, {})
-    yield "pull", Call(wb.pull, {"problem": ask, "path": places, "method": "qp", "goal": 0, "spacing": 0.05})
+    yield (
+        "follow_path",
+        Call(wb.follow_path, {"problem": ask, "path": places, "method": "qp", "goal": 0, "spacing": 0.05}),
+    )
 
     def solve_parts(made: Any) -> Any:
         return made.solve(iterations=3)
@@ -514,7 +517,7 @@ BROWSER = ["open", "wait", "wait_until_closed", "sync", "picture", "movie", "clo
 def fed(name: str) -> bool:
     """Whether a name of the surface is fed here."""
     owner, _, method = name.partition(".")
-    if name in ANSWERS or (owner == "Viewer" and method in BROWSER) or name == "write_strip":
+    if name in ANSWERS or (owner == "Viewer" and method in BROWSER) or name == "write_filmstrip":
         return False
     if name in OF_METHODS or owner == "Workspace":
         return False

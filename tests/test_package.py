@@ -17,6 +17,7 @@ HEAVY = ("pinocchio", "coal", "numpy", "scipy", "osqp", "placo", "meshcat", "tri
 ROOMS = (
     *(
         "errors",
+        "arrays",
         "version",
         "checks",
         "files",

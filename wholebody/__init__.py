@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from wholebody.methods.drag import Drag
     from wholebody.methods.newton.assembly import Assembly
     from wholebody.methods.newton.method import Newton
+    from wholebody.methods.path_following import follow_path
     from wholebody.methods.placo.method import Placo
-    from wholebody.methods.pull import pull
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
     from wholebody.problem import Problem
@@ -118,8 +118,8 @@ __all__ = [
     "WholebodyError",
     "__version__",
     "assess",
+    "follow_path",
     "load",
-    "pull",
     "read_task",
     "simplify",
     "solve",
@@ -135,7 +135,7 @@ _MODULES = {
     "wholebody.methods.newton.assembly": "Assembly",
     "wholebody.methods.newton.method": "Newton",
     "wholebody.methods.placo.method": "Placo",
-    "wholebody.methods.pull": "pull",
+    "wholebody.methods.path_following": "follow_path",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
     "wholebody.problem": "Problem",

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 LOOPS = (
     "wholebody.geometry.contact_rows",
-    "wholebody.geometry.moved_pairs",
+    "wholebody.geometry.continuous.moved_pairs",
     "wholebody.methods.newton.linear_algebra.gram",
     "wholebody.methods.qp.active_set",
 )

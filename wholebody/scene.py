@@ -25,8 +25,8 @@ from wholebody.workspace import Workspace, lent
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
+    from wholebody.geometry.continuous.sweep import FirstContact
     from wholebody.geometry.penetration import ObjectPenetration
-    from wholebody.geometry.sweep import FirstContact
 
 Array = NDArray[np.float64]
 
@@ -275,7 +275,7 @@ class Scene:
     def sweep(self, q0: Array, q1: Array, tolerance: float = 1e-4) -> FirstContact | None:
         """First contact on the way from q0 to q1, both (nq,), along pin.interpolate; None where there is none.
 
-        Continuous: no object is too thin to be seen. See `wholebody.geometry.sweep`.
+        Continuous: no object is too thin to be seen. See `wholebody.geometry.continuous.sweep`.
 
         Args:
             q0: where the motion starts.

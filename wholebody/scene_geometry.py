@@ -12,8 +12,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.geometry.continuous.moved_pairs import compiled_kernel
 from wholebody.geometry.large_models import geometry_model
-from wholebody.geometry.moved_pairs import compiled_kernel
 from wholebody.geometry.proximity import PairTable, Proximity
 from wholebody.pool import Pool
 

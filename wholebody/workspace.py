@@ -16,7 +16,7 @@ from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene_geometry import SceneGeometry
 
 if TYPE_CHECKING:
-    from wholebody.geometry.sweep import Sweep
+    from wholebody.geometry.continuous.sweep import Sweep
 
 Array = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ class Workspace:
     def sweep(self) -> Sweep:
         """Continuous collision detection; made when it is first needed."""
         if self._sweep is None:
-            from wholebody.geometry.sweep import Sweep
+            from wholebody.geometry.continuous.sweep import Sweep
 
             self._sweep = Sweep(self.model, self.geometry)
         return self._sweep
@@ -75,6 +75,10 @@ class Workspace:
     def near(self, q: Array, within: float) -> Contacts:
         """Every pair nearer than `within` metres at the posture q, shape (nq,), in the order of the pairs."""
         return self.proximity.near(self.state.update(q).data, within)
+
+    def placements(self, q: Array) -> Array:
+        """Where all pieces are at the posture q, shape (nq,); see `Contacts.placements`."""
+        return self.proximity.placements(self.state.update(q).data)
 
 
 @contextmanager

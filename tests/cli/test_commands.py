@@ -17,7 +17,7 @@ import pytest
 import wholebody as wb
 from tests.needs import each
 from wholebody.cli import main
-from wholebody.cli.demo import shipped_tasks
+from wholebody.cli.demo import packaged_tasks
 from wholebody.view import browser
 
 TASK = """\
@@ -262,7 +262,7 @@ def test_figure_describes_and_writes_what_can_be_loaded_again(
 def test_demo_tasks_can_all_be_read(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["demo", "--list"]) == 0
     listed = capsys.readouterr().out
-    for name, path in shipped_tasks().items():
+    for name, path in packaged_tasks().items():
         assert name in listed
         assert wb.read_task(path).problem.goals
 

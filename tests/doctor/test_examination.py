@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.doctor import examination, packages, trials
+from wholebody.doctor import checks, examination, packages
+from wholebody.doctor.checks import Outcome
 from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
-from wholebody.doctor.trials import Outcome
 
 Fake = Callable[..., None]
 
@@ -29,7 +29,7 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> Fake:
             return {name: Outcome(name not in failing, failing.get(name, answer)) for name in names}
 
         monkeypatch.setattr(packages, "installed", lambda names: everything)
-        monkeypatch.setattr(trials, "run", run)
+        monkeypatch.setattr(checks, "run", run)
 
     return arrange
 
@@ -47,7 +47,7 @@ def test_what_is_absent_but_not_needed_is_no_fault_and_says_how_it_is_had(fake: 
     report = examination.examine({})
     assert report.healthy
     mends = {
-        entry.name: entry.mend for entry in report.entries if entry.state == "absent" and entry.kind != "QP solver"
+        entry.name: entry.repair for entry in report.entries if entry.state == "absent" and entry.kind != "QP solver"
     }
     assert mends == {
         "mujoco": "pip install 'wholebody[compare]'",
@@ -57,7 +57,7 @@ def test_what_is_absent_but_not_needed_is_no_fault_and_says_how_it_is_had(fake: 
 
 
 @pytest.mark.parametrize(
-    ("arranged", "environ", "sentence", "mend"),
+    ("arranged", "environ", "sentence", "repair"),
     [
         (
             {"have": {"placo": Distribution("0.10.2", ("pin==3.8.0",)), "pin": Distribution("4.1.0")}},
@@ -79,12 +79,12 @@ def test_what_is_absent_but_not_needed_is_no_fault_and_says_how_it_is_had(fake: 
     ],
 )
 def test_faults_come_with_their_mend(
-    fake: Fake, arranged: dict[str, object], environ: dict[str, str], sentence: str, mend: str
+    fake: Fake, arranged: dict[str, object], environ: dict[str, str], sentence: str, repair: str
 ) -> None:
     fake(**arranged)
     report = examination.examine(environ)
     assert not report.healthy
-    assert any(sentence in said and mend == told for said, told in report.faults), report.faults
+    assert any(sentence in said and repair == told for said, told in report.faults), report.faults
 
 
 def test_a_ros_workspace_on_the_paths_is_a_fault(fake: Fake, tmp_path: Path) -> None:
@@ -92,4 +92,4 @@ def test_a_ros_workspace_on_the_paths_is_a_fault(fake: Fake, tmp_path: Path) -> 
     (tmp_path / "libboost_python311.so").touch()
     fake()
     report = examination.examine({"PYTHONPATH": str(tmp_path), "LD_LIBRARY_PATH": str(tmp_path)})
-    assert [mend for _, mend in report.faults] == ["unset PYTHONPATH", "unset LD_LIBRARY_PATH"]
+    assert [repair for _, repair in report.faults] == ["unset PYTHONPATH", "unset LD_LIBRARY_PATH"]

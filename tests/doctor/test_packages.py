@@ -19,12 +19,12 @@ def test_placo_beside_another_pin_is_named_with_its_mend() -> None:
     (found,) = conflicts({"placo": PLACO, "pin": Distribution("4.1.0"), "cmeel-urdfdom": URDFDOM})
     assert found == Conflict("placo", "pin==3.8.0", "4.1.0")
     assert str(found) == "placo needs pin==3.8.0, and 4.1.0 is installed"
-    assert found.mend == "pip install 'placo' 'pin==3.8.0'"
+    assert found.repair == "pip install 'placo' 'pin==3.8.0'"
 
 
 def test_an_old_placo_contradicts_wholebody_itself() -> None:
     (found,) = conflicts({"wholebody": Distribution("1", ("placo==0.10.2",)), "placo": Distribution("0.6.2")})
-    assert (found.who, found.found, found.mend) == ("wholebody", "0.6.2", "pip install 'placo==0.10.2'")
+    assert (found.who, found.found, found.repair) == ("wholebody", "0.6.2", "pip install 'placo==0.10.2'")
 
 
 def test_what_is_missing_is_said_to_be_missing() -> None:

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures import load, urdf_path
-from wholebody.figures.anthropometry import body, design_cases
-from wholebody.figures.shipping import shipped_files
-from wholebody.figures.tables import table
+from wholebody.figures.anthropometry import body, design_cases, table
+from wholebody.figures.packaged_urdf import packaged_files
 
 CASES = tuple(design_cases())
 DETAILS = ("spheres", "capsules", "hulls")
@@ -354,14 +353,14 @@ def test_effort_weights_are_the_tables_and_spare_the_root():
     assert figure.effort_weights[figure.dofs(["right_elbow_flexion"])] == pytest.approx(1.0)
 
 
-def test_shipped_files_are_the_builders_output():
+def test_packaged_files_are_the_builders_output():
     folder = urdf_path("human").parent
-    for name, text in shipped_files().items():
+    for name, text in packaged_files().items():
         assert (folder / name).read_text(encoding="utf-8") == text, f"{name} is stale: write it again"
 
 
 @pytest.mark.parametrize("name", ["human", "avatar", "hand"])
-def test_shipped_urdf_is_the_figure(name):
+def test_packaged_urdf_is_the_figure(name):
     built, read = load(name), load(urdf_path(name), root="free")
     assert list(built.model.names) == list(read.model.names)
     q = built.posture(built.postures[0])

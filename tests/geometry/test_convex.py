@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from wholebody import FileFormatError, InputError
+from wholebody.arrays import Array
 from wholebody.geometry.components import split_components
 from wholebody.geometry.convex import convex_pieces
 from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.meshes import read_mesh
-from wholebody.geometry.outer_hull import outer_hull
-from wholebody.geometry.pieces import Array, Piece
+from wholebody.geometry.pieces import Piece
 from wholebody.geometry.shapes import Mesh
+from wholebody.geometry.simplified_hull import simplified_hull
 
 
 def outside(points: Array, pieces: tuple[Piece, ...]) -> Array:
@@ -137,7 +138,7 @@ def test_pieces_are_the_callers_own() -> None:
 @given(st.integers(0, 2**32 - 1), st.integers(20, 200), st.integers(8, 40))
 def test_a_simpler_hull_holds_all_points(seed: int, count: int, most: int) -> None:
     points = np.random.default_rng(seed).normal(size=(count, 3)) * (1.0, 0.5, 0.1)
-    simple = outer_hull(points, most)
+    simple = simplified_hull(points, most)
     assert len(simple) <= most
     planes = ConvexHull(simple).equations
     assert (points @ planes[:, :3].T + planes[:, 3]).max() < 1e-9

@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.geometry.components import enclosed_volume
 from wholebody.geometry.convex import HULL_VERTICES, convex_pieces, mesh_hull
 from wholebody.geometry.hull import MOST_NEIGHBOURS, hull_piece
 from wholebody.geometry.meshes import read_mesh
-from wholebody.geometry.pieces import SMALLEST, Array, Piece
+from wholebody.geometry.pieces import SMALLEST, Piece
 
 
 def outside(cloud: Array, piece: Piece) -> float:

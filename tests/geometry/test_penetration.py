@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from wholebody import InputError
+from wholebody.arrays import Array
 from wholebody.geometry.minkowski import Placed
 from wholebody.geometry.penetration import global_depth, object_penetration, object_penetrations
-from wholebody.geometry.pieces import Array
 from wholebody.geometry.separation import least_separation
 from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Shape, Sphere
 

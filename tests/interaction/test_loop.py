@@ -11,7 +11,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.interaction import FrameLoop, Track, follow
-from wholebody.interaction.nearest import CLEARANCE
+from wholebody.interaction.qp_strategy import CLEARANCE
 from wholebody.tasks import ReachCones
 
 
@@ -188,15 +188,15 @@ def test_driven_objects_come_first(hand: wb.Figure, scene: wb.Scene) -> None:
     order: list[str] = []
 
     class Spy:
-        graze = 1e-4
+        sweep_tolerance = 1e-4
 
-        def remove(self, shown: Any, tracked: Any) -> Any:
-            order.append("remove")
+        def resolve(self, shown: Any, tracked: Any) -> Any:
+            order.append("resolve")
             assert hand.within_limits(tracked)
             np.testing.assert_array_equal(shown, loop.shown)
-            return remover.remove(shown, tracked)
+            return strategy.resolve(shown, tracked)
 
-    remover, loop._remover = loop._remover, Spy()
+    strategy, loop._strategy = loop._strategy, Spy()
     whole_sweep = scene.sweep
 
     def sweep(*ways: Any, **options: Any) -> Any:
@@ -205,9 +205,9 @@ def test_driven_objects_come_first(hand: wb.Figure, scene: wb.Scene) -> None:
 
     scene.sweep = sweep  # type: ignore[method-assign]
     done: list[int] = []
-    follow_track = [at(hand, 0.0, 0.3 - 0.02 * k) for k in range(3)]
-    for tracked in follow_track:
+    tracks = [at(hand, 0.0, 0.3 - 0.02 * k) for k in range(3)]
+    for tracked in tracks:
         loop.frame(tracked)
         done.append(loop.count)
-    assert order == ["remove", "sweep"] * 3
+    assert order == ["resolve", "sweep"] * 3
     assert done == [1, 2, 3]

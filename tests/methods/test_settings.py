@@ -46,7 +46,7 @@ def test_names_are_texts(wrong: Any) -> None:
 def test_assemblies_are_told_where_they_are_taken() -> None:
     assembly = wb.Assembly().body("rod")
     for call in (
-        lambda: wb.pull(assembly, [(0, 0, 0)]),  # type: ignore[arg-type]
+        lambda: wb.follow_path(assembly, [(0, 0, 0)]),  # type: ignore[arg-type]
         lambda: wb.Drag(assembly),  # type: ignore[arg-type]
     ):
         with pytest.raises(InputError, match=r"takes a Problem, not an Assembly; .*point_goal"):

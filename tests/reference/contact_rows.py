@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.geometry import contact_rows as module
-from wholebody.geometry.contact_rows import Array, ContactRowBuilder, Indices
+from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.proximity import Contacts
 
 
@@ -29,7 +30,7 @@ class ReferenceRowBuilder(ContactRowBuilder):
                     points @ placement[piece, :3] + placement[piece, 3] - placement[own[flat[entry[row]]], 3]
                 ) @ (direction[row])
                 apart = heights.min() - self._faces[face[row], 3] - self._radius[piece]
-                if apart >= contacts.distance[c] - module.COAL_ACCURACY:
+                if apart >= contacts.distance[c] - module.NORMAL_ROOM:
                     contacts.normal[c] = sign * direction[row]
 
     def _patch_ends(self, contacts: Contacts, wide: Indices) -> tuple[Indices, Array, Array]:

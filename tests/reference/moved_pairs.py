@@ -1,11 +1,12 @@
-"""Which pairs moved by more than lay between them, in array code: what `wholebody.geometry.moved_pairs` must find."""
+"""Array code for which pairs moved by more than lay between them: what `far_moved` of the package must find."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wholebody.geometry.moved_pairs import ARC, ENDLESS, Placed, distances
-from wholebody.geometry.proximity import Array, Indices, PairTable
+from wholebody.arrays import Array, Indices
+from wholebody.geometry.continuous.moved_pairs import ARC, ENDLESS, Placed, distances
+from wholebody.geometry.proximity import PairTable
 
 
 def far_moved(table: PairTable, before: Placed, after: Placed) -> Indices:

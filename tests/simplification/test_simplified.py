@@ -14,11 +14,11 @@ from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
-from wholebody.geometry.cores import core_of
-from wholebody.simplification.lifting import LiftedConstraint, LiftedGoal
-from wholebody.simplification.outer_pieces import coarser
-from wholebody.simplification.participation import participation
+from wholebody.geometry.swept_points import swept_points
+from wholebody.simplification.active_joints import active_joints
+from wholebody.simplification.embedding import EmbeddedConstraint, EmbeddedGoal
 from wholebody.simplification.simplified import Simplified
+from wholebody.simplification.simplified_pieces import simplified_piece
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 
 FEET = [wb.Hold("left_foot"), wb.Hold("right_foot")]
@@ -219,8 +219,8 @@ def test_terms_that_cannot_be_stated_anew_are_asked_at_the_whole_posture(human: 
         constraints=[wb.Freeze("root", "legs", "spine"), Lean()],
     )
     part = wb.simplify(problem).problem
-    assert [isinstance(goal, LiftedGoal) for goal in part.goals] == [False, True]
-    assert [type(term) for term in part.constraints] == [LiftedConstraint]
+    assert [isinstance(goal, EmbeddedGoal) for goal in part.goals] == [False, True]
+    assert [type(term) for term in part.constraints] == [EmbeddedConstraint]
 
 
 class Slow(Bound):
@@ -296,15 +296,15 @@ def test_coarser_pieces_hold_the_finer_ones_and_say_how_far_they_reach_out() -> 
     points = directions / np.linalg.norm(directions, axis=1)[:, None] * (0.05, 0.06, 0.1)
     hull = wb.Hull(points).pieces()[0]
     fine = pin.GeometryObject("egg", 1, 0, pin.SE3.Random(), hull.geometry)
-    made = coarser(fine, 0.02)
+    made = simplified_piece(fine, 0.02)
     assert made is not None
     coarse, out = made
-    a, b = core_of(coarse.geometry), core_of(fine.geometry)
+    a, b = swept_points(coarse.geometry), swept_points(fine.geometry)
     assert len(a.points) < 0.2 * len(b.points)
     inner = coarse.placement.actInv(fine.placement)
     planes = a.faces
     assert ((b.points @ inner.rotation.T + inner.translation) @ planes[:, :3].T <= planes[:, 3] + 1e-9).all()
-    weights = rng.dirichlet(np.full(len(a.points), 0.01), size=500)  # points all over the coarser piece
+    weights = rng.dirichlet(np.full(len(a.points), 0.01), size=500)  # points all over the simplified piece
     request = coal.DistanceRequest()
     place = coal.Transform3s(fine.placement.rotation, fine.placement.translation)
     ball = coal.Sphere(1e-4)
@@ -320,8 +320,8 @@ def test_coarser_pieces_hold_the_finer_ones_and_say_how_far_they_reach_out() -> 
         for x in weights @ a.points
     ]
     assert 0.3 * out < max(gaps) + 1e-4 <= out
-    assert coarser(fine, 1e-5) is None
-    assert coarser(pin.GeometryObject("box", 1, 0, pin.SE3.Identity(), coal.Box(1, 1, 1)), 0.02) is None
+    assert simplified_piece(fine, 1e-5) is None
+    assert simplified_piece(pin.GeometryObject("box", 1, 0, pin.SE3.Identity(), coal.Box(1, 1, 1)), 0.02) is None
 
 
 def test_a_thing_can_be_moved_in_the_smaller_scene(human: Figure) -> None:
@@ -338,8 +338,8 @@ def test_a_thing_can_be_moved_in_the_smaller_scene(human: Figure) -> None:
     state = scene.state(human.neutral)
     fine, coarse = scene.geometry.geometryObjects[-1], small.geometry.geometryObjects[-1]
     inner = coarse.placement.actInv(fine.placement)
-    planes = core_of(coarse.geometry).faces
-    there = core_of(fine.geometry).points @ inner.rotation.T + inner.translation
+    planes = swept_points(coarse.geometry).faces
+    there = swept_points(fine.geometry).points @ inner.rotation.T + inner.translation
     assert (there @ planes[:, :3].T <= planes[:, 3] + 1e-9).all()
     assert state is not None
 
@@ -350,7 +350,7 @@ def test_the_whole_problem_is_left_as_it_was(human: Figure) -> None:
     wb.simplify(problem)
     after = (problem.scene.revision, problem.goals, len(problem.scene.pair_table.pairs), problem.start.tolist())
     assert before == after
-    assert participation(problem).moving.any()
+    assert active_joints(problem).moving.any()
 
 
 def test_mistakes_are_refused(human: Figure) -> None:

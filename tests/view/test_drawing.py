@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 
 from wholebody.errors import InputError
 from wholebody.view import drawing, style
-from wholebody.view.stage import quaternions
+from wholebody.view.scene_graph import quaternions
 
 directions = st.tuples(*[st.floats(-1, 1)] * 3).map(np.array).filter(lambda d: np.linalg.norm(d) > 1e-3)
 

@@ -12,8 +12,8 @@ from PIL import Image
 
 import wholebody as wb
 from wholebody.view.browser import Browser
+from wholebody.view.filmstrip import GAP, write_filmstrip
 from wholebody.view.parts import Part, Parts
-from wholebody.view.strip import GAP, write_strip
 
 RED, BLUE = (0.9, 0.1, 0.1, 1.0), (0.1, 0.1, 0.9, 1.0)
 
@@ -48,7 +48,7 @@ def test_mistakes_are_named() -> None:
     with pytest.raises(wb.UnknownNameError, match="pin"):
         board_and_pin().posture({"board": (0, 0, 0)})
     with pytest.raises(wb.InputError, match="at least one posture"):
-        write_strip(wb.Viewer(board_and_pin()), [], "strip.png")
+        write_filmstrip(wb.Viewer(board_and_pin()), [], "strip.png")
 
 
 @pytest.mark.browser
@@ -67,7 +67,7 @@ def test_a_strip_has_its_pictures_in_order(chromium: str, tmp_path: Path) -> Non
     left, right = ({"board": (x, 0.0, 0.0), "pin": (0.0, 0.0, -9.0)} for x in (-0.5, 0.5))
     with wb.Viewer(parts) as viewer:
         viewer.look(eye=(0.0, -3.0, 0.6), target=(0.0, 0.0, 0.0))
-        path = write_strip(viewer, [parts.posture(left), parts.posture(right)], tmp_path / "strip.png", (120, 90))
+        path = write_filmstrip(viewer, [parts.posture(left), parts.posture(right)], tmp_path / "strip.png", (120, 90))
     pixels = np.asarray(Image.open(path).convert("RGB"), dtype=int)
     assert pixels.shape == (90, 240 + GAP, 3)
     assert (pixels[:, 120 : 120 + GAP] == 255).all()

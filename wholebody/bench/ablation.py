@@ -30,7 +30,7 @@ from wholebody.problem import Problem
 Array = NDArray[np.float64]
 Value = float | int | tuple[float, ...]
 
-SHARED = ("wholebody.methods.starts", "wholebody.methods.passage")
+SHARED = ("wholebody.methods.starts", "wholebody.geometry.continuous.passing_through")
 """Modules that methods share and that have constants of their own."""
 
 FACTORS = {"a tenth": 0.1, "ten times": 10.0}

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.chains import TIP, chain, task
 from wholebody.bench.problem_sets import balance, clutter
 from wholebody.errors import WholebodyError
-from wholebody.problem import Array, Problem
+from wholebody.problem import Problem
 from wholebody.simplification.simplify import GROWTH, Parts, leave_out
 
 DETAILS = ("spheres", "capsules", "hulls")

@@ -11,7 +11,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Array, Track
+from wholebody.arrays import Array
+from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
 
 TOUCHING = 1e-3  # m: a pair nearer than the clearance and this is in contact
 

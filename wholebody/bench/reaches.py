@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.problem_sets.bodies import TIPS
 from wholebody.bench.problem_sets.clutter import reach_among
-from wholebody.bench.track import Array
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.bench.judge import Verdict, judge
 from wholebody.bench.tools import make_tool
 from wholebody.bench.tools.base import Tool
-from wholebody.bench.track import CLEARANCE, Array, Track
+from wholebody.bench.track import CLEARANCE, Track
 
 REFERENCE = "placo"
 JUDGED = ("free", "contact")  # reaches for which a figure was asked

@@ -26,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.cli.pose import pose
     from wholebody.errors import UnknownNameError
 
-    tasks = shipped_tasks()
+    tasks = packaged_tasks()
     if arguments.list:
         for name, path in tasks.items():
             print(f"{name:24} {path}")
@@ -38,12 +38,12 @@ def run(arguments: argparse.Namespace) -> int:
     return code
 
 
-def shipped_tasks() -> dict[str, Path]:
+def packaged_tasks() -> dict[str, Path]:
     """Task files by name: inside an installed package, or among the examples of a checkout.
 
     Raises:
         WholebodyError: the installation lacks them.
     """
-    from wholebody.figures.shipped import task_paths
+    from wholebody.figures.packaged_urdf import task_paths
 
     return task_paths()

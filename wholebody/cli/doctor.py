@@ -46,11 +46,11 @@ def run(arguments: argparse.Namespace) -> int:
     for column in ("kind", "name", "", "detail", "to have it"):
         made.add_column(column, overflow="fold")
     for entry in report.entries:
-        mend = entry.mend if entry.state != "works" else ""
-        made.add_row(entry.kind, entry.name, _MARKS[entry.state], escape(entry.detail), escape(mend))
+        repair = entry.repair if entry.state != "works" else ""
+        made.add_row(entry.kind, entry.name, _MARKS[entry.state], escape(entry.detail), escape(repair))
     console.print(made)
-    for fault, mend in report.faults:
-        console.print(f"[red]wrong:[/] {escape(fault)}\n  mend: {escape(mend)}", highlight=False, soft_wrap=True)
+    for fault, repair in report.faults:
+        console.print(f"[red]wrong:[/] {escape(fault)}\n  repair: {escape(repair)}", highlight=False, soft_wrap=True)
     if report.healthy:
         console.print("[green]nothing is wrong[/]")
     return 0 if report.healthy else 1

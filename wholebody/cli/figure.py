@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _write(name: str, options: dict[str, Any], out: Path) -> int:
     from wholebody.errors import InputError
     from wholebody.figures.anthropometry import body
-    from wholebody.figures.shipping import write_human
+    from wholebody.figures.packaged_urdf import write_human
 
     if name != "human" or "detail" in options:
         raise InputError("--out writes the person in capsules; write: wholebody figure human --out FILE.urdf")

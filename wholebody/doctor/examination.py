@@ -1,4 +1,4 @@
-"""The whole examination: what is there, what works, and every fault with its mend."""
+"""The whole examination: what is there, what works, and every fault with its repair."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from wholebody.doctor import packages, surroundings, trials
+from wholebody.doctor import checks, environment, packages
 from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
 from wholebody.methods import EXTRAS as OF_METHODS
 
@@ -36,7 +36,7 @@ class Entry:
         state: "works", "absent" or "broken".
         detail: version, time, place or reason.
         needed: whether wholebody cannot do without it.
-        mend: the command or the deed that repairs it; empty where nothing is to be done.
+        repair: the command or the deed that repairs it; empty where nothing is to be done.
     """
 
     kind: str
@@ -44,7 +44,7 @@ class Entry:
     state: State
     detail: str
     needed: bool = True
-    mend: str = ""
+    repair: str = ""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Report:
     Attributes:
         python: version and place of the interpreter.
         entries: everything that was looked at.
-        faults: what is wrong, with its mend: (sentence, mend).
+        faults: what is wrong, with its repair: (sentence, repair).
     """
 
     python: str
@@ -77,7 +77,7 @@ def examine(environ: Mapping[str, str] = os.environ) -> Report:
     entries = [*_packages(have), *_solvers(have), *_methods(), *_tools(), _cache()]
     faults = [*_python(), *_conflicts(have), *_paths(environ)]
     faults += [
-        (f"the {entry.kind} {entry.name} is {entry.state}: {entry.detail}", entry.mend)
+        (f"the {entry.kind} {entry.name} is {entry.state}: {entry.detail}", entry.repair)
         for entry in entries
         if entry.state == "broken" or (entry.needed and entry.state == "absent")
     ]
@@ -85,19 +85,19 @@ def examine(environ: Mapping[str, str] = os.environ) -> Report:
 
 
 def _packages(have: Mapping[str, Distribution]) -> Iterator[Entry]:
-    outcomes = trials.run("import", list(MODULES.values()))
+    outcomes = checks.run("import", list(MODULES.values()))
     for name, module in MODULES.items():
         found, outcome = have.get(packages.normal(name)), outcomes[module]
         if found is None and not outcome.works:
-            yield Entry("package", name, "absent", "not installed", mend=AGAIN)
+            yield Entry("package", name, "absent", "not installed", repair=AGAIN)
         elif not outcome.works:
             version = found.version if found else ""
-            yield Entry("package", name, "broken", f"{version}: import fails, {outcome.detail}", mend=AGAIN)
+            yield Entry("package", name, "broken", f"{version}: import fails, {outcome.detail}", repair=AGAIN)
         elif found is None:
             yield Entry("package", name, "works", f"not from a package, {outcome.detail}")
         elif (folder := packages.shadow(found, outcome.detail)) is not None:
             detail = f"{found.version} is installed, but {folder} hides it"
-            yield Entry("package", name, "broken", detail, mend="unset PYTHONPATH")
+            yield Entry("package", name, "broken", detail, repair="unset PYTHONPATH")
         else:
             yield Entry("package", name, "works", found.version)
     for name, extra in EXTRAS.items():
@@ -109,38 +109,38 @@ def _packages(have: Mapping[str, Distribution]) -> Iterator[Entry]:
 
 def _solvers(have: Mapping[str, Distribution]) -> Iterator[Entry]:
     present = [name for name, package in SOLVERS.items() if package in have]
-    outcomes = trials.run("program", present)
+    outcomes = checks.run("program", present)
     for name, package in SOLVERS.items():
         if name in outcomes:
-            mend = "" if outcomes[name].works else f"pip install --force-reinstall {package}"
+            repair = "" if outcomes[name].works else f"pip install --force-reinstall {package}"
             state: State = "works" if outcomes[name].works else "broken"
-            yield Entry("QP solver", name, state, outcomes[name].detail, name == "osqp", mend)
+            yield Entry("QP solver", name, state, outcomes[name].detail, name == "osqp", repair)
         else:
             yield Entry("QP solver", name, "absent", "not installed", name == "osqp", f"pip install {package}")
 
 
 def _methods() -> Iterator[Entry]:
-    listed = trials.run("methods", [""])[""]
+    listed = checks.run("methods", [""])[""]
     if not listed.works:
-        yield Entry("method", "all", "broken", listed.detail, mend=AGAIN)
+        yield Entry("method", "all", "broken", listed.detail, repair=AGAIN)
         return
-    for name, outcome in trials.run("pose", listed.detail.split()).items():
+    for name, outcome in checks.run("pose", listed.detail.split()).items():
         if outcome.works:
             yield Entry("method", name, "works", outcome.detail)
         else:
-            mend = f"pip install --force-reinstall 'wholebody[{OF_METHODS[name]}]'" if name in OF_METHODS else AGAIN
-            yield Entry("method", name, "broken", outcome.detail, name not in OF_METHODS, mend)
+            repair = f"pip install --force-reinstall 'wholebody[{OF_METHODS[name]}]'" if name in OF_METHODS else AGAIN
+            yield Entry("method", name, "broken", outcome.detail, name not in OF_METHODS, repair)
 
 
 def _tools() -> Iterator[Entry]:
-    for name, outcome in trials.run("tool", list(TOOLS)).items():
-        use, mend = TOOLS[name]
+    for name, outcome in checks.run("tool", list(TOOLS)).items():
+        use, repair = TOOLS[name]
         if outcome.works:
             yield Entry("tool", name, "works", f"{outcome.detail}, {use}", False)
         elif outcome.detail.endswith("not found"):
-            yield Entry("tool", name, "absent", use, False, mend)
+            yield Entry("tool", name, "absent", use, False, repair)
         else:
-            yield Entry("tool", name, "broken", outcome.detail, False, mend)
+            yield Entry("tool", name, "broken", outcome.detail, False, repair)
 
 
 def _cache() -> Entry:
@@ -155,19 +155,19 @@ def _cache() -> Entry:
 
 
 def _python() -> Iterator[tuple[str, str]]:
-    fault = surroundings.python_fault()
+    fault = environment.python_fault()
     if fault:
         yield fault, "make an environment with one of them: python3.12 -m venv .venv"
 
 
 def _conflicts(have: Mapping[str, Distribution]) -> Iterator[tuple[str, str]]:
     for conflict in packages.conflicts(have):
-        yield str(conflict), conflict.mend
+        yield str(conflict), conflict.repair
 
 
 def _paths(environ: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    for folder, hidden in surroundings.shadowing_folders(environ, MODULES.values()).items():
+    for folder, hidden in environment.shadowing_folders(environ, MODULES.values()).items():
         yield f"PYTHONPATH names {folder}, whose {', '.join(hidden)} hide the installed ones", "unset PYTHONPATH"
-    for folder, hidden in surroundings.loader_folders(environ).items():
+    for folder, hidden in environment.loader_folders(environ).items():
         sentence = f"LD_LIBRARY_PATH names {folder}, whose {', '.join(hidden)} replace the installed ones"
         yield sentence, "unset LD_LIBRARY_PATH"

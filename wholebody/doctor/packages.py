@@ -72,7 +72,7 @@ class Conflict(NamedTuple):
     found: str | None
 
     @property
-    def mend(self) -> str:
+    def repair(self) -> str:
         """The command that repairs it."""
         return f"pip install '{self.needs}'" if self.who == "wholebody" else f"pip install '{self.who}' '{self.needs}'"
 

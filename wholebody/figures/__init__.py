@@ -4,8 +4,8 @@ from wholebody.figures.denavit_hartenberg import DenavitHartenberg, denavit_hart
 from wholebody.figures.description import Chain, JointCone, Limits
 from wholebody.figures.figure import Figure
 from wholebody.figures.loading import load
+from wholebody.figures.packaged_urdf import urdf_path
 from wholebody.figures.reach_cones import ReachCone
-from wholebody.figures.shipped import urdf_path
 
 __all__ = [
     "Chain",

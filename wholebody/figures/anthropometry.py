@@ -6,18 +6,18 @@ Lengths and masses are fractions (de Leva 1996; ANSUR II), radii are linear fits
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import number, shown
 from wholebody.errors import InputError, UnknownNameError
-from wholebody.figures.tables import keyed, table
-
-Array = NDArray[np.float64]
 
 STATURE_RANGE = (1.3, 2.2)
 """Metres. The fits come from adults of 1.4 to 2.0 m; beyond this range they are no longer a body."""
@@ -32,6 +32,11 @@ _SEXES = {"male": "M", "female": "F"}
 
 # Expected mass at a stature, log-log fit to ANSUR II: mass = a stature^b.
 _EXPECTED_MASS = {"M": (27.41, 1.999), "F": (23.00, 2.192)}
+
+
+_FOLDER = Path(__file__).parent / "data"
+
+Row = dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -132,3 +137,27 @@ def _row(name: str, column: str, key: str) -> Mapping[str, str]:
     if key not in rows:
         raise UnknownNameError("segment" if name == "segments" else "body part", key, rows)
     return rows[key]
+
+
+@cache
+def table(name: str) -> tuple[Row, ...]:
+    """Return the rows of one table, each a mapping from column to text.
+
+    Args:
+        name: "joints", "segments", "radii_ansur", "percentiles", "design_cases", "spheres39", "sphere_exclusions",
+            "reach_cones" or "hand".
+
+    Raises:
+        UnknownNameError: there is no such table.
+    """
+    path = _FOLDER / f"{name}.csv"
+    if not path.is_file():
+        raise UnknownNameError("table", name, [file.stem for file in _FOLDER.glob("*.csv")])
+    with path.open(encoding="utf-8", newline="") as file:
+        return tuple(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+@cache
+def keyed(name: str, column: str) -> dict[str, Row]:
+    """Return the rows of a table by the text in one column."""
+    return {row[column]: row for row in table(name)}

@@ -12,12 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
-
-Array = NDArray[np.float64]
 
 _PARALLEL = 1e-9
 """Axes closer to parallel than this (sine of the angle) are taken as parallel: beyond it, d would be kilometres."""

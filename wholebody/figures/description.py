@@ -8,12 +8,9 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.figures.reach_cones import ReachCone
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 ROOT_JOINT = "root_joint"
 """Name of a free root in the model."""

@@ -10,8 +10,9 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody import checks
+from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError, UnknownNameError
-from wholebody.figures.description import ROOT_JOINT, Array, Description, Indices, followers_of, limits_of
+from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
 from wholebody.figures.reduction import reduced_parts
 
 LARGEST = 1e6

@@ -14,15 +14,14 @@ from itertools import combinations
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures import hulls
-from wholebody.figures.anthropometry import Body, body, describe
-from wholebody.figures.assembly import geometry_of, model_of
-from wholebody.figures.blueprint import Array, Blueprint, Joint, Landmark, Link, Solid, place
+from wholebody.figures.anthropometry import Body, body, describe, keyed
+from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, geometry_of, model_of, place
 from wholebody.figures.description import Articulated, Chain, Description, ExcludedPair
+from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.figure import Figure
-from wholebody.figures.measures import FINGER_BASES, Measures, keyed_hand
-from wholebody.figures.tables import keyed
 
 MESH = "meshes/ellipsoid.stl"
 """The unit polyhedron that the URDF scales to each part."""
@@ -55,8 +54,8 @@ POSTURES: dict[str, dict[str, float]] = {
 }
 
 
-def hand_blueprint(side: str = "right", person: Body | None = None) -> Blueprint:
-    """Return the blueprint of a hand.
+def hand_spec(side: str = "right", person: Body | None = None) -> BodySpec:
+    """Return the specification of a hand.
 
     Args:
         side: "left" or "right".
@@ -68,7 +67,7 @@ def hand_blueprint(side: str = "right", person: Body | None = None) -> Blueprint
     if side not in ("left", "right"):
         raise InputError(f"side is {side!r}; give 'left' or 'right'")
     person = person or body()
-    size = Measures(person)
+    size = Dimensions(person)
     palm = Solid(f"{side}_hand", f"{side}_hand", *_polyhedron(size, "palm"), (MESH, _radii(size, "palm")))
     solids, joints, virtual = [palm], [], []
     marks = [_palm_mark(size, side)]
@@ -82,7 +81,7 @@ def hand_blueprint(side: str = "right", person: Body | None = None) -> Blueprint
             solids.append(Solid(segment, segment, *_polyhedron(size, key), (MESH, _radii(size, key))))
             parent, origin = segment, place(z=-keyed_hand(key, "length") * size.hand_length)
         marks.append(Landmark(f"{side}_{finger}_tip", parent, origin * pin.SE3(_palm_axes(side), np.zeros(3))))
-    return Blueprint(
+    return BodySpec(
         name=f"{side}_hand",
         title=f"{side} hand; {describe(person)}",
         links=(*_links(size, solids), *virtual),
@@ -95,21 +94,21 @@ def hand_blueprint(side: str = "right", person: Body | None = None) -> Blueprint
 def hand_figure(
     side: str = "right", sex: str = "male", stature: float | None = None, mass: float | None = None
 ) -> Figure:
-    """Return a hand with a free root at the wrist; arguments as for `hand_blueprint` and the person."""
-    plan = hand_blueprint(side, body(sex, stature, mass))
-    model = model_of(plan)
-    tested, excluded = _pairs(plan.solids)
-    names = tuple(joint.name for joint in plan.joints)
+    """Return a hand with a free root at the wrist; arguments as for `hand_spec` and the person."""
+    spec = hand_spec(side, body(sex, stature, mass))
+    model = model_of(spec)
+    tested, excluded = _pairs(spec.solids)
+    names = tuple(joint.name for joint in spec.joints)
     groups = {finger: tuple(name for name in names if name.startswith(f"{side}_{finger}_")) for finger in FINGERS}
     description = Description(
         groups={**groups, "fingers": names},
         chains={finger: Chain(groups[finger], f"{side}_{finger}_tip") for finger in FINGERS},
-        frames=tuple(mark.name for mark in plan.landmarks),
-        segments=tuple(solid.segment for solid in plan.solids),
+        frames=tuple(mark.name for mark in spec.landmarks),
+        segments=tuple(solid.segment for solid in spec.solids),
         postures={name: partial(_posture, side=side, degrees=degrees) for name, degrees in POSTURES.items()},
         excluded=excluded,
     )
-    return Figure(plan.name, model, geometry_of(model, plan.solids, tested), "hulls", description)
+    return Figure(spec.name, model, geometry_of(model, spec.solids, tested), "hulls", description)
 
 
 def _palm_axes(side: str) -> Array:
@@ -117,13 +116,13 @@ def _palm_axes(side: str) -> Array:
     return np.column_stack([[0.0, 0.0, -1.0], [sign, 0.0, 0.0], [0.0, -sign, 0.0]])
 
 
-def _palm_mark(size: Measures, side: str) -> Landmark:
+def _palm_mark(size: Dimensions, side: str) -> Landmark:
     out = size.palm_half_thickness if side == "right" else -size.palm_half_thickness
     half = 0.5 * keyed_hand("palm", "length") * size.hand_length
     return Landmark(f"{side}_palm", f"{side}_hand", place(0.0, out, -half, _palm_axes(side)))
 
 
-def _radii(size: Measures, part: str) -> tuple[float, float, float]:
+def _radii(size: Dimensions, part: str) -> tuple[float, float, float]:
     return (
         keyed_hand(part, "width") * size.hand_breadth,
         keyed_hand(part, "depth") * size.hand_breadth,
@@ -131,13 +130,13 @@ def _radii(size: Measures, part: str) -> tuple[float, float, float]:
     )
 
 
-def _polyhedron(size: Measures, part: str) -> tuple[object, pin.SE3]:
+def _polyhedron(size: Dimensions, part: str) -> tuple[object, pin.SE3]:
     radii = _radii(size, part)
     shape, center = hulls.ellipsoid(radii, part)
     return shape, place(z=-radii[2]) * center
 
 
-def _base(size: Measures, side: str, finger: str) -> pin.SE3:
+def _base(size: Dimensions, side: str, finger: str) -> pin.SE3:
     """Place of a finger's first joint in the hand: its knuckle, or the thumb's one beyond the fixed metacarpal."""
     lateral, distal = FINGER_BASES[finger]
     knuckle = np.array([lateral * size.hand_breadth, 0.0, -distal * size.hand_length])
@@ -170,7 +169,7 @@ def _joints(side: str, finger: str, key: str, parent: str, segment: str, origin:
         parent, origin = child, pin.SE3.Identity()
 
 
-def _links(size: Measures, solids: list[Solid]) -> Iterator[Link]:
+def _links(size: Dimensions, solids: list[Solid]) -> Iterator[Link]:
     """Links whose mass follows their volume; solid ellipsoids."""
     volumes = [float(np.prod(solid.mesh[1])) for solid in solids if solid.mesh is not None]
     total = size.body.segment_mass("left_hand")

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from wholebody.arrays import Array
 
 RINGS = 5
 AROUND = 10

@@ -14,20 +14,19 @@ import numpy as np
 
 from wholebody.errors import UnknownNameError
 from wholebody.figures import human_capsules, human_hulls, human_spheres
-from wholebody.figures.anthropometry import Body, body, describe
-from wholebody.figures.blueprint import Blueprint, Joint, Landmark, Link, Solid, place
-from wholebody.figures.measures import Measures
-from wholebody.figures.tables import table
+from wholebody.figures.anthropometry import Body, body, describe, table
+from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
+from wholebody.figures.dimensions import Dimensions
 
-DETAILS: dict[str, Callable[[Measures], tuple[Solid, ...]]] = {
+DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
     "spheres": human_spheres.solids,
     "capsules": human_capsules.solids,
     "hulls": human_hulls.solids,
 }
 
 
-def blueprint(person: Body | None = None, detail: str = "capsules") -> Blueprint:
-    """Return the blueprint of a person.
+def human_spec(person: Body | None = None, detail: str = "capsules") -> BodySpec:
+    """Return the specification of a person.
 
     Args:
         person: from `wholebody.figures.anthropometry.body`; the median man if left out.
@@ -37,12 +36,12 @@ def blueprint(person: Body | None = None, detail: str = "capsules") -> Blueprint
         UnknownNameError: another detail.
     """
     person = person or body()
-    return Blueprint(
+    return BodySpec(
         name="human",
         title=describe(person),
         links=_links(person),
         joints=_joints(person),
-        landmarks=landmarks(Measures(person)),
+        landmarks=landmarks(Dimensions(person)),
         solids=human_solids(person, detail),
     )
 
@@ -55,7 +54,7 @@ def human_solids(person: Body, detail: str) -> tuple[Solid, ...]:
     """
     if detail not in DETAILS:
         raise UnknownNameError("detail", detail, DETAILS)
-    return DETAILS[detail](Measures(person))
+    return DETAILS[detail](Dimensions(person))
 
 
 def _links(person: Body) -> tuple[Link, ...]:
@@ -84,7 +83,7 @@ def _joints(person: Body) -> tuple[Joint, ...]:
     return tuple(joints)
 
 
-def landmarks(size: Measures) -> tuple[Landmark, ...]:
+def landmarks(size: Dimensions) -> tuple[Landmark, ...]:
     """Frames to reach with.
 
     - ``<side>_palm``: on the skin in the middle of the palm; x along the fingers, z out of the palm.

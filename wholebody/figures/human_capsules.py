@@ -9,19 +9,20 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.figures.blueprint import Array, Solid, place
-from wholebody.figures.measures import RELAXED, Measures
+from wholebody.arrays import Array
+from wholebody.figures.body_spec import Solid, place
+from wholebody.figures.dimensions import RELAXED, Dimensions
 
 # Turns a capsule's own axis z into y.
 _ACROSS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
-def solids(size: Measures) -> tuple[Solid, ...]:
+def solids(size: Dimensions) -> tuple[Solid, ...]:
     """Return the pieces of a person: spheres, capsules and boxes."""
     return (*_trunk(size), *_limbs(size))
 
 
-def _trunk(size: Measures) -> Iterator[Solid]:
+def _trunk(size: Dimensions) -> Iterator[Solid]:
     for part in trunk_parts(size):
         half = max(part.half_breadth - part.half_depth, 1e-3)
         yield Solid(
@@ -40,7 +41,7 @@ def _trunk(size: Measures) -> Iterator[Solid]:
     )
 
 
-def _limbs(size: Measures) -> Iterator[Solid]:
+def _limbs(size: Dimensions) -> Iterator[Solid]:
     person, radius = size.body, size.body.radius
     for side in ("left", "right"):
         yield clavicle(size, side)
@@ -61,13 +62,13 @@ def _limbs(size: Measures) -> Iterator[Solid]:
         yield from foot(size, side)
 
 
-def clavicle(size: Measures, side: str) -> Solid:
+def clavicle(size: Dimensions, side: str) -> Solid:
     """Shoulder girdle: a capsule from beside the breastbone to the shoulder joint."""
     shoulder = np.array(size.joint(f"{side}_shoulder_flexion"))
     return _between(f"{side}_clavicle", f"{side}_clavicle", 0.028 * size.stature, 0.25 * shoulder, 0.9 * shoulder)
 
 
-def hand(size: Measures, side: str) -> Iterator[Solid]:
+def hand(size: Dimensions, side: str) -> Iterator[Solid]:
     """Palm, index finger, and the three others slightly shortened: at rest they curl, and the index leads a reach."""
     segment, thick, breadth = f"{side}_hand", size.palm_half_thickness, size.hand_breadth
     palm, index = size.palm_length, size.index
@@ -83,7 +84,7 @@ def hand(size: Measures, side: str) -> Iterator[Solid]:
     )
 
 
-def foot(size: Measures, side: str) -> Iterator[Solid]:
+def foot(size: Dimensions, side: str) -> Iterator[Solid]:
     """Boxes for the foot and the toes, flush on the sole."""
     height, length = -1.0 * size.sole, size.toe_joint_x - size.heel_x
     box = coal.Box(length, 2.0 * size.foot_half_width, height)
@@ -105,7 +106,7 @@ class TrunkPart(NamedTuple):
     half_height: float
 
 
-def trunk_parts(size: Measures) -> tuple[TrunkPart, ...]:
+def trunk_parts(size: Dimensions) -> tuple[TrunkPart, ...]:
     """Return place and half sizes from the pelvis to the thorax."""
     radius, height, length = size.body.radius, size.stature, size.body.length
     waist_x, waist_y, chest_x, chest_y = radius("waist_x"), radius("waist_y"), radius("chest_x"), radius("chest_y")

@@ -1,22 +1,21 @@
-"""The person as a figure: groups, chains, cones, postures."""
+"""The person as a figure: groups, chains, cones, postures; and the avatar, which is the person on a rigid torso."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from wholebody.figures import postures
-from wholebody.figures.anthropometry import body
-from wholebody.figures.assembly import geometry_of, model_of
-from wholebody.figures.blueprint import Blueprint
+from wholebody.figures.anthropometry import Body, body, table
+from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
 from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone
 from wholebody.figures.figure import Figure
-from wholebody.figures.human import blueprint
+from wholebody.figures.human import human_spec
 from wholebody.figures.human_pairs import body_pairs, collision_group, sphere_pairs
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
-from wholebody.figures.tables import table
 
 
 def human_figure(
@@ -34,21 +33,21 @@ def human_figure(
         InputError: an impossible body.
         UnknownNameError: an unknown detail.
     """
-    return figure_of(blueprint(body(sex, stature, mass), detail), detail)
+    return figure_of(human_spec(body(sex, stature, mass), detail), detail)
 
 
-def figure_of(plan: Blueprint, detail: str) -> Figure:
-    """Return the figure of a human blueprint, whole or with some joints fixed."""
-    model = model_of(plan)
-    tested, excluded = (sphere_pairs if detail == "spheres" else body_pairs)(plan.solids)
-    geometry = geometry_of(model, plan.solids, tested)
+def figure_of(spec: BodySpec, detail: str) -> Figure:
+    """Return the figure of a human specification, whole or with some joints fixed."""
+    model = model_of(spec)
+    tested, excluded = (sphere_pairs if detail == "spheres" else body_pairs)(spec.solids)
+    geometry = geometry_of(model, spec.solids, tested)
     rigid = drop_rigid_pairs(geometry)
-    joints = {joint.name for joint in plan.joints if joint.axis is not None}
-    segments = tuple(link.name for link in plan.links if link.mass)
+    joints = {joint.name for joint in spec.joints if joint.axis is not None}
+    segments = tuple(link.name for link in spec.links if link.mass)
     description = Description(
         groups=human_groups(joints),
         chains=human_chains(joints),
-        frames=tuple(mark.name for mark in plan.landmarks),
+        frames=tuple(mark.name for mark in spec.landmarks),
         segments=segments,
         postures={name: partial(postures.stand, attitude=attitude) for name, attitude in postures.HUMAN.items()},
         cones=human_cones(),
@@ -56,7 +55,7 @@ def figure_of(plan: Blueprint, detail: str) -> Figure:
         effort={row["name"]: float(row["effort_weight"]) for row in table("joints")},
         excluded=(*(ExcludedPair(*entry) for entry in excluded), *rigid),
     )
-    return Figure(plan.name, model, geometry, detail, description)
+    return Figure(spec.name, model, geometry, detail, description)
 
 
 def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
@@ -104,3 +103,26 @@ def human_cones() -> dict[str, JointCone]:
         cones[f"right_{joint}"] = JointCone(right, reference, f"right_{limb}", down)
         cones[f"left_{joint}"] = JointCone(right.mirrored(), reference, f"left_{limb}", down)
     return cones
+
+
+RIGID = ("spine", "neck2", "left_clavicle", "right_clavicle")
+"""Beginnings of the names of the joints that the avatar does not have."""
+
+
+def avatar_spec(person: Body | None = None, detail: str = "capsules") -> BodySpec:
+    """Return the specification of an avatar; arguments as for the person."""
+    person = person or body()
+    whole = human_spec(person, detail)
+    joints = tuple(joint._replace(axis=None) if joint.name.startswith(RIGID) else joint for joint in whole.joints)
+    return replace(whole, name="avatar", joints=joints)
+
+
+def avatar_figure(
+    sex: str = "male", stature: float | None = None, mass: float | None = None, detail: str = "capsules"
+) -> Figure:
+    """Return the avatar; arguments as for the person.
+
+    Two arms and two legs of seven joints and a neck of three, on a rigid torso (Schmidl & Lin): the person with spine,
+    shoulder girdle and upper neck fixed.
+    """
+    return figure_of(avatar_spec(body(sex, stature, mass), detail), detail)

@@ -8,16 +8,16 @@ from typing import Any
 import pinocchio as pin
 
 from wholebody.figures import hulls, human_capsules
-from wholebody.figures.blueprint import Solid, place
-from wholebody.figures.measures import RELAXED, Measures
+from wholebody.figures.body_spec import Solid, place
+from wholebody.figures.dimensions import RELAXED, Dimensions
 
 
-def solids(size: Measures) -> tuple[Solid, ...]:
+def solids(size: Dimensions) -> tuple[Solid, ...]:
     """Return the pieces of a person, all of them convex polyhedra."""
     return (*_trunk(size), *_limbs(size))
 
 
-def _trunk(size: Measures) -> Iterator[Solid]:
+def _trunk(size: Dimensions) -> Iterator[Solid]:
     for part in human_capsules.trunk_parts(size):
         radii = (part.half_depth, part.half_breadth, part.half_height)
         yield _solid(part.segment, hulls.ellipsoid(radii, part.segment), part.x, part.z)
@@ -28,7 +28,7 @@ def _trunk(size: Measures) -> Iterator[Solid]:
     yield _solid("head", hulls.ellipsoid(radii, "head"), size.head_x, size.head_top - half_height)
 
 
-def _limbs(size: Measures) -> Iterator[Solid]:
+def _limbs(size: Dimensions) -> Iterator[Solid]:
     person, radius = size.body, size.body.radius
     upper, fore = person.length("left_upper_arm"), person.length("left_forearm")
     thigh, shank = person.length("left_thigh"), person.length("left_shank")

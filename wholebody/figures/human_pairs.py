@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from itertools import combinations
 
-from wholebody.figures.blueprint import Solid
+from wholebody.figures.anthropometry import table
+from wholebody.figures.body_spec import Solid
 from wholebody.figures.human_spheres import sphere_names
-from wholebody.figures.tables import table
 
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")
 

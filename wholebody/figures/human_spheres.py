@@ -10,15 +10,15 @@ import math
 
 import coal
 
-from wholebody.figures.blueprint import Solid, place
-from wholebody.figures.measures import Measures
-from wholebody.figures.tables import table
+from wholebody.figures.anthropometry import table
+from wholebody.figures.body_spec import Solid, place
+from wholebody.figures.dimensions import Dimensions
 
 # Mass per stature of the median man and woman of ANSUR II, kg / m, for which the table's radii hold.
 _MEDIAN = {"M": 48.2, "F": 41.1}
 
 
-def solids(size: Measures) -> tuple[Solid, ...]:
+def solids(size: Dimensions) -> tuple[Solid, ...]:
     """Return the 39 spheres of a person; the feet's are lifted to rest on the soles' plane."""
     person = size.body
     build = math.sqrt(person.mass / person.stature / _MEDIAN[person.column])

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import known, number, shown
 from wholebody.errors import InputError
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
@@ -19,8 +20,6 @@ from wholebody.geometry.hull import hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces, kept
 from wholebody.geometry.meshes import EmptyMeshError, read_mesh
 from wholebody.geometry.pieces import LARGEST, SMALLEST
-
-Array = NDArray[np.float64]
 
 CYLINDER_SIDES = 32
 """A cylinder becomes a prism around it with this many sides; its corners stand out by 0.5 % of the radius."""

@@ -35,9 +35,8 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
         InputError: a value that no body has.
         FileFormatError: a file that cannot be read.
     """
-    from wholebody.figures.avatar import avatar_figure
     from wholebody.figures.hand import hand_figure
-    from wholebody.figures.human_figure import human_figure
+    from wholebody.figures.human_figure import avatar_figure, human_figure
     from wholebody.figures.mjcf_figure import xml_figure
     from wholebody.figures.urdf_figure import urdf_figure
 

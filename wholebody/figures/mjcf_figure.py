@@ -10,8 +10,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import FileFormatError, InputError
 from wholebody.figures.description import ROOT_JOINT
 from wholebody.figures.figure import Figure
@@ -19,8 +19,6 @@ from wholebody.figures.link_pieces import Concavity, LinkShape, check_concavity
 from wholebody.figures.robot_figure import check_size, geometry_of_links, robot_figure
 from wholebody.figures.urdf_figure import SAMPLES, urdf_figure
 from wholebody.figures.xml_reading import read_xml
-
-Array = NDArray[np.float64]
 
 _PLACED = {"pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"}
 """Attributes that place a body; Pinocchio drops them of a first body that is fixed."""

@@ -8,11 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.figures.description import Articulated
-
-Array = NDArray[np.float64]
 
 GAP = 0.004
 """Metres that a named posture leaves between any two pieces; arms and legs move outwards where a build needs it."""

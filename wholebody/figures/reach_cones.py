@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
-
-Array = NDArray[np.float64]
 
 _PARALLEL = 1e-12
 TOUCHING = 1e-9  # rad: nearer to an edge than this a direction lies on it

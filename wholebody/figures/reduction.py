@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
-from wholebody.figures.description import ROOT_JOINT, Array, Articulated, Chain, Description, ExcludedPair
+from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair
 
 _LOCKED = "locked together"
 

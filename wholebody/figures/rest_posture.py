@@ -10,14 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.figures.description import ExcludedPair, limits_of
 from wholebody.figures.self_pairs import drop_pairs, random_postures
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
-
-Array = NDArray[np.float64]
 
 APART = 1e-3
 """Metres that the posture leaves between two pieces."""

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import FileFormatError, InputError, WholebodyError
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description
 from wholebody.figures.figure import Figure
@@ -18,8 +18,6 @@ from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces
 from wholebody.figures.rest_posture import RestPosture, rest_posture
 from wholebody.figures.self_pairs import choose_pairs
 from wholebody.geometry.large_models import geometry_model
-
-Array = NDArray[np.float64]
 
 DATA_KEPT = 4
 """Pinocchio's data that a scene with one problem holds."""

@@ -6,12 +6,9 @@ from collections.abc import Iterable
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.figures.description import ExcludedPair
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 SELDOM = 0.02
 """Share of the sampled postures: pairs that are free in no more of them are shells in shells, and are left out."""

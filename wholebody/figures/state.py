@@ -8,10 +8,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import instance, posture, whole
 from wholebody.errors import InputError
-
-Array = NDArray[np.float64]
 
 UNIT_TOLERANCE = 1e-3  # how far a quaternion's length may be from 1 before it is taken for a mistake
 

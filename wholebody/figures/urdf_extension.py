@@ -31,16 +31,14 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import FileFormatError, UnknownNameError, WholebodyError
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, JointCone
 from wholebody.figures.figure import Figure
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.figures.xml_reading import numbers
-
-Array = NDArray[np.float64]
 
 
 def extension_text(figure: Figure) -> str:

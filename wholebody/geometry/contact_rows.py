@@ -7,7 +7,7 @@ With n the unit normal from the first piece to the second and x a point of the c
 where V are spatial velocities at the world's origin. At the witness point this is the exact derivative of the signed
 distance, on both sides of zero. It is not enough between flat faces: the witness point jumps from corner to corner as
 the bodies turn, every linear row is satisfied and the bodies rock into each other. So a pair also gets a row at the
-ends of the patch in which its two faces look at each other: core points of one piece near the separating plane, drawn
+ends of the patch in which its two faces look at each other: swept points of one piece near the separating plane, drawn
 back towards the witness point until they are over the other piece. Points that hang over an edge make no row, which
 would forbid turning about that edge.
 """
@@ -20,17 +20,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError
-from wholebody.geometry.proximity import Contacts, PairTable
+from wholebody.geometry.proximity import COAL_ACCURACY, Contacts, PairTable
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-
-BAND = 0.02  # m: core points this much farther than the witness point still make a row; wider = more rows
+BAND = 0.02  # m: swept points this much farther than the witness point still make a row; wider = more rows
 LEVER_DISTANCE = 0.025  # m: pairs that are this much farther apart than they must be get their witness row only
 INSET = 5e-4  # m: how far below the plane a point must find the other piece; larger = larger patches on round pieces
 SAME_NORMAL = 1.0 - 5e-5  # cosine of 0.01 rad: nearer to a face's normal than this, coal's may be meant to be it
-COAL_ACCURACY = 2e-6  # m: of coal's distances, with some room
+NORMAL_ROOM = 2.0 * COAL_ACCURACY  # m: by which a face's normal may part the pieces by less than coal's does
 MOST_ENDS = 8  # rows of one contact beside the witness row: a round face has dozens of corners; fewer rows rock more
 SHORTEST_LEVER = 8e-3  # m: rows nearer to the witness point than this say what the witness row says
 
@@ -57,17 +55,17 @@ class ContactRowBuilder:
     """Builds contact rows for all near pairs at once. It remembers no posture, so any number of runs may share one."""
 
     def __init__(self, table: PairTable) -> None:
-        """Lay the core points and faces of all pieces in flat tables."""
+        """Lay the swept points and faces of all pieces in flat tables."""
         self.table = table
-        cores = table.cores
-        self._points = np.vstack([core.points for core in cores] or [np.zeros((0, 3))])
-        self._point_count = np.array([len(core.points) for core in cores], dtype=np.intp)
+        shapes = table.swept
+        self._points = np.vstack([swept.points for swept in shapes] or [np.zeros((0, 3))])
+        self._point_count = np.array([len(swept.points) for swept in shapes], dtype=np.intp)
         self._point_start = np.concatenate([[0], np.cumsum(self._point_count)])[:-1].astype(np.intp)
-        self._faces = np.vstack([core.faces for core in cores] or [np.zeros((0, 4))])
-        self._face_count = np.array([len(core.faces) for core in cores], dtype=np.intp)
+        self._faces = np.vstack([swept.faces for swept in shapes] or [np.zeros((0, 4))])
+        self._face_count = np.array([len(swept.faces) for swept in shapes], dtype=np.intp)
         self._face_start = np.concatenate([[0], np.cumsum(self._face_count)])[:-1].astype(np.intp)
-        self._radius = np.array([core.radius for core in cores])
-        self._axis = np.array([core.axis for core in cores]).reshape(-1, 3)
+        self._radius = np.array([swept.radius for swept in shapes])
+        self._axis = np.array([swept.axis for swept in shapes]).reshape(-1, 3)
         self._is_capsule: NDArray[np.bool_] = np.asarray(self._axis.any(axis=1))
         flat = (self._point_count >= 2) | np.isinf(table.reach)
         self._extended = flat[table.pairs].all(axis=1)
@@ -117,7 +115,7 @@ class ContactRowBuilder:
         self._kernel.snap_normals(
             wide, contacts.pair, contacts.distance, contacts.normal, contacts.placements, self._points,
             self._point_start, self._point_count, self._faces, self._face_start, self._face_count, self._radius,
-            SAME_NORMAL, COAL_ACCURACY,
+            SAME_NORMAL, NORMAL_ROOM,
         )  # fmt: skip
 
     def _patch_ends(self, contacts: Contacts, wide: Indices) -> tuple[Indices, Array, Array]:
@@ -140,7 +138,7 @@ def compiled_kernel() -> Any:
     pair, faces, placement = np.zeros((2, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros((2, 4, 3))
     patch_kernel.snap_normals(
         none, pair, table[:, 0], table[:, 1:4], placement, points, none, none, faces, none, none, np.zeros(0),
-        SAME_NORMAL, COAL_ACCURACY,
+        SAME_NORMAL, NORMAL_ROOM,
     )  # fmt: skip
     patch_kernel.patch_ends(
         none, pair, table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], placement, points, none, none, faces,

@@ -13,12 +13,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError, MissingPackageError
 from wholebody.geometry.components import Component, enclosed_volume, split_components
 from wholebody.geometry.hull import hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, kept
-from wholebody.geometry.outer_hull import outer_hull
-from wholebody.geometry.pieces import LARGEST, SMALLEST, Array, Piece
+from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
+from wholebody.geometry.simplified_hull import simplified_hull
 
 CONVEX_VOLUME = 1e-4
 """A closed part is taken as convex when its hull adds at most this share of its volume: float32 files round by less."""
@@ -227,4 +228,4 @@ def _coacd(part: Component, max_vertices: int, threshold: float, name: str) -> l
     if done.returncode != 0:
         raise InputError(f"{name}: CoACD cannot cut it into convex pieces; {_MEND}")
     parts = pickle.loads(done.stdout)
-    return [outer_hull(np.asarray(corners, dtype=float), max_vertices) for corners in parts]
+    return [simplified_hull(np.asarray(corners, dtype=float), max_vertices) for corners in parts]

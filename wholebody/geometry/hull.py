@@ -13,9 +13,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
-from wholebody.geometry.outer_hull import outer_hull
-from wholebody.geometry.pieces import LARGEST, SMALLEST, Array, Piece
+from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
+from wholebody.geometry.simplified_hull import simplified_hull
 
 MOST_NEIGHBOURS = 255
 """Edges at one vertex that coal can count."""
@@ -49,9 +50,9 @@ def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] 
         cloud = np.unique(cloud, axis=0)
     hull = _solid_hull(cloud, what)
     if vertices is not None and len(hull.vertices) > vertices[0]:
-        hull = _solid_hull(outer_hull(cloud[hull.vertices], vertices[1]), what)
+        hull = _solid_hull(simplified_hull(cloud[hull.vertices], vertices[1]), what)
     if np.bincount(hull.simplices.ravel()).max() > MOST_NEIGHBOURS:
-        hull = _solid_hull(outer_hull(cloud[hull.vertices], MANY_EDGES), what)
+        hull = _solid_hull(simplified_hull(cloud[hull.vertices], MANY_EDGES), what)
     used = hull.vertices
     corners = hull.points[used]
     centre, _ = enclosing_ball(corners)

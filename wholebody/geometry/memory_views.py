@@ -11,9 +11,8 @@ import ctypes
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from wholebody.arrays import Array
 
 SE3_STRIDE = 96  # bytes: rotation (9 doubles, column major), translation (3 doubles)
 RESULT_STRIDE = 160  # bytes of a coal.DistanceResult

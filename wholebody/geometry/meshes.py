@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import FileFormatError, InputError, MissingPackageError
 from wholebody.files import check_file
 from wholebody.geometry.convex import check_mesh
-from wholebody.geometry.pieces import Array
 
 SUFFIXES = (".obj", ".stl", ".gltf", ".glb", ".dae")
 

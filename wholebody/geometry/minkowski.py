@@ -14,8 +14,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.geometry.cores import Core, core_of
-from wholebody.geometry.pieces import Array
+from wholebody.arrays import Array
+from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.geometry.swept_points import SweptPoints, swept_points
 
 Placed: TypeAlias = tuple[Any, pin.SE3]
 """A coal geometry and where it is in the world."""
@@ -24,26 +25,26 @@ MOST_POINTS = 20_000
 """Vertices of a Minkowski difference above which its sides are sampled and no longer enumerated."""
 
 
-OVERLAP = 2e-6
+OVERLAP = 2.0 * COAL_ACCURACY
 """Depth up to which a pair counts as touching, metres: twice coal's own tolerance."""
 
 
 class _Body:
-    """One piece: its core in the world, and its support function."""
+    """One piece: its swept points in the world, and its support function."""
 
     def __init__(self, placed: Placed) -> None:
         self.geometry, self.placement = placed
-        self.core: Core = core_of(self.geometry)
+        self.swept: SweptPoints = swept_points(self.geometry)
         rotation, self.center = np.asarray(self.placement.rotation), np.asarray(self.placement.translation)
-        self.points: Array = self.core.points @ rotation.T + self.center
-        self.axis: Array = rotation @ self.core.axis
+        self.points: Array = self.swept.points @ rotation.T + self.center
+        self.axis: Array = rotation @ self.swept.axis
         self.plane: Array | None = None
-        self.round = self.core.radius > 0.0
+        self.round = self.swept.radius > 0.0
         self.radii: Array | None = None
         if not len(self.points):
-            if np.isinf(self.core.reach):
-                self.plane = rotation @ self.core.faces[0, :3]
-                self.offset = float(self.core.faces[0, 3] + self.plane @ self.center)
+            if np.isinf(self.swept.reach):
+                self.plane = rotation @ self.swept.faces[0, :3]
+                self.offset = float(self.swept.faces[0, 3] + self.plane @ self.center)
             else:
                 self.round = True
                 self.radii = rotation * np.asarray(self.geometry.radii)
@@ -54,7 +55,7 @@ class _Body:
             return np.where(np.abs(normals - self.plane).max(axis=1) < 1e-12, self.offset, np.inf)
         if self.radii is not None:
             return np.asarray(normals @ self.center + np.linalg.norm(normals @ self.radii, axis=1))
-        return np.asarray((normals @ self.points.T).max(axis=1) + self.core.radius)
+        return np.asarray((normals @ self.points.T).max(axis=1) + self.swept.radius)
 
 
 class Sides(NamedTuple):
@@ -75,7 +76,7 @@ class ObjectPair:
 
         self.a, self.b = [_Body(p) for p in pieces_a], [_Body(p) for p in pieces_b]
         self._centers = np.array([x.center for x in self.a])[:, None] - np.array([x.center for x in self.b])
-        self._reach = np.array([x.core.reach for x in self.a])[:, None] + np.array([x.core.reach for x in self.b])
+        self._reach = np.array([x.swept.reach for x in self.a])[:, None] + np.array([x.swept.reach for x in self.b])
         if allowed is not None:
             self._reach = np.where(allowed, self._reach, -np.inf)
         self._sides: dict[tuple[int, int], Sides] = {}
@@ -109,7 +110,7 @@ class ObjectPair:
         normal = -np.array(self._result.normal)
         if (
             not normal @ normal > 0.25
-        ):  # cores that cross exactly (capsule axes, concentric spheres): coal has no normal
+        ):  # swept points that cross exactly (capsule axes, concentric spheres): coal has no normal
             normal = np.cross(a.axis, b.axis)
             if np.linalg.norm(normal) < 1e-9:
                 along = a.axis if a.axis.any() else b.axis if b.axis.any() else np.array([1.0, 0.0, 0.0])
@@ -157,7 +158,7 @@ class ObjectPair:
             corners = (b.points[:, None] - a.points).reshape(-1, 3)
             try:
                 found.append(ConvexHull(corners - corners.mean(axis=0)).equations[:, :3])
-            except QhullError:  # the cores are points, segments or parallel plates: the rounding decides, see _net
+            except QhullError:  # what is swept are points, segments or parallel plates: the rounding decides, see _net
                 crossed = np.cross(a.axis, b.axis)
                 if np.linalg.norm(crossed) > 1e-9:
                     found.append(np.array([crossed, -crossed]) / np.linalg.norm(crossed))

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.compiled import compiled
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @compiled()

@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.geometry.minkowski import ObjectPair, Placed
-from wholebody.geometry.pieces import Array
 from wholebody.geometry.separation import least_separation
 
 

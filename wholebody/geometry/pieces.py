@@ -6,12 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from wholebody.checks import array, number, shown
 from wholebody.errors import InputError
-
-Array = NDArray[np.float64]
 
 SMALLEST = 1e-4
 """Least extent of a piece, metres: below 1e-5 m coal reads gaps as zero, and at 1e-6 m it loses the depth."""

@@ -12,14 +12,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.geometry.cores import Core, core_of
+from wholebody.arrays import Array, Indices
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, placement_view, read_result
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from wholebody.geometry.swept_points import SweptPoints, swept_points
 
 COAL_ACCURACY = 1e-6  # m: of coal's distances
+PENETRATION = 1e-5  # m: deeper than this a pair is called inside of each other; what touches is solved to it
 
 MANY = 60
 """Pairs that survive their spheres from which on their boxes are asked too: long walls have large spheres. It costs as
@@ -30,7 +29,7 @@ SINGLY = 3000
 takes it 50 ns for each of them."""
 
 AWAY = 10.0  # m: between pieces that stand anywhere
-ENDLESS = 1e9  # m: half the size of a half-space's box
+ENDLESS = 1e9  # m: what counts for the reach of a half-space, and half the size of its box
 
 
 class Contacts(NamedTuple):
@@ -63,11 +62,11 @@ class Contacts(NamedTuple):
         )  # fmt: skip
 
 
-def half_box(core: Core) -> Array:
+def half_box(swept: SweptPoints) -> Array:
     """Half the size (3,) of a box about a piece's origin, along the piece's axes, that holds the piece."""
-    if not len(core.points):
-        return np.full(3, min(core.reach, ENDLESS))
-    return np.asarray(np.abs(core.points).max(axis=0) + core.radius)
+    if not len(swept.points):
+        return np.full(3, min(swept.reach, ENDLESS))
+    return np.asarray(np.abs(swept.points).max(axis=0) + swept.radius)
 
 
 class PairTable:
@@ -76,7 +75,7 @@ class PairTable:
     Attributes:
         model: Pinocchio's model.
         geometry: the geometry model; only the placements of its pieces may change.
-        cores: the core of every piece.
+        swept: the swept points of every piece.
         pairs: (pairs, 2) indices of the two pieces of every collision pair.
         joint: (n,) joint that carries each piece; 0 is the world.
         reach: (n,) radius of each piece about its origin, metres; infinite for a half-space.
@@ -90,18 +89,18 @@ class PairTable:
             InputError: a geometry that is not a convex piece.
         """
         self.model, self.geometry = model, geometry
-        self.cores = [core_of(piece.geometry) for piece in geometry.geometryObjects]
+        self.swept = [swept_points(piece.geometry) for piece in geometry.geometryObjects]
         self.pairs: Indices = np.array(
             [[pair.first, pair.second] for pair in geometry.collisionPairs], dtype=np.intp
         ).reshape(-1, 2)
         self.joint: Indices = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
-        self.reach = np.array([core.reach for core in self.cores]).reshape(-1)
-        self.half = np.array([half_box(core) for core in self.cores]).reshape(-1, 3)
-        width = np.array([core.width for core in self.cores]).reshape(-1)
+        self.reach = np.array([swept.reach for swept in self.swept]).reshape(-1)
+        self.half = np.array([half_box(swept) for swept in self.swept]).reshape(-1, 3)
+        width = np.array([swept.width for swept in self.swept]).reshape(-1)
         self.widths: Array = width[self.pairs].sum(axis=1)
-        radius = np.array([core.radius for core in self.cores]).reshape(-1)
-        # where round pieces' cores meet, coal's normal is zero or noise along an axis
-        self.cores_meet = np.where(
+        radius = np.array([swept.radius for swept in self.swept]).reshape(-1)
+        # where round pieces' swept points meet, coal's normal is zero or noise along an axis
+        self.points_meet = np.where(
             (radius[self.pairs] > 0.0).all(axis=1), COAL_ACCURACY - radius[self.pairs].sum(axis=1), -np.inf
         )
         rows = self.pairs[:, 0]
@@ -225,17 +224,17 @@ class Proximity:
         table, index = table[keep], index[keep]
         normal = table[:, 1:4]
         pair = self.table.pairs[index]
-        broken = table[:, 0] <= self.table.cores_meet[index]
+        broken = table[:, 0] <= self.table.points_meet[index]
         if broken.any():
-            self._mend_normals(placements, table, pair, np.flatnonzero(broken))
+            self._repair_normals(placements, table, pair, np.flatnonzero(broken))
         return Contacts(pair, table[:, 0], normal, table[:, 4:7], table[:, 7:10], index, placements)
 
-    def _mend_normals(self, placements: Array, table: Array, pair: Indices, rows: Indices) -> None:
-        """Give a normal to pairs where coal has none: cores that cross exactly (capsule axes, concentric spheres)."""
+    def _repair_normals(self, placements: Array, table: Array, pair: Indices, rows: Indices) -> None:
+        """Give a normal to pairs where coal has none: capsule axes that cross exactly, concentric spheres."""
         for row in rows:
             first, second = pair[row]
-            axis_a = self.table.cores[first].axis @ placements[first, :3]
-            axis_b = self.table.cores[second].axis @ placements[second, :3]
+            axis_a = self.table.swept[first].axis @ placements[first, :3]
+            axis_b = self.table.swept[second].axis @ placements[second, :3]
             normal = np.cross(axis_a, axis_b)
             if np.linalg.norm(normal) < 1e-9:
                 along = axis_a if axis_a.any() else axis_b if axis_b.any() else np.array([1.0, 0.0, 0.0])

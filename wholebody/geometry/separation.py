@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.geometry.minkowski import OVERLAP, ObjectPair, Placed, Sides
-from wholebody.geometry.pieces import Array
 
 TOUCHING = 1e-7
 """Overlap that counts as none in the search, metres; the answer is verified to `OVERLAP`."""

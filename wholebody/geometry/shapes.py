@@ -12,13 +12,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import array, choice, number, path, shown, whole
 from wholebody.errors import InputError
 from wholebody.geometry.convex import check_mesh, convex_pieces
 from wholebody.geometry.hull import check_points, hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.meshes import Y_UP, read_mesh
-from wholebody.geometry.pieces import LARGEST, Array, Piece, check_length, check_vector
+from wholebody.geometry.pieces import LARGEST, Piece, check_length, check_vector
 
 MAX_VERTICES = (8, 256)
 """Least and greatest `Mesh.max_vertices`."""

@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.tasks.base import Bound, Measure
 from wholebody.tasks.distance import SquaredDistance
-
-Array = NDArray[np.float64]
 
 
 class Attraction(Measure):

@@ -15,20 +15,20 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from wholebody.arrays import Array
 from wholebody.assessment import assess
 from wholebody.checks import array, function, instance, numbers
 from wholebody.errors import InputError
-from wholebody.geometry.sweep import Sweep
+from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.interaction.judging import jerk
 from wholebody.interaction.scripts import FRAME
 from wholebody.methods.base import Method
 from wholebody.methods.drag import Drag
-from wholebody.methods.moving_goals import moving_goal, own_copy, retarget
+from wholebody.methods.moving_goals import copied, moving_goal, retarget
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.intp]
 
 SETTLED = 1e-3  # m, rad: a goal that is left by less than this when it has come to its end is met at once
@@ -173,7 +173,7 @@ def _lags(left: list[float], late: int) -> bool:
 
 def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudgement:
     """Judge a drag of a problem's goal."""
-    own, model = own_copy(problem), problem.scene.model
+    own, model = copied(problem), problem.scene.model
     instance(dragged, Dragged, "judge_drag: dragged", "make one with drag_along(problem, places)")
     moving_goal(problem, goal)
     errors, judged = [], []

@@ -12,14 +12,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import instance
 from wholebody.figures.state import State
-from wholebody.geometry.sweep import Sweep
+from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.interaction.recording import Recording
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.intp]
 
 PASSING = {"qp": 1e-4, "ccd": 1e-3}

@@ -13,14 +13,16 @@ from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from wholebody.arrays import Array
 from wholebody.checks import array, flag, function, instance, known, time_step
 from wholebody.errors import InputError
+from wholebody.geometry.proximity import PENETRATION
 from wholebody.interaction.attraction import Attraction
-from wholebody.interaction.nearest import CLEARANCE, NearestPosture, weights
+from wholebody.interaction.overlap_strategy import OverlapStrategy, Resolution
+from wholebody.interaction.qp_strategy import CLEARANCE, QPStrategy, weights
 from wholebody.interaction.recording import Frame, Recording
-from wholebody.interaction.removal import Removal, Remover
 from wholebody.interaction.scripts import FRAME
 from wholebody.interaction.tracks import UNIT_TOLERANCE, Track
 from wholebody.methods.inputs import SEED
@@ -29,14 +31,10 @@ from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
 
-Array = NDArray[np.float64]
-
 OVERLAPS = ("qp", "ccd")
 
 SHARES = (0.5, 0.25)
 """Of the way, tried when all of it is not free: what keeps to a surface leaves it by the square of the share."""
-
-INSIDE = 1e-5  # m: deeper than this a posture is called inside of something
 
 
 def check_scene(scene: object, what: str) -> None:
@@ -95,8 +93,8 @@ class FrameLoop:
         if unreadable:
             raise InputError(f"frame 0: {unreadable}; begin with a posture of {scene.figure.name}")
         self.shown, self._note = free_start(scene, q, rigid)
-        self._remover = self._made(overlap, dt, seed, rigid)
-        self._kept_from_passing(self._remover.remove(self.shown, self.shown))  # what is set up once, before the clock
+        self._strategy = self._strategy_for(overlap, dt, seed, rigid)
+        self._kept_from_passing(self._strategy.resolve(self.shown, self.shown))  # what is set up once, before the clock
 
     def frame(self, tracked: ArrayLike) -> Frame:
         """Show one frame.
@@ -111,40 +109,40 @@ class FrameLoop:
         goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
         unreadable = _unreadable(self.scene, goal)
         if unreadable:
-            return self._shown(Removal((self.shown,), 0.0, 0.0, 0, 0, 0, f"{unreadable}; the figure stays"), began)
-        removal = self._remover.remove(self.shown, self._readable(goal))
+            return self._shown(Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{unreadable}; the figure stays"), began)
+        resolution = self._strategy.resolve(self.shown, self._readable(goal))
         # Simulated objects would move here, after the driven ones have found their places.
-        return self._shown(self._kept_from_passing(removal), began)
+        return self._shown(self._kept_from_passing(resolution), began)
 
-    def _shown(self, removal: Removal, began: tuple[float, float]) -> Frame:
-        note = "; ".join(part for part in (self._note, removal.note) if part)
+    def _shown(self, resolution: Resolution, began: tuple[float, float]) -> Frame:
+        note = "; ".join(part for part in (self._note, resolution.note) if part)
         note = f"frame {self.count}: {note}" if note else ""
-        self.shown, self._note, self.count = np.array(removal.ways[0]), "", self.count + 1
+        self.shown, self._note, self.count = np.array(resolution.candidates[0]), "", self.count + 1
         wall, cpu = (now - then for now, then in zip(_clocks(), began, strict=True))
         return Frame(
-            self.shown, wall, cpu, removal.contact_seconds, removal.solve_seconds,
-            removal.iterations, removal.joints, removal.pairs, note,
+            self.shown, wall, cpu, resolution.contact_seconds, resolution.solve_seconds,
+            resolution.iterations, resolution.joints, resolution.pairs, note,
         )  # fmt: skip
 
     def _readable(self, goal: Array) -> Array:
         """The tracked posture within limits and with a quaternion of unit length."""
         return self.scene.figure.clamp(pin.normalize(self.scene.model, goal))
 
-    def _kept_from_passing(self, removal: Removal) -> Removal:
+    def _kept_from_passing(self, resolution: Resolution) -> Resolution:
         """The first posture whose way from the one shown is free; else a part of its way, or the one shown.
 
-        What the removal swept is not swept again. This is the interpolation with the last posture without overlap of
+        What the resolution swept is not swept again. This is the interpolation with the last posture without overlap of
         algorithm 1, step 4. What is free for the whole length of a share is taken, and never what is free up to a
         contact: that would creep into it.
         """
-        if removal.swept:
-            return removal
+        if resolution.swept:
+            return resolution
         began = time.perf_counter()
-        nearest = removal.ways[-1]
+        nearest = resolution.candidates[-1]
         parts = (np.asarray(pin.interpolate(self.scene.model, self.shown, nearest, share)) for share in SHARES)
-        note, contact = removal.note, None
-        for q in itertools.chain(removal.ways, parts):
-            contact = self.scene.sweep(self.shown, q, self._remover.graze)
+        note, contact = resolution.note, None
+        for q in itertools.chain(resolution.candidates, parts):
+            contact = self.scene.sweep(self.shown, q, self._strategy.sweep_tolerance)
             if contact is None:
                 break
         if contact is not None:
@@ -152,19 +150,19 @@ class FrameLoop:
             q = self.shown
             stop = f"{owners} would pass through each other on the way; the figure stays"
             note = "; ".join(part for part in (note, stop) if part)
-        spent = removal.contact_seconds + time.perf_counter() - began
-        return removal._replace(ways=(q,), contact_seconds=spent, note=note)
+        spent = resolution.contact_seconds + time.perf_counter() - began
+        return resolution._replace(candidates=(q,), contact_seconds=spent, note=note)
 
-    def _made(self, overlap: str, dt: float, seed: int, rigid: bool) -> Remover:
+    def _strategy_for(self, overlap: str, dt: float, seed: int, rigid: bool) -> OverlapStrategy:
         if overlap == "qp":
-            return NearestPosture(self.scene, self.shown, dt, rigid)
+            return QPStrategy(self.scene, self.shown, dt, rigid)
         if rigid:
-            from wholebody.interaction.displacing import AsAWhole
+            from wholebody.interaction.rigid_translation import RigidTranslation
 
-            return AsAWhole(self.scene)
-        from wholebody.interaction.chains import LimbByLimb
+            return RigidTranslation(self.scene)
+        from wholebody.interaction.ccd_strategy import CCDStrategy
 
-        return LimbByLimb(self.scene, self.shown, dt, seed)
+        return CCDStrategy(self.scene, self.shown, dt, seed)
 
 
 def _unreadable(scene: Scene, q: Array) -> str:
@@ -203,7 +201,7 @@ def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
 
 def deepest_overlap(scene: Scene, q: Array) -> str:
     """The deepest overlap at q in words, or "" where there is none."""
-    contacts = scene.contacts(q, within=-INSIDE)
+    contacts = scene.contacts(q, within=-PENETRATION)
     if not len(contacts.distance):
         return ""
     first, second = (scene.piece_owner[piece] for piece in contacts.pair[0])

@@ -7,16 +7,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from wholebody.arrays import Array
 from wholebody.checks import array, number, shown, time_step, whole
 from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, InputError
 from wholebody.files import read_text
 from wholebody.interaction.tracks import MOST_FRAMES
 from wholebody.tasks.inputs import direction, point
-
-Array = NDArray[np.float64]
 
 SPEED = 0.5  # m/s: of a hand that drags, where the number of frames is not given
 CORNERS = 72  # of a circle

@@ -10,10 +10,9 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import known, number, whole
 from wholebody.figures import load
 from wholebody.figures.figure import Figure
@@ -23,7 +22,6 @@ from wholebody.interaction.tracks import MOST_FRAMES, Track
 from wholebody.methods.inputs import SEED
 from wholebody.scene import Scene
 
-Array = NDArray[np.float64]
 Place = tuple[float, float, float]
 Keys = list[tuple[float, Array]]
 

@@ -7,12 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.interaction.tracks import Track
-
-Array = NDArray[np.float64]
 
 FRAME = 1.0 / 60.0  # s: of a display
 TREMOR = 2e-3  # rad: what a tracker's noise and a person's unrest come to in arms, fingers and neck

@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from wholebody.arrays import Array
 from wholebody.checks import array, instance, known, listed, shown, text, time_step, whole
 from wholebody.checks import posture as checked_posture
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.placement import placement
-
-Array = NDArray[np.float64]
 
 UNIT_TOLERANCE = 1e-3  # of a quaternion's length, beyond which it is taken for a mistake
 ROOT_SIZE = 7

@@ -14,11 +14,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.checks import time_step
+from wholebody.geometry.continuous.passing_through import GRAZE, is_free
 from wholebody.methods.base import Method, goal_error
-from wholebody.methods.moving_goals import moving_goal, own_copy, part_way, refuse_assembly, retarget
-from wholebody.methods.nearby import solve_nearby
-from wholebody.methods.passage import GRAZE, is_free
+from wholebody.methods.moving_goals import copied, interpolated_target, moving_goal, refuse_assembly, retarget
 from wholebody.methods.solve import method_for_motions
+from wholebody.methods.warm_start import warm_started
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.solution import Solution
@@ -76,7 +76,7 @@ class Drag:
             UnknownNameError: there is no such method.
         """
         refuse_assembly(problem, "Drag")
-        self.problem, self.dt = own_copy(problem), time_step(dt, "dt")
+        self.problem, self.dt = copied(problem), time_step(dt, "dt")
         self.method = method_for_motions(method)
         self.tracker = self.method.tracker(self.problem, self.dt)
         self._workspace = self.tracker.workspace
@@ -106,7 +106,7 @@ class Drag:
     def finish(self) -> Solution:
         """Meet the goal where it is now with the method's full accuracy, and judge the posture."""
         with self._alone:
-            solution = solve_nearby(self.problem, self.tracker, self.q)
+            solution = warm_started(self.problem, self.tracker, self.q)
             self.q = solution.q
             return solution
 
@@ -127,7 +127,7 @@ class Drag:
         error = max(float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:])))
         for leg in LEGS:
             if leg < error:
-                retarget(self.problem, self._number, part_way(goal, left, leg / error))
+                retarget(self.problem, self._number, interpolated_target(goal, left, leg / error))
             elif np.isfinite(leg):
                 continue  # the goal is no farther than that, and was asked for already
             step = self.tracker.frame(self.q)

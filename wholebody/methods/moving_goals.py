@@ -21,7 +21,7 @@ from wholebody.tasks.base import Goal
 Array = NDArray[np.float64]
 
 
-def own_copy(problem: Problem) -> Problem:
+def copied(problem: Problem) -> Problem:
     """A copy whose goals can be moved without moving the caller's.
 
     Raises:
@@ -71,7 +71,7 @@ def retarget(problem: Problem, number: int, target: Any) -> None:
     problem.retarget(goals)
 
 
-def part_way(goal: Point | Frame, error: Array, share: float) -> Any:
+def interpolated_target(goal: Point | Frame, error: Array, share: float) -> Any:
     """A target on the way of a goal's frame from where it has this error: a share of what is left."""
     if isinstance(goal, Point):
         return goal.resolved_target + (1.0 - share) * error

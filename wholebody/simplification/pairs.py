@@ -9,9 +9,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.figures.figure import Figure
 from wholebody.geometry.proximity import COAL_ACCURACY
-from wholebody.simplification.reach import Array, Balls, Indices, Reach, about_point, placed
+from wholebody.simplification.reach import Balls, Reach, about_point, placed
 from wholebody.tasks.base import Constraint
 from wholebody.tasks.hold import Hold
 

@@ -14,10 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from wholebody.arrays import Array, Indices
 
 
 class Range(NamedTuple):

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from wholebody import checks
+from wholebody.arrays import Array
 from wholebody.assessment import assess
-from wholebody.problem import Array, Problem
-from wholebody.simplification.lifting import Embedding
+from wholebody.problem import Problem
+from wholebody.simplification.embedding import Embedding
 from wholebody.solution import Solution
 
 HOLDS = 1e-4  # m, rad: to this limits, constraints and clearances of the whole problem must hold for "solved"
@@ -49,7 +50,7 @@ class LeftOut:
 
     @property
     def exact(self) -> bool:
-        """Whether nothing is changed at all: no joint locked that could matter, no piece coarser."""
+        """Whether nothing is changed at all: no joint locked that could matter, no piece simplified."""
         return not self.locked and not self.pieces
 
     def __str__(self) -> str:
@@ -97,7 +98,7 @@ class Simplified:
         Raises:
             InputError: q has the wrong shape or a value that is not finite.
         """
-        return self._embedding.lift(checks.posture(q, self.problem.scene.model.nq))
+        return self._embedding.embed(checks.posture(q, self.problem.scene.model.nq))
 
     def restored(self, solution: Solution) -> Solution:
         """The same answer for the whole problem: its posture, judged by the whole problem's assessment.

@@ -8,18 +8,18 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody import checks
+from wholebody.arrays import Array, Indices
 from wholebody.figures.description import ROOT_JOINT
 from wholebody.figures.figure import Figure
 from wholebody.geometry.large_models import geometry_model
-from wholebody.problem import Array, Problem
+from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.scene_geometry import SceneGeometry, SceneObject
-from wholebody.simplification.lifting import Embedding, on_smaller
-from wholebody.simplification.outer_pieces import coarser
+from wholebody.simplification.active_joints import ActiveJoints, active_joints
+from wholebody.simplification.embedding import Embedding, restated_term
 from wholebody.simplification.pairs import reachable_pairs
-from wholebody.simplification.participation import Participation, participation
-from wholebody.simplification.reach import Indices
 from wholebody.simplification.simplified import LeftOut, Simplified
+from wholebody.simplification.simplified_pieces import simplified_piece
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import Freeze
 
@@ -82,7 +82,7 @@ def leave_out(problem: Problem, parts: Parts) -> Simplified:
     """
     problem.check_fresh()
     whole = problem.scene
-    part = participation(problem, parts.lock) if parts.joints else None
+    part = active_joints(problem, parts.lock) if parts.joints else None
     figure, geometry = _smaller_figure(problem, part)
     embedding = Embedding(whole.model, figure.model, problem.start)
     start = problem.start[embedding.idx_q]
@@ -107,7 +107,7 @@ def leave_out(problem: Problem, parts: Parts) -> Simplified:
     return Simplified(made, problem, _left_out(problem, made, part, len(numbers), rigid, grown), embedding)
 
 
-def _smaller_figure(problem: Problem, part: Participation | None) -> tuple[Figure, pin.GeometryModel]:
+def _smaller_figure(problem: Problem, part: ActiveJoints | None) -> tuple[Figure, pin.GeometryModel]:
     """The figure without the joints that take no part, and the scene's geometry on its joints."""
     scene = problem.scene
     if part is None or part.moving[1:].all():
@@ -136,7 +136,7 @@ def _terms(
         return list(problem.goals), list(problem.constraints), list(problem.bounds), list(problem.measures)
 
     def restated(terms: tuple[Term, ...]) -> list[Term]:
-        found = [on_smaller(term, small, start, embedding) for term in terms]
+        found = [restated_term(term, small, start, embedding) for term in terms]
         return [term for term in found if term is not None]
 
     bounds = tuple(bound for bound in problem.bounds if not isinstance(bound, Freeze))  # what they freeze is locked
@@ -159,7 +159,7 @@ def _pieces(
     found, grown = {}, {}
     for index in np.unique(pairs[numbers]).tolist():
         piece = geometry.geometryObjects[index]
-        made = None if index in crowded else coarser(piece, growth)
+        made = None if index in crowded else simplified_piece(piece, growth)
         if made is not None:
             found[index], grown[piece.name] = made
     return found, grown
@@ -220,7 +220,7 @@ def _dofs(figure: Figure, joint: str) -> list[int]:
 
 
 def _left_out(
-    whole: Problem, small: Problem, part: Participation | None, pairs: int, rigid: int, grown: dict[str, float]
+    whole: Problem, small: Problem, part: ActiveJoints | None, pairs: int, rigid: int, grown: dict[str, float]
 ) -> LeftOut:
     names = list(whole.scene.model.names)
     frozen = tuple(names[j] for j in np.flatnonzero(part.frozen & ~part.moving)) if part is not None else ()

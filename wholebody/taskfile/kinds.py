@@ -12,12 +12,10 @@ from wholebody.checks import shown
 from wholebody.errors import UnknownNameError
 from wholebody.figures.figure import Figure
 from wholebody.taskfile.where import Where
+from wholebody.tasks.inputs import FARTHEST
 
 FAR = 1e15
 """Beyond this no slip of units is guessed."""
-
-FARTHEST = 100.0
-"""Metres from the origin: what lies farther is taken for a slip of units."""
 
 _SLIPS = {
     "m": ((0.01, "centimetres"), (0.001, "millimetres")),

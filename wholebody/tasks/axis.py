@@ -17,11 +17,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from wholebody.arrays import Array, Mask
 from wholebody.checks import shown
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Goal, Mask, Surroundings, filled
+from wholebody.tasks.base import Goal, Surroundings, filled
 
 STEEPEST = pi / sin(pi / 180.0)
 """Largest derivative across the error, reached one degree before the opposite direction.

@@ -7,11 +7,12 @@ from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 
+from wholebody.arrays import Array, Mask
 from wholebody.checks import listed, number
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Constraint, Mask, Surroundings, filled
+from wholebody.tasks.base import Constraint, Surroundings, filled
 from wholebody.tasks.support import convex_polygon, edges, shrunk, standing_points
 
 

@@ -15,15 +15,13 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Mask
 from wholebody.figures.state import State, Wrench
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _T = TypeVar("_T")
 

@@ -7,11 +7,12 @@ from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.checks import instance, number, shown
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Bound, Surroundings, filled
+from wholebody.tasks.base import Bound, Surroundings, filled
 
 SLOWEST, FASTEST = 1e-9, 1e9  # rad/s, m/s: what is slower is frozen, what is faster is not bounded
 

@@ -8,10 +8,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wholebody.arrays import Array, Mask
 from wholebody.checks import choice
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Goal, Mask, Surroundings
+from wholebody.tasks.base import Goal, Surroundings
 
 
 @dataclass(frozen=True, eq=False)

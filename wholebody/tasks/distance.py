@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.figures.state import State
-from wholebody.tasks.base import Array
 
 LEAST_CURVATURE = 1e-6
 """Curvature [1/rad^2] given to what a measure leaves free: positive, as methods need it, far below any in use."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Measure, Surroundings, filled
+from wholebody.tasks.base import Measure, Surroundings, filled
 from wholebody.tasks.distance import SquaredDistance
 
 

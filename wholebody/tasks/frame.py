@@ -7,11 +7,12 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from wholebody.arrays import Array, Mask
 from wholebody.checks import shown
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Goal, Mask, Surroundings, filled
+from wholebody.tasks.base import Goal, Surroundings, filled
 from wholebody.tasks.residuals import PlacementResidual
 
 

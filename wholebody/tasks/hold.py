@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array, Mask
 from wholebody.checks import flag, shown
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Constraint, Mask, Surroundings, filled
+from wholebody.tasks.base import Constraint, Surroundings, filled
 from wholebody.tasks.residuals import PlacementResidual, placement_between
 
 

@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wholebody.arrays import Array
 from wholebody.checks import array, number, numbers, shown
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import PlacementLike, placement
-from wholebody.tasks.base import Array, Surroundings
+from wholebody.tasks.base import Surroundings
 
 FARTHEST = 100.0
 """Distance [m] beyond which a place is taken for a slip of units: in millimetres it is a tenth of a metre."""

@@ -8,10 +8,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from wholebody.arrays import Array, Mask
 from wholebody.checks import choice, shown
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Constraint, Mask, Surroundings, filled
+from wholebody.tasks.base import Constraint, Surroundings, filled
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from wholebody.arrays import Array, Mask
 from wholebody.checks import array, listed, numbers
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import ROUNDING
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Goal, Mask, Surroundings, filled
+from wholebody.tasks.base import Goal, Surroundings, filled
 
 
 @dataclass(frozen=True, eq=False)

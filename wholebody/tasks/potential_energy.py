@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Measure, Surroundings, filled
+from wholebody.tasks.base import Measure, Surroundings, filled
 from wholebody.tasks.distance import LEAST_CURVATURE
 
 GRAVITY = 9.80665

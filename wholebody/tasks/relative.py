@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
+from wholebody.arrays import Array, Mask
 from wholebody.checks import flag, shown
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Goal, Mask, Surroundings, filled
+from wholebody.tasks.base import Goal, Surroundings, filled
 from wholebody.tasks.residuals import PlacementResidual, placement_between
 
 

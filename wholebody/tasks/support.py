@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
-from wholebody.geometry.cores import core_of
+from wholebody.geometry.swept_points import swept_points
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Array, Surroundings
+from wholebody.tasks.base import Surroundings
 
 STANDING_HEIGHT = 0.01
 """Height [m] above a foot's lowest point up to which its corners stand on the ground: soles are rounded by as much."""
@@ -55,14 +56,14 @@ def low_points(geometry: Any, placement: pin.SE3) -> Array:
         geometry: a coal shape.
         placement: where its origin is in the world.
     """
-    core = core_of(geometry)
-    if len(core.points) == 0:
+    swept = swept_points(geometry)
+    if len(swept.points) == 0:
         # An ellipsoid's lowest point: the image of the ball's point whose normal is mapped to -z.
         pull = np.asarray(geometry.radii) * placement.rotation[2]
         lowest = placement.rotation @ (np.asarray(geometry.radii) * pull) / np.linalg.norm(pull)
         return np.array([placement.translation - lowest])
-    corners = core.points @ placement.rotation.T + placement.translation
-    corners[:, 2] -= core.radius
+    corners = swept.points @ placement.rotation.T + placement.translation
+    corners[:, 2] -= swept.radius
     return np.asarray(corners)
 
 

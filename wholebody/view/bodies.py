@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.view import drawing, style
-from wholebody.view.stage import Moment, Stage
+from wholebody.view.scene_graph import Keyframe, SceneGraph
 from wholebody.view.style import Color
-from wholebody.view.subject import Subject
-
-Array = NDArray[np.float64]
+from wholebody.view.viewed_scene import ViewedScene
 
 
 @dataclass(frozen=True)
@@ -46,9 +44,9 @@ class Body:
 
 
 class Bodies:
-    """All pieces of a scene on the stage, in the order of its geometry model."""
+    """All pieces of a scene in the scene graph, in the order of its geometry model."""
 
-    def __init__(self, scene: Subject, see_through: Collection[str]) -> None:
+    def __init__(self, scene: ViewedScene, see_through: Collection[str]) -> None:
         """Read the scene.
 
         Args:
@@ -83,17 +81,17 @@ class Bodies:
             color = style.object_color(number)
         return style.with_opacity(color, style.SEE_THROUGH) if thing in self.see_through else color
 
-    def build(self, stage: Stage) -> None:
-        """Put every piece on the stage, in place of those that were there."""
-        stage.remove(style.FIGURE_NODE)
-        stage.remove(style.OBJECT_NODE)
+    def build(self, graph: SceneGraph) -> None:
+        """Put every piece in the scene graph, in place of those that were there."""
+        graph.remove(style.FIGURE_NODE)
+        graph.remove(style.OBJECT_NODE)
         for body, piece in zip(self.all, self.scene.geometry.geometryObjects, strict=True):
-            stage.put(body.path, drawing.piece(piece.geometry, body.path, body.color))
-            stage.place(body.path, piece.placement.homogeneous)
+            graph.put(body.path, drawing.piece(piece.geometry, body.path, body.color))
+            graph.place(body.path, piece.placement.homogeneous)
         floor = next(
             (index for index, body in enumerate(self.all) if body.plate and body.color[:3] == style.FLOOR[:3]), None
         )
-        stage.set("/Ground", "visible", floor is None)  # what shows shadows where there is no floor
+        graph.set("/Ground", "visible", floor is None)  # what shows shadows where there is no floor
         grid = np.eye(4)
         if floor is not None:
             piece = self.scene.geometry.geometryObjects[floor]
@@ -101,34 +99,34 @@ class Bodies:
             grid = piece.placement.homogeneous @ top
             grid[:3, 3] += grid[:3, 2] * style.PLATE[2] / 2
         grid[:3, 3] += 0.0015 * grid[:3, 2]  # m: clear of the floor, else the two flicker
-        stage.place("/Grid", grid)
+        graph.place("/Grid", grid)
 
-    def pose(self, moment: Moment, data: Any) -> None:
+    def pose(self, keyframe: Keyframe, data: Any) -> None:
         """Place the joints where `data` has them, and the things where the scene has them now."""
         for path, joint in self.carriers.items():
-            moment.transforms[path] = data.oMi[joint].homogeneous
+            keyframe.transforms[path] = data.oMi[joint].homogeneous
         pieces = self.scene.geometry.geometryObjects
         for index in self._things:
-            moment.transforms[self.all[index].path] = pieces[index].placement.homogeneous
+            keyframe.transforms[self.all[index].path] = pieces[index].placement.homogeneous
         for body in self.all:
-            moment.colors[body.path] = body.color
+            keyframe.colors[body.path] = body.color
 
-    def ghost(self, stage: Stage, number: int, data: Any, color: Color) -> None:
+    def ghost(self, graph: SceneGraph, number: int, data: Any, color: Color) -> None:
         """Draw the figure and what it carries once more, transparent, at the posture of `data`."""
         root = f"{style.GHOST_NODE}/{number}"
         for body, piece in zip(self.all, self.scene.geometry.geometryObjects, strict=True):
             if body.joint == 0 and body.thing is not None:
                 continue
             path = f"{root}{body.path}"
-            stage.put(path, drawing.piece(piece.geometry, path, color))
-            stage.place(path, piece.placement.homogeneous)
-            stage.place(f"{root}{body.carrier}", data.oMi[body.joint].homogeneous)
+            graph.put(path, drawing.piece(piece.geometry, path, color))
+            graph.place(path, piece.placement.homogeneous)
+            graph.place(f"{root}{body.carrier}", data.oMi[body.joint].homogeneous)
 
-    def pose_ghost(self, moment: Moment, number: int, data: Any) -> None:
+    def pose_ghost(self, keyframe: Keyframe, number: int, data: Any) -> None:
         """Place a ghost that was drawn before where `data` has the joints."""
         for path, joint in self.carriers.items():
             if joint:
-                moment.transforms[f"{style.GHOST_NODE}/{number}{path}"] = data.oMi[joint].homogeneous
+                keyframe.transforms[f"{style.GHOST_NODE}/{number}{path}"] = data.oMi[joint].homogeneous
 
     def corners(self, data: Any, *, things: bool) -> Array:
         """Corners (n, 3) in the world of the boxes around the figure's pieces, or the things'; no plates, no glass."""

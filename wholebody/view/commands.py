@@ -1,4 +1,4 @@
-"""The commands that the page understands, as msgpack: meshcat's own, and `label` and `look` of page.js."""
+"""The commands that the page understands, as msgpack: meshcat's own, and `label` of page.js."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wholebody.view.server import ANIMATION, CAMERA, DELETE, OBJECT, PROPERTY, STOP, TRANSFORM, Command
+from wholebody.arrays import Array
+from wholebody.view.server import ANIMATION, DELETE, OBJECT, PROPERTY, STOP, TRANSFORM, Command
 
-Array = NDArray[np.float64]
 _FLOATS, _INTEGERS = 0x17, 0x16  # msgpack extension types: Float32Array, Uint32Array
 
 
@@ -27,7 +26,7 @@ def integers(values: Any) -> Any:
 
 def set_object(path: str, three: Mapping[str, Any]) -> Command:
     """Put a three.js object (its JSON form) at a node."""
-    return Command(OBJECT, path, "", _pack({"type": "set_object", "path": path, "object": dict(three)}))
+    return Command(OBJECT, path, "", pack({"type": "set_object", "path": path, "object": dict(three)}))
 
 
 def label(path: str, text: str, color: str, size: float) -> Command:
@@ -39,7 +38,7 @@ def label(path: str, text: str, color: str, size: float) -> Command:
         color: of the letters, as in CSS.
         size: height, as a fraction of the distance at which it is looked at.
     """
-    return Command(OBJECT, path, "", _pack({"type": "label", "path": path, "text": text, "color": color, "size": size}))
+    return Command(OBJECT, path, "", pack({"type": "label", "path": path, "text": text, "color": color, "size": size}))
 
 
 def set_transform(path: str, matrix: Array) -> Command:
@@ -50,42 +49,13 @@ def set_transform(path: str, matrix: Array) -> Command:
 @lru_cache(maxsize=8192)
 def set_property(path: str, name: str, value: Any) -> Command:
     """Set a property of a node's three.js object; `color` takes red, green, blue, alpha and reaches all below."""
-    payload = _pack({"type": "set_property", "path": path, "property": name, "value": value})
+    payload = pack({"type": "set_property", "path": path, "property": name, "value": value})
     return Command(PROPERTY, path, name, payload)
 
 
 def delete(path: str) -> Command:
     """Remove a node and all below it."""
-    return Command(DELETE, path, "", _pack({"type": "delete", "path": path}))
-
-
-def look(
-    target: Array,
-    fov: float,
-    *,
-    eye: Array | None = None,
-    direction: Array | None = None,
-    points: Array | None = None,
-    margin: float = 1.0,
-) -> Command:
-    """Aim the camera at a target, from `eye`, or from `direction` so that all `points` (n, 3) are in the picture.
-
-    Args:
-        target: (3,) what is in the middle.
-        fov: vertical angle of view, degrees.
-        eye: (3,) where the camera is.
-        direction: (3,) from the target towards the camera.
-        points: (n, 3) what must be seen.
-        margin: how much wider than the points the picture is, 1 being exact.
-    """
-    command: dict[str, Any] = {"type": "look", "target": np.asarray(target, dtype=float).tolist(), "fov": float(fov)}
-    if eye is not None:
-        command["eye"] = np.asarray(eye, dtype=float).tolist()
-    else:
-        command["direction"] = np.asarray(direction, dtype=float).tolist()
-        command["points"] = np.asarray(points, dtype=float).round(6).ravel().tolist()
-        command["margin"] = float(margin)
-    return Command(CAMERA, "", "", _pack(command))
+    return Command(DELETE, path, "", pack({"type": "delete", "path": path}))
 
 
 class Track(NamedTuple):
@@ -134,19 +104,19 @@ def set_animation(tracks: Sequence[Track], dt: float, frames: int, repetitions: 
         {"path": path, "clip": {"fps": 1, "name": path, "tracks": lowered}} for path, lowered in clips.items()
     ]
     options = {"play": True, "repetitions": float(repetitions)}
-    return Command(ANIMATION, "", "", _pack({"type": "set_animation", "animations": animations, "options": options}))
+    return Command(ANIMATION, "", "", pack({"type": "set_animation", "animations": animations, "options": options}))
 
 
 def stop_animation() -> Command:
     """End the motion; what it moved goes back to where it was before."""
     empty = {"type": "set_animation", "animations": [], "options": {"play": False}}
-    return Command(ANIMATION, "", STOP, _pack(empty))
+    return Command(ANIMATION, "", STOP, pack(empty))
 
 
 @lru_cache(maxsize=4096)
 def _transform_head(path: str) -> bytes:
     """All of a set_transform message before its 64 bytes of numbers: packing it each time costs ten times as much."""
-    message = _pack({"type": "set_transform", "path": path, "matrix": _extension(_FLOATS, bytes(64))})
+    message = pack({"type": "set_transform", "path": path, "matrix": _extension(_FLOATS, bytes(64))})
     return message[:-64]
 
 
@@ -156,7 +126,8 @@ def _extension(code: int, data: bytes) -> Any:
     return umsgpack.Ext(code, data)
 
 
-def _pack(message: dict[str, Any]) -> bytes:
+def pack(message: dict[str, Any]) -> bytes:
+    """A message as msgpack."""
     import umsgpack
 
     return bytes(umsgpack.packb(message))

@@ -1,4 +1,4 @@
-"""Turns a posture of a scene into a moment to show: pieces, contacts, goals, names, and where to look from."""
+"""Turns a posture of a scene into a keyframe: pieces, contacts, goals, names, and where the camera stands."""
 
 from __future__ import annotations
 
@@ -6,39 +6,37 @@ from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.view import style
-from wholebody.view.aim import aim
+from wholebody.view.blocker_markers import mark_blockers
 from wholebody.view.bodies import Bodies
-from wholebody.view.goals import Goals
-from wholebody.view.in_the_way import mark_blockers
+from wholebody.view.camera import camera_on
+from wholebody.view.contact_markers import color_contacts, mark_contacts
+from wholebody.view.goal_markers import Goals
+from wholebody.view.scene_graph import Keyframe, Marker, SceneGraph
 from wholebody.view.server import Command
-from wholebody.view.stage import Marker, Moment, Stage
-from wholebody.view.subject import Subject
-from wholebody.view.touches import color_contacts, mark_contacts
-
-Array = NDArray[np.float64]
+from wholebody.view.viewed_scene import ViewedScene
 
 
 class Composition:
-    """A scene on a stage."""
+    """A scene in a scene graph."""
 
     def __init__(
-        self, scene: Subject, stage: Stage, contact_distance: float, see_through: Collection[str], names: bool
+        self, scene: ViewedScene, graph: SceneGraph, contact_distance: float, see_through: Collection[str], names: bool
     ) -> None:
         """Keep what to draw and how; nothing is drawn before the first posture.
 
         Args:
             scene: what is shown.
-            stage: where it is shown.
+            graph: where it is shown.
             contact_distance: pieces nearer than this are shown as touching, metres.
             see_through: names of things to draw transparent.
             names: write the names of things beside them.
         """
-        self._scene, self._stage = scene, stage
+        self._scene, self._graph = scene, graph
         self._contact_distance, self._see_through, self._names = contact_distance, see_through, names
         self._state = State(scene.model)
         self._bodies: Bodies | None = None
@@ -49,7 +47,7 @@ class Composition:
         """The pieces; drawn when they are first asked for, and anew after things came or went."""
         if self._bodies is None or self._bodies.revision != self._scene.revision:
             self._bodies = Bodies(self._scene, self._see_through)
-            self._bodies.build(self._stage)
+            self._bodies.build(self._graph)
         return self._bodies
 
     def checked(self, q: Any) -> Array:
@@ -60,48 +58,48 @@ class Composition:
         """
         return np.array(self._state.update(q).q)
 
-    def moment(self, q: Array, problem: Any, blockers: Sequence[Any] = ()) -> Moment:
+    def keyframe(self, q: Array, problem: Any, blockers: Sequence[Any] = ()) -> Keyframe:
         """What is shown at a posture, with the goals of a problem if there is one, and what stands in their way."""
-        bodies, state, moment = self.bodies, self._state.update(q), Moment()
-        bodies.pose(moment, state.data)
+        bodies, state, keyframe = self.bodies, self._state.update(q), Keyframe()
+        bodies.pose(keyframe, state.data)
         contacts = self._scene.contacts(q, within=self._contact_distance)
-        color_contacts(moment, bodies, contacts)
-        mark_contacts(moment, bodies, contacts)
+        color_contacts(keyframe, bodies, contacts)
+        mark_contacts(keyframe, bodies, contacts)
         self._goals = Goals(self._scene, problem) if problem is not None else None
         if self._goals is not None:
-            self._goals.mark(moment, state)
+            self._goals.mark(keyframe, state)
         if blockers:
             asked = float(problem.clearances.max(initial=0.0))
             near = self._scene.contacts(q, within=asked + self._contact_distance)
-            mark_blockers(moment, self._scene, state, near, blockers)
+            mark_blockers(keyframe, self._scene, state, near, blockers)
         if self._names:
             for path, (name, top) in bodies.tops(state.data).items():
                 matrix = np.eye(4)
                 matrix[:3, 3] = top
-                moment.markers[path] = (Marker("label", style.LABEL, style.LABEL_SIZE, name), matrix)
-        return moment
+                keyframe.markers[path] = (Marker("label", style.LABEL, style.LABEL_SIZE, name), matrix)
+        return keyframe
 
     def ghosts(self, postures: Iterable[Array], color: style.Color) -> None:
         """Draw the figure, transparent, at these postures, in place of earlier ghosts."""
-        self._stage.remove(style.GHOST_NODE)
+        self._graph.remove(style.GHOST_NODE)
         for number, q in enumerate(postures):
-            self.bodies.ghost(self._stage, number, self._state.update(q).data, color)
+            self.bodies.ghost(self._graph, number, self._state.update(q).data, color)
 
-    def moving_ghost(self, moments: Sequence[Moment], postures: Any, color: style.Color) -> list[Array]:
-        """Add a ghost that moves to a motion's moments; return where it begins.
+    def moving_ghost(self, keyframes: Sequence[Keyframe], postures: Any, color: style.Color) -> list[Array]:
+        """Add a ghost that moves to a motion's keyframes; return where it begins.
 
         Raises:
-            InputError: not as many postures as moments, or one has the wrong shape or is not finite.
+            InputError: not as many postures as keyframes, or one has the wrong shape or is not finite.
         """
         checked = [self.checked(q) for q in postures]
-        if len(checked) != len(moments):
-            raise InputError(f"the ghost has {len(checked)} postures and the motion {len(moments)}; give as many")
+        if len(checked) != len(keyframes):
+            raise InputError(f"the ghost has {len(checked)} postures and the motion {len(keyframes)}; give as many")
         self.ghosts(checked[:1], color)
-        for moment, q in zip(moments, checked, strict=True):
-            self.bodies.pose_ghost(moment, 0, self._state.update(q).data)
+        for keyframe, q in zip(keyframes, checked, strict=True):
+            self.bodies.pose_ghost(keyframe, 0, self._state.update(q).data)
         return checked[:1]
 
-    def aim(self, postures: Iterable[Array]) -> Command:
+    def camera(self, postures: Iterable[Array]) -> Command:
         """Look at the figure so that it is in the picture at all of these postures, and the goals shown last too."""
         figure, things = [], []
         for q in postures:
@@ -110,4 +108,4 @@ class Composition:
             things.append(self.bodies.corners(state.data, things=True))
             if self._goals is not None:
                 figure.append(self._goals.targets(state))
-        return aim(np.concatenate(figure), np.concatenate(things))
+        return camera_on(np.concatenate(figure), np.concatenate(things))

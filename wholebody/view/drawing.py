@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.view import style
 from wholebody.view.commands import floats, integers
 from wholebody.view.style import Color
 
-Array = NDArray[np.float64]
 Three = dict[str, Any]
 _FRONT, _BOTH = 0, 2
 _AROUND, _ALONG = 32, 8

@@ -12,12 +12,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody import checks
+from wholebody.arrays import Array
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.geometry.placement import FARTHEST, PlacementLike, placement
 from wholebody.geometry.shapes import Shape
 from wholebody.view.style import Color
-
-Array = NDArray[np.float64]
 
 
 class Part(NamedTuple):

@@ -11,29 +11,28 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wholebody import checks
+from wholebody.arrays import Array
 from wholebody.assessment import assess
 from wholebody.errors import InputError
 from wholebody.files import check_writable, write
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
 from wholebody.view import style
-from wholebody.view.commands import look
+from wholebody.view.camera import look
 from wholebody.view.composition import Composition
 from wholebody.view.movie import check_movie, frame_times, movie
 from wholebody.view.page import live_page, static_page
+from wholebody.view.scene_graph import SceneGraph
+from wholebody.view.screenshot import Screenshots
 from wholebody.view.sender import Sender
 from wholebody.view.server import ANIMATION, CAMERA, Command
-from wholebody.view.stage import Stage
-from wholebody.view.studio import Studio
-from wholebody.view.subject import Subject, checked_subject
-
-Array = NDArray[np.float64]
+from wholebody.view.viewed_scene import ViewedScene, checked_scene
 
 DEFAULT_DT = 1 / 30  # s: postures without a time step
-AIMED_AT = 24  # postures of a motion that the camera takes into account
+CAMERA_POSTURES = 24  # postures of a motion that the camera takes into account
 
 
 class Viewer:
@@ -55,7 +54,7 @@ class Viewer:
 
     def __init__(
         self,
-        scene: Subject,
+        scene: ViewedScene,
         *,
         contact_distance: float = 0.005,
         see_through: Collection[str] = (),
@@ -80,7 +79,7 @@ class Viewer:
             InputError: not a scene, or a value of the wrong kind or out of range.
             UnknownNameError: there is no thing of a name in `see_through`.
         """
-        scene = checked_subject(scene)
+        scene = checked_scene(scene)
         contact_distance = checks.number(contact_distance, "contact_distance", -FARTHEST, FARTHEST, "m")
         see_through = checks.listed(see_through, "see_through", "['table']")
         for name in see_through:
@@ -89,9 +88,9 @@ class Viewer:
         checks.text(title, "title")
         self._host, self._port = checks.text(host, "host"), checks.whole(port, "port", 0, 65535)
         self.title = title
-        self._stage = Stage()
-        self._composition = Composition(scene, self._stage, contact_distance, tuple(see_through), names)
-        self._studio = Studio()
+        self._graph = SceneGraph()
+        self._composition = Composition(scene, self._graph, contact_distance, tuple(see_through), names)
+        self._screenshots = Screenshots()
         self._sender: Sender | None = None
         self._camera: Command | None = None
         self._seen: list[Array] = []
@@ -113,11 +112,11 @@ class Viewer:
         """
         posture = self._composition.checked(q)
         blockers = assess(problem, posture).blockers if isinstance(problem, Problem) else ()
-        moment = self._composition.moment(posture, problem, blockers)
+        keyframe = self._composition.keyframe(posture, problem, blockers)
         self._seen, self._motion = [posture], None
-        if self._stage.store.camera is None:
-            self._stage.do(self._aim())
-        self._stage.show(moment)
+        if self._graph.store.camera is None:
+            self._graph.do(self._camera_command())
+        self._graph.show(keyframe)
 
     def play(
         self, motion: Any, dt: float | None = None, *, problem: Any = None, ghost: Any = None, repeat: float = 1
@@ -141,15 +140,15 @@ class Viewer:
         step = checks.time_step(getattr(motion, "dt", DEFAULT_DT) if dt is None else dt, "dt")
         if not (isinstance(repeat, float) and math.isinf(repeat) and repeat > 0.0):
             repeat = checks.number(repeat, "repeat", 1e-3, 1e9, "times, or math.inf")
-        moments = [self._composition.moment(q, problem) for q in postures]
+        keyframes = [self._composition.keyframe(q, problem) for q in postures]
         if ghost is not None:
             followed = checks.listed(getattr(ghost, "q", ghost), "ghost", "postures, each of shape (nq,)")
-            self._ghosts = self._composition.moving_ghost(moments, followed, style.GHOST)
+            self._ghosts = self._composition.moving_ghost(keyframes, followed, style.GHOST)
         self._motion = (len(postures), step)
-        chosen = np.unique(np.linspace(0, len(postures) - 1, AIMED_AT).astype(int))
+        chosen = np.unique(np.linspace(0, len(postures) - 1, CAMERA_POSTURES).astype(int))
         self._seen = [postures[index] for index in chosen]
-        self._stage.do(self._aim())
-        self._stage.play(moments, step, repeat)
+        self._graph.do(self._camera_command())
+        self._graph.play(keyframes, step, repeat)
 
     def ghosts(self, postures: Sequence[ArrayLike], *, color: style.Color = style.GHOST) -> None:
         """Show more postures of the figure, transparent; in place of the ghosts that were there.
@@ -165,7 +164,7 @@ class Viewer:
         painted = checks.color(color, "color")
         self._ghosts = [self._composition.checked(q) for q in given]
         self._composition.ghosts(self._ghosts, painted)
-        self._stage.flush()
+        self._graph.flush()
 
     def look(self, eye: ArrayLike | None = None, target: ArrayLike | None = None) -> None:
         """Aim the camera; without arguments at the figure as it is shown.
@@ -187,8 +186,8 @@ class Viewer:
             camera = look(there, style.FIELD_OF_VIEW, eye=here)
         self._camera = camera
         if self._seen:
-            self._stage.do(self._aim())
-            self._stage.flush()
+            self._graph.do(self._camera_command())
+            self._graph.flush()
 
     # ---- live
 
@@ -250,7 +249,7 @@ class Viewer:
         """
         place = check_writable(checks.path(path, "path"))
         page = static_page([command for command in self._commands() if command.op != ANIMATION])
-        return write(place, self._studio.picture(page, size))
+        return write(place, self._screenshots.picture(page, size))
 
     def movie(self, path: str | os.PathLike[str], size: tuple[int, int] = (640, 480), fps: float | None = None) -> Path:
         """Write the motion that was played last as a GIF or an MP4, by the ending of the path.
@@ -273,15 +272,15 @@ class Viewer:
         count, dt = self._motion
         place = check_writable(check_movie(path))
         times, fps = frame_times(place, count, dt, fps)
-        return write(place, movie(place.suffix, self._studio.pictures(page, size, times), fps))
+        return write(place, movie(place.suffix, self._screenshots.pictures(page, size, times), fps))
 
     def close(self) -> None:
         """End the live page's server and the headless browser. Doing it again does nothing."""
-        self._stage.disconnect()
+        self._graph.disconnect()
         if self._sender is not None:
             self._sender.close()
         self._sender = None
-        self._studio.close()
+        self._screenshots.close()
 
     def __enter__(self) -> Viewer:
         """Return the viewer."""
@@ -296,18 +295,18 @@ class Viewer:
     def _live(self) -> Sender:
         if self._sender is None:
             self._sender = Sender(live_page(self.title), self._host, self._port)
-            self._stage.connect(self._sender)
+            self._graph.connect(self._sender)
         return self._sender
 
-    def _aim(self) -> Command:
+    def _camera_command(self) -> Command:
         """The camera that was asked for, else one that looks at the figure in what was shown last."""
-        return self._camera or self._composition.aim([*self._seen, *self._ghosts])
+        return self._camera or self._composition.camera([*self._seen, *self._ghosts])
 
     def _commands(self) -> list[Command]:
         """What draws the picture anew, with the camera on the figure as it is now."""
         if not self._seen:
             raise InputError("nothing is shown yet; call show(q) or play(motion) first")
-        return [self._aim() if command.op == CAMERA else command for command in self._stage.store.commands()]
+        return [self._camera_command() if command.op == CAMERA else command for command in self._graph.store.commands()]
 
 
 def _seconds(timeout: object) -> float:

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.geometry.sweep import Sweep
+from wholebody.geometry.continuous.sweep import Sweep
 
 CLEARANCE = 0.005
 STEPS = {1e-3: 60, 1e-2: 60, 0.1: 40, 1.0: 40}

@@ -66,8 +66,8 @@ CALLS: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     ("wb.DampedLeastSquares", (("tolerance", "1e-5"), ("iterations", "50"), ("time_limit", "2.0"))),
     ("wb.solve", (("problem", "problem"), ("method", "'qp'"))),
     ("wb.assess", (("problem", "problem"), ("q", "figure.neutral"))),
-    ("wb.pull", (("problem", "problem"), ("path", "[(0, 0, 1.0), (0, 0.02, 1.0)]"), ("method", "'qp'"), ("goal", "0"),
-                 ("spacing", "0.05"))),
+    ("wb.follow_path", (("problem", "problem"), ("path", "[(0, 0, 1.0), (0, 0.02, 1.0)]"), ("method", "'qp'"),
+                        ("goal", "0"), ("spacing", "0.05"))),
     ("wb.Drag", (("problem", "problem"), ("method", "'qp'"), ("goal", "0"), ("dt", "0.02"))),
     ("wb.Drag(problem).to", (("target", "(0, 0, 1)"),)),
     ("wb.read_task", (("path", "task_paths()['shelf']"),)),
@@ -115,7 +115,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.bench.attack import files
 from wholebody.bench.attack.case import Verdict
-from wholebody.figures.shipped import task_paths
+from wholebody.figures.packaged_urdf import task_paths
 
 robot = Path(__file__).with_name("robot.urdf")
 figure = wb.load(robot)

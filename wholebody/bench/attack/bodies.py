@@ -103,7 +103,7 @@ def robot(rng: np.random.Generator, scale: float | None = None) -> Body:
 
 
 def _called(call: str, size: float, people: bool = False, files: Mapping[str, bytes] | None = None) -> Body:
-    from wholebody.figures.shipped import task_paths, urdf_path
+    from wholebody.figures.packaged_urdf import task_paths, urdf_path
     from wholebody.files import Scratch
 
     with Scratch() as folder:

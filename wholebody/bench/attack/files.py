@@ -12,7 +12,7 @@ import wholebody as wb
 from wholebody.bench.attack import corpus
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.mutations import mutated
-from wholebody.figures.shipped import task_paths, urdf_path
+from wholebody.figures.packaged_urdf import task_paths, urdf_path
 
 LONGEST = 1500  # characters of a refusal: more is no sentence
 HEAVIEST = 1e9  # kg, m, rad/s: numbers of a robot above this are slips

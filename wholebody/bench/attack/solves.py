@@ -88,7 +88,7 @@ def opening(title: str, figure: Body, start: Array, things: list[Thing], asked: 
     """Return the script up to the problem: figure, scene, start, goals, constraints."""
     imports = "from wholebody.bench.attack import claims\n"
     if "_path" in figure.call:
-        imports += "from wholebody.figures.shipped import task_paths, urdf_path\n"
+        imports += "from wholebody.figures.packaged_urdf import task_paths, urdf_path\n"
     lines = [
         f"figure = {figure.call}",
         "scene = wb.Scene(figure)",

@@ -11,7 +11,7 @@ from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs
 from wholebody.bench.attack.solves import Asked, opening
 from wholebody.bench.attack.things import Placed, clear, inside
-from wholebody.geometry.sweep import TOLERANCE, FirstContact
+from wholebody.geometry.continuous.sweep import TOLERANCE, FirstContact
 from wholebody.scene import Scene
 
 Array = NDArray[np.float64]

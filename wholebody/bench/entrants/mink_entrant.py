@@ -8,8 +8,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.bench.entrants.base import LADDER, Budget, Entrant
-from wholebody.bench.entrants.loop import GAIN, NEAR, STEP, Array, Loop, StepError, Stepper, kept_apart, pulls
+from wholebody.bench.entrants.loop import GAIN, NEAR, STEP, Loop, StepError, Stepper, kept_apart, pulls
 from wholebody.bench.tools.mjcf import ROOT, mjcf
 from wholebody.problem import Problem
 from wholebody.tasks import (

@@ -8,8 +8,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.bench.entrants.base import LADDER, Budget, Entrant
-from wholebody.bench.entrants.loop import GAIN, STEP, Array, Loop, StepError, Stepper, kept_apart, pulls
+from wholebody.bench.entrants.loop import GAIN, STEP, Loop, StepError, Stepper, kept_apart, pulls
 from wholebody.problem import Problem
 from wholebody.tasks import (
     CenterOfMass,

@@ -7,12 +7,12 @@ from functools import lru_cache
 import numpy as np
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.problem_sets.bodies import (
     ATTEMPTS,
     CLEARANCE,
     FEET,
     TIPS,
-    Array,
     alone,
     floor_scene,
     held_feet,

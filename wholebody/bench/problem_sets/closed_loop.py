@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.problem_sets.bodies import (
     ATTEMPTS,
     CLEARANCE,
-    Array,
     alone,
     floor_scene,
     held_feet,

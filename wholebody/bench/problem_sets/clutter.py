@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.problem_sets.bodies import (
     CLEARANCE,
     ROOM,
     TIPS,
-    Array,
     floor_scene,
     held_feet,
     human,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.problem_sets.bodies import (
     CLEARANCE,
     TIPS,
-    Array,
     floor_scene,
     held_feet,
     human,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.problem_sets.arms import KINDS, arm
-from wholebody.bench.problem_sets.bodies import ATTEMPTS, CLEARANCE, ROOM, Array, alone, floor_scene, is_free, place_of
+from wholebody.bench.problem_sets.bodies import ATTEMPTS, CLEARANCE, ROOM, alone, floor_scene, is_free, place_of
 from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
 from wholebody.bench.problem_sets.things import Occupied, add_things
 from wholebody.errors import InputError

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 import wholebody as wb
 from wholebody.errors import InputError
-from wholebody.geometry.cores import core_of
 from wholebody.geometry.placement import placement
+from wholebody.geometry.swept_points import swept_points
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ class Occupied:
             pin.updateGeometryPlacements(figure.model, data, geometry, placed, q)
             self.places += [pin.SE3(place) for place in placed.oMg]
         self.centres = np.array([place.translation for place in self.places])
-        self.reach = np.tile([core_of(shape).reach for shape in self.shapes], len(self.places) // len(self.shapes))
+        self.reach = np.tile([swept_points(shape).reach for shape in self.shapes], len(self.places) // len(self.shapes))
 
     def clear_of(self, shape: wb.Shape, at: Sequence[float] | pin.SE3, room: float) -> bool:
         """Whether a thing at a placement leaves this much room, metres, around the figure in every posture."""
@@ -44,7 +44,7 @@ class Occupied:
             there = base * piece.placement
             put = coal.Transform3s(there.rotation, there.translation)
             between = np.linalg.norm(self.centres - there.translation, axis=1)
-            near = np.flatnonzero(between < self.reach + core_of(piece.geometry).reach + room)
+            near = np.flatnonzero(between < self.reach + swept_points(piece.geometry).reach + room)
             for number in near.tolist():
                 body, place = self.shapes[number % len(self.shapes)], self.places[number]
                 other = coal.Transform3s(place.rotation, place.translation)

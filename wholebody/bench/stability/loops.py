@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.bench.stability.bodies import Builder, planar_arm
-from wholebody.bench.stability.case import Array, HardCase, Kind, Posed
+from wholebody.bench.stability.case import HardCase, Kind, Posed
 from wholebody.figures.figure import Figure
 from wholebody.problem import Problem
 from wholebody.scene import Scene

@@ -17,7 +17,7 @@ from wholebody.files import Scratch
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 from wholebody.view import Viewer
-from wholebody.view.studio import Studio
+from wholebody.view.screenshot import Screenshots
 from wholebody.view.style import FIELD_OF_VIEW
 
 Array = NDArray[np.float64]
@@ -50,27 +50,29 @@ def draw(result: Result, folder: Path, progress: Callable[[], None] = lambda: No
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.jpg"):
         old.unlink()
-    studio = Studio()
+    screenshots = Screenshots()
     drawn: Drawn = {}
     try:
         for case in result.cases:
-            drawn[case.name] = _case(case, result, folder, studio)
+            drawn[case.name] = _case(case, result, folder, screenshots)
             progress()
     finally:
-        studio.close()
+        screenshots.close()
     return drawn
 
 
-def _case(case: HardCase, result: Result, folder: Path, studio: Studio) -> list[tuple[Path, str]]:
+def _case(case: HardCase, result: Result, folder: Path, screenshots: Screenshots) -> list[tuple[Path, str]]:
     best = _best(case, result)
     answer = result.cells[case.name, best].answer if best is not None else None
     before = "the frame before" if isinstance(case.question(), Stream) else "the start"
     caption = f"The answer of {best}; transparent, {before}." if best is not None else "As it begins."
-    found = [(_picture(case, answer, None, folder / f"{case.name}.jpg", studio), caption)]
+    found = [(_picture(case, answer, None, folder / f"{case.name}.jpg", screenshots), caption)]
     for number, method in enumerate(_failing(case, result)[:MOST_FAILURES], start=1):
         cell, verdict = result.cells[case.name, method], result.verdicts[case.name, method]
         path = folder / f"{case.name}-wrong-{number}.jpg"
-        found.append((_picture(case, cell.answer, cell.judged.worst, path, studio), f"{method}: {verdict.figure}."))
+        found.append(
+            (_picture(case, cell.answer, cell.judged.worst, path, screenshots), f"{method}: {verdict.figure}.")
+        )
     return found
 
 
@@ -95,7 +97,7 @@ def _failing(case: HardCase, result: Result) -> list[str]:
     return list(found.values())
 
 
-def _picture(case: HardCase, answer: Answer | None, index: int | None, path: Path, studio: Studio) -> Path:
+def _picture(case: HardCase, answer: Answer | None, index: int | None, path: Path, screenshots: Screenshots) -> Path:
     """Draw one posture of an answer; the one that the case wants shown where `index` is None."""
     question = case.drawn()
     problem = question.problem
@@ -110,7 +112,7 @@ def _picture(case: HardCase, answer: Answer | None, index: int | None, path: Pat
             before = answer.postures[index - 1]
     if isinstance(question, Nonsense):
         before = q
-    path.write_bytes(_jpeg(studio.picture(_page(case, problem, q, before), SIZE)))
+    path.write_bytes(_jpeg(screenshots.picture(_page(case, problem, q, before), SIZE)))
     return path
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from wholebody.bench.track import Array
+from wholebody.arrays import Array
 
 REACH_COST = 1.0
 POSTURE_COST = 1e-3

@@ -6,9 +6,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.bench.tools.base import POSTURE_COST, REACH_COST, Tool
 from wholebody.bench.tools.mjcf import ROOT, mjcf
-from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Array, Track
+from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
 
 COLLISION_GAIN = 0.5 * DT  # half of what is free of a gap may be used up in one step; see `differences`
 

@@ -7,8 +7,9 @@ from typing import ClassVar
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.bench.tools.base import POSTURE_COST, REACH_COST, Tool
-from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Array, Track
+from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 
 NEAREST = 20  # pairs that its barrier looks at; it gets slower with more, and loses contacts with fewer
 BARRIER_GAIN = 0.5 / DT  # 1/s: half of what is free of a gap may be used up in one step

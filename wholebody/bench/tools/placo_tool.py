@@ -12,9 +12,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.bench.tools.base import POSTURE_COST, REACH_COST, Tool
-from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, WITHIN, Array, Track
-from wholebody.figures.shipped import urdf_path
+from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, WITHIN, Track
+from wholebody.figures.packaged_urdf import urdf_path
 
 
 class PlacoTool(Tool):

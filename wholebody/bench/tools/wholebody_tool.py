@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.tools.base import Tool
-from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Array, Track
+from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks.base import Goal, Surroundings, filled
 

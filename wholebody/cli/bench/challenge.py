@@ -25,12 +25,12 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.drag import drag_chart
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_rows
-    from wholebody.cli.demo import shipped_tasks
+    from wholebody.cli.demo import packaged_tasks
 
     frames = 60 if arguments.quick else arguments.frames
     check_count(frames, "--frames")
     facts = machine()
-    rows, every = challenge.measure(shipped_tasks()[challenge.TASK], frames, print)
+    rows, every = challenge.measure(packaged_tasks()[challenge.TASK], frames, print)
     write_rows(arguments.out / "challenge.csv", facts, rows)
     write_rows(arguments.out / "challenge-frames.csv", facts, [row for method in every.values() for row in method])
     drawn = {"challenge": drag_chart(every, arguments.out / "challenge")}

@@ -30,9 +30,9 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.machine import machine
     from wholebody.bench.report import solve_report
     from wholebody.bench.tables import write_rows
-    from wholebody.cli.demo import shipped_tasks
+    from wholebody.cli.demo import packaged_tasks
 
-    task = arguments.task or shipped_tasks()["shelf"]
+    task = arguments.task or packaged_tasks()["shelf"]
     count = 3 if arguments.quick else arguments.count
     check_count(count, "--count")
     facts = machine()

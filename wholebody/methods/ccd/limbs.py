@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from wholebody.arrays import Array
+
 Placement = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
 Line = tuple[float, float, float, float, float, float]
 

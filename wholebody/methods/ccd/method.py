@@ -9,13 +9,14 @@ from math import inf
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import posture
+from wholebody.geometry.continuous.bisection import last_free
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError
-from wholebody.methods.ccd.overlap import SHAKES
+from wholebody.methods.ccd.overlap_resolution.frames import PERTURBATIONS
+from wholebody.methods.ccd.overlap_resolution.resolver import TOLERANCE, OverlapResolver
 from wholebody.methods.ccd.reaching import Reach
-from wholebody.methods.ccd.remover import TOUCH, Remover
 from wholebody.methods.ccd.terms import read
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
@@ -24,8 +25,6 @@ from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, 
 from wholebody.problem import Problem
 from wholebody.solution import Iterate, Solution
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 DISTURBANCES = (0.0, 0.05, 0.2, 0.6)  # rad: of the first starts, from the posture at hand; later ones begin anywhere
 ROUNDS = 6  # reaching and leaving overlap by turns, from one start
@@ -43,9 +42,9 @@ class _Trial:
     error: float
     rested: bool
 
-    def better(self, other: _Trial, touch: float) -> bool:
+    def better(self, other: _Trial, tolerance: float) -> bool:
         """Less overlap first, then the smaller error."""
-        mine, theirs = max(self.overlap, touch), max(other.overlap, touch)
+        mine, theirs = max(self.overlap, tolerance), max(other.overlap, tolerance)
         return (mine, self.error) < (theirs, other.error)
 
 
@@ -172,14 +171,14 @@ class _Search:
         self._method, self._problem, self._control = method, problem, control
         request = read(problem)
         self._reach = Reach(problem.scene.figure, request, control)
-        self._touch = min(TOUCH, SHARE * method.tolerance)
-        self._remover = Remover(
+        self._tolerance = min(TOLERANCE, SHARE * method.tolerance)
+        self._resolver = OverlapResolver(
             problem.scene,
             workspace,
             problem.clearances,
             fixed=request.fixed,
             cones=request.cones,
-            touch=self._touch,
+            tolerance=self._tolerance,
             control=control,
         )
         self._rng = np.random.default_rng(method.seed)
@@ -191,14 +190,14 @@ class _Search:
     def run(self) -> _Trial:
         """The best of all starts, or the first that serves."""
         start = self._problem.scene.figure.clamp(self._problem.start)
-        self._remover.look(start)
-        free = start if self._remover.deepest <= self._touch else None
+        self._resolver.query(start)
+        free = start if self._resolver.deepest <= self._tolerance else None
         best: _Trial | None = None
         for attempt in range(1 + self._method.restarts):
             size = DISTURBANCES[attempt] if attempt < len(DISTURBANCES) else inf
             q = start if attempt == 0 else self._reach.disturbed(start, size, self._rng)
             trial = self._attempt(q, free, "" if attempt == 0 else "restart")
-            if best is None or trial.better(best, self._touch):
+            if best is None or trial.better(best, self._tolerance):
                 best = trial
             if self._serves(best):
                 self.contradictions = ()
@@ -215,17 +214,17 @@ class _Search:
     def pushed_out(self, q: Array) -> Array:
         """Where pushing a posture q (nq,) out ends, or pushing one a little beside it, where that leads farther out."""
         least, out = inf, q
-        for size in (0.0, *SHAKES):
-            shaken = self._reach.disturbed(q, size, self._rng) if size else q
-            pushed, left = self._remover.separate(shaken, self._rng)
-            if self._remover.deepest < least:
-                least, out = self._remover.deepest, pushed
+        for size in (0.0, *PERTURBATIONS):
+            perturbed = self._reach.disturbed(q, size, self._rng) if size else q
+            pushed, left = self._resolver.resolve(perturbed, self._rng)
+            if self._resolver.deepest < least:
+                least, out = self._resolver.deepest, pushed
             if not left:
                 break
         return out
 
     def _serves(self, trial: _Trial) -> bool:
-        return trial.error <= SHARE * self._method.tolerance and trial.overlap <= self._touch
+        return trial.error <= SHARE * self._method.tolerance and trial.overlap <= self._tolerance
 
     def _attempt(self, q: Array, free: Array | None, note: str) -> _Trial:
         """Reach, leave overlap, reach again: until both hold, or neither gains."""
@@ -234,19 +233,19 @@ class _Search:
             before = q
             q, reached = self._reach.run(q, SHARE * self._method.tolerance, self._method.iterations)
             self.sweeps += reached.sweeps
-            left = self._remover.look(q)
-            trial = _Trial(q, self._remover.deepest, reached.error, reached.rested)
+            left = self._resolver.query(q)
+            trial = _Trial(q, self._resolver.deepest, reached.error, reached.rested)
             if left:
-                q, left = self._remover.separate(q, self._rng)
-                trial = _Trial(q, self._remover.deepest, self._error(q), reached.rested)
+                q, left = self._resolver.resolve(q, self._rng)
+                trial = _Trial(q, self._resolver.deepest, self._error(q), reached.rested)
             if left and free is not None:
-                back = self._interpolate(free, q)
-                self._remover.look(back)
-                trial = _Trial(back, self._remover.deepest, self._error(back), True)
+                back = last_free(self._problem.scene.model, free, q, self._resolver.query, HALVINGS)
+                self._resolver.query(back)
+                trial = _Trial(back, self._resolver.deepest, self._error(back), True)
             step = float(np.abs(pin.difference(self._problem.scene.model, before, q)).max(initial=0.0))
             self.trace.append(Iterate(trial.error, trial.overlap, 0.0, step, note if turn == 0 else "overlap"))
             self._control.tell(self.trace[-1])
-            gained = best is None or trial.better(best, self._touch)
+            gained = best is None or trial.better(best, self._tolerance)
             if gained:
                 best = trial
             if self._serves(trial) or not gained or self._control.over:
@@ -257,15 +256,3 @@ class _Search:
     def _error(self, q: Array) -> float:
         """Largest error of the goals at a posture q (nq,)."""
         return self._reach.run(q, inf, 0)[1].error
-
-    def _interpolate(self, free: Array, q: Array) -> Array:
-        """The last posture without overlap on the way from a free one, by halving."""
-        model = self._problem.scene.model
-        inside, outside = 0.0, 1.0
-        for _ in range(HALVINGS):
-            middle = 0.5 * (inside + outside)
-            if self._remover.look(np.asarray(pin.interpolate(model, free, q, middle))):
-                outside = middle
-            else:
-                inside = middle
-        return np.asarray(pin.interpolate(model, free, q, inside))

@@ -8,16 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.methods.ccd.cones import guards
 from wholebody.methods.ccd.limbs import Limbs, Placement, floats, moved, rotated
 from wholebody.methods.ccd.sweep import Aims, sweep
 from wholebody.methods.ccd.terms import Request, Wish
 from wholebody.methods.control import Control
-
-Array = NDArray[np.float64]
 
 LEVER = 0.3  # m per radian: how far from its origin a frame's axes are held; about the length of a forearm
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.methods.newton.batches import OTHER_TURN, TURN, Array, Batch, Indices
+from wholebody.arrays import Array, Indices
+from wholebody.methods.newton.batches import OTHER_TURN, TURN, Batch
 
 
 class Angle(Batch):

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.geometry.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Coincide
-from wholebody.methods.passage import jumps
 from wholebody.problem import Problem
 from wholebody.workspace import Workspace
 
@@ -46,7 +46,7 @@ class ContactSet:
         self._names = tuple(piece.name for piece in workspace.geometry.geometryObjects)
         self._labels: list[str] = []
         self._joint = table.joint[table.pairs].reshape(-1, 2)
-        thin = np.array([core.width for core in table.cores])[table.pairs].reshape(-1, 2).min(axis=1)
+        thin = np.array([swept.width for swept in table.swept])[table.pairs].reshape(-1, 2).min(axis=1)
         self._bearable = np.minimum(DEEPEST, SHALLOW * thin)
         self._here: Placed | None = None
         self._there: Placed | None = None
@@ -78,7 +78,7 @@ class ContactSet:
         allowed = np.maximum(depth + MORE, self._bearable)
         if (-there.distance > allowed[there.number]).any():
             return False
-        return not jumps(self.workspace, self._here, self._there, before, after)
+        return not passes_through(self.workspace, self._here, self._there, before, after)
 
     def renew(self, data: Any, bodies: Array, world: int) -> Coincide:
         """The inequalities where `look` has just been.

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from wholebody.arrays import Array, Indices
 from wholebody.methods.newton import quaternions as quat
-from wholebody.methods.newton.batches import OTHER_TURN, PLACE, TURN, Array, Batch, Indices
+from wholebody.methods.newton.batches import OTHER_TURN, PLACE, TURN, Batch
 
 OPPOSITE = 1e-6  # of 1 + cosine: nearer to the opposite direction the error grows no more
 TOUCHING = 1e-6  # m: nearer to the place than this any direction will do

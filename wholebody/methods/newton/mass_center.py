@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from wholebody.arrays import Array, Indices
 from wholebody.methods.newton import quaternions as quat
-from wholebody.methods.newton.batches import PLACE, TURN, Array, Batch, Indices
+from wholebody.methods.newton.batches import PLACE, TURN, Batch
 
 
 class MassCenter(Batch):

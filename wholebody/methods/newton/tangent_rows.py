@@ -10,8 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.figures.state import State, Wrench
-from wholebody.methods.newton.batches import Array, Batch, Indices, Mask
+from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.tasks.base import Constraint, Goal
 

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError
-from wholebody.methods.newton.batches import Array, Batch
+from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.directions import Cone, Toward
 from wholebody.methods.newton.equations import EquationSet
 from wholebody.methods.newton.figure_bodies import FigureBodies

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.checks import number, posture, time_step
+from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import Method, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.linear_algebra.base import Pattern
 from wholebody.methods.newton.reaching import reach
 from wholebody.methods.newton.search import SHARPER, Search, Settings
-from wholebody.methods.passage import SHORT
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.solution import Solution

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.methods.qp.quadratic_program import Array
+from wholebody.arrays import Array
 
 DEPTH = 5  # steps remembered; more adds little where a handful of joints settles slowly
 STRETCH = 6.0  # an accelerated step is at most this many times the plain one

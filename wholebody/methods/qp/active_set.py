@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.methods.qp.quadratic_program import ActiveSet, Array, Mask, QPSolution, QuadraticProgram
+from wholebody.arrays import Array, Mask
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 
 BOUND_TOLERANCE = 1e-11  # rad, m: an x this far outside its box counts as inside
 ROW_TOLERANCE = 1e-11  # m: likewise for elastic rows

@@ -17,12 +17,12 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.figures.state import State, Wrench
-from wholebody.geometry.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.linearisation import Lineariser
 from wholebody.methods.control import Control
-from wholebody.methods.passage import jumps
-from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Rows, Subproblem
 from wholebody.methods.qp.visit import Local, Visit
@@ -123,7 +123,7 @@ class CurvedReach:
         return Visit(at, rows, self._subproblem.violation(rows), Placed(at.contacts, within))
 
     def _jumps(self, here: Visit, there: Visit) -> bool:
-        return jumps(self._lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
+        return passes_through(self._lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
 
     def _curvature(self, rows: Rows, push: Array) -> tuple[Array, Array]:
         """Soft rows (k, nv) and weights (k,) that stand for the positive curvature of what is pulled and held.

@@ -15,13 +15,14 @@ from dataclasses import dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from wholebody.geometry.moved_pairs import Placed
+from wholebody.arrays import Array
+from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.linearisation import Lineariser
 from wholebody.methods.control import Control
-from wholebody.methods.passage import jumps
 from wholebody.methods.qp.acceleration import Anderson
 from wholebody.methods.qp.funnel import Funnel, Outlook, Verdict
-from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
+from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import PULL, Subproblem
 from wholebody.methods.qp.visit import Local, Visit
@@ -264,7 +265,7 @@ class Descent:
         return there.violation.goal < here.violation.goal and broken < MENDABLE
 
     def _jumps(self, here: Visit, there: Visit) -> bool:
-        return jumps(self.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
+        return passes_through(self.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
 
     def _visit(self, q: Array) -> Visit:
         within = min(max(LEAST_WITHIN, PULL * self._radius), MOST_WITHIN)

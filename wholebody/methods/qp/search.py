@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.linearisation import Lineariser
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
 from wholebody.methods.qp.curved_reach import CurvedReach
 from wholebody.methods.qp.descent import Descent
-from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.visit import Local

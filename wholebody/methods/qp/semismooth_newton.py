@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from wholebody.arrays import Array, Mask
 from wholebody.methods.qp.active_set import minimise_on_face
-from wholebody.methods.qp.quadratic_program import ActiveSet, Array, Mask, QuadraticProgram
+from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 
 STILL = 1e-13  # rad, m: a step shorter than this is none
 WHOLE = 1e-9  # a step this near to the whole way is the whole way but for rounding

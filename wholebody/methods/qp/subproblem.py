@@ -11,10 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.linearisation import Linearisation
-from wholebody.methods.qp.quadratic_program import Array, QuadraticProgram
+from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.problem import Problem
 
 ALOOF = 0.01  # share of the curvature left where measures do not count: they still say which joints move

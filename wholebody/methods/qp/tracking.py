@@ -9,12 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.checks import flag, number, posture, time_step
+from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.linearisation import Linearisation
 from wholebody.methods.base import Method, goal_error, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.methods.passage import SHORT, is_free
-from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
+from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem
 from wholebody.methods.qp.working_set import WorkingSet

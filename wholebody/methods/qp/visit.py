@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from wholebody.geometry.moved_pairs import Placed
+from wholebody.arrays import Array
+from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.linearisation import Linearisation
-from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.subproblem import Rows, Violation
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.methods.qp.quadratic_program import ActiveSet, Mask, QPSolution, QuadraticProgram
+from wholebody.arrays import Mask
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 
 NEAR = 0.03  # m: rows lacking less than this at x = 0 are in from the beginning

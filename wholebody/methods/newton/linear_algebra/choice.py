@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from wholebody.arrays import Indices
 from wholebody.checks import known
-from wholebody.methods.newton.linear_algebra.base import Indices, LinearAlgebra, Pattern
+from wholebody.methods.newton.linear_algebra.base import LinearAlgebra, Pattern
 from wholebody.methods.newton.linear_algebra.dense_columns import DenseColumns
 from wholebody.methods.newton.linear_algebra.normal import NormalEquations
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite

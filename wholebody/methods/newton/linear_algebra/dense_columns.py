@@ -4,14 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.methods.newton.linear_algebra.base import (
-    Array,
-    Indices,
-    LinearSystem,
-    Pattern,
-    SingularSystemError,
-    by_normal_equations,
-)
+from wholebody.arrays import Array, Indices
+from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern, SingularSystemError, by_normal_equations
 from wholebody.methods.newton.linear_algebra.gram import Gram
 
 

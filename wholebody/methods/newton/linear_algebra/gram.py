@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.methods.newton.linear_algebra.base import Indices, Pattern
+from wholebody.arrays import Indices
+from wholebody.methods.newton.linear_algebra.base import Pattern
 
 Array = NDArray[np.float64]
 

@@ -6,13 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.methods.newton.linear_algebra.base import (
-    Array,
-    Indices,
-    LinearSystem,
-    Pattern,
-    SingularSystemError,
-)
+from wholebody.arrays import Array, Indices
+from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern, SingularSystemError
 
 LEAST_DAMPING = 1e-10  # times the largest weight's inverse: makes the matrix quasi-definite; smaller = less stable
 REFINEMENTS = 2  # steps that take the error of that out again

@@ -4,13 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.methods.newton.linear_algebra.base import (
-    Array,
-    LinearSystem,
-    Pattern,
-    SingularSystemError,
-    by_normal_equations,
-)
+from wholebody.arrays import Array
+from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern, SingularSystemError, by_normal_equations
 
 
 class Dense:

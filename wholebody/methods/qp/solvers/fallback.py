@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from wholebody.arrays import Array
 from wholebody.methods.qp.active_set import guess_active_set, solve_from
-from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
+from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.semismooth_newton import minimise
 
 SEMISMOOTH = "semismooth newton"

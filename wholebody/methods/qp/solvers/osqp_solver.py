@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
+from wholebody.arrays import Array
+from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.fallback import finish, last_resort
 

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.methods.qp.quadratic_program import Array, QuadraticProgram
+from wholebody.arrays import Array
+from wholebody.methods.qp.quadratic_program import QuadraticProgram
 
 
 class SplitForm(NamedTuple):

@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from wholebody.doctor import checks
+
+ROOT = str(Path(checks.__file__).resolve().parents[2])
+
+
+def test_what_works_works_and_what_fails_says_why() -> None:
+    outcomes = checks.run("import", ["json", "no_such_module"])
+    assert outcomes["json"].works
+    assert outcomes["json"].detail.endswith("__init__.py")
+    assert outcomes["no_such_module"] == (False, "ModuleNotFoundError: No module named 'no_such_module'")
+
+
+@pytest.fixture
+def hostile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Modules that do what broken binary packages do."""
+    (tmp_path / "crashes.py").write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    (tmp_path / "talks.py").write_text('print("[[not a report]]")')
+    (tmp_path / "hangs.py").write_text("import time; time.sleep(60)")
+    start = checks._CHILD.replace("sys.path.append({root!r})", f"sys.path += [{{root!r}}, {str(tmp_path)!r}]")
+    monkeypatch.setattr(checks, "_CHILD", start)
+    return tmp_path
+
+
+@pytest.mark.usefixtures("hostile")
+def test_a_package_that_crashes_is_named_and_the_others_are_still_tried() -> None:
+    outcomes = checks.run("import", ["json", "crashes", "talks"])
+    assert [outcome.works for outcome in outcomes.values()] == [True, False, True]
+    assert "ended the process (code -11)" in outcomes["crashes"].detail
+
+
+@pytest.mark.usefixtures("hostile")
+def test_a_package_that_hangs_is_ended() -> None:
+    outcomes = checks.run("import", ["json", "hangs"], timeout=8)
+    assert outcomes["json"].works
+    assert outcomes["hangs"] == (False, "no answer within 8 s")
+
+
+def test_the_current_folder_does_not_hide_packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "json.py").write_text("raise RuntimeError")
+    monkeypatch.chdir(tmp_path)
+    assert checks.run("import", ["colorsys"])["colorsys"].works
+
+
+@pytest.mark.parametrize("name", ["osqp", "daqp", "quadprog"])
+def test_solvers_solve(name: str) -> None:
+    assert checks.run("program", [name])[name].works
+
+
+def test_a_solver_that_is_not_there_fails() -> None:
+    assert not checks.run("program", ["no_such_solver"])["no_such_solver"].works
+
+
+def test_every_method_poses() -> None:
+    names = checks.run("methods", [""])[""].detail.split()
+    assert "qp" in names
+    assert all(outcome.works for outcome in checks.run("pose", names).values())
+
+
+def test_children_use_this_interpreter() -> None:
+    assert checks.run("import", ["os"])["os"].detail.startswith(sys.base_prefix)

@@ -1,0 +1,83 @@
+"""Which pairs moved by more than lay between them: compiled loops and array code, and points that were followed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from tests.reference import moved_pairs as reference
+from wholebody.geometry.continuous.moved_pairs import Placed, compiled_kernel, far_moved
+
+WITHIN = 0.05
+
+
+@pytest.fixture(scope="module")
+def scene() -> wb.Scene:
+    """Return a human on the floor with a few things near it."""
+    made = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    made.add(wb.Box((0.6, 1.2, 0.001)), name="plate", at=(0.4, 0.0, 0.9))
+    return made.add(wb.Sphere(0.03), name="ball", at=(0.3, 0.2, 1.1))
+
+
+def placed(scene, q):
+    with scene.lend() as workspace:
+        return Placed(workspace.near(q, WITHIN), WITHIN)
+
+
+def ways(scene, rng, count):
+    """Return postures before and after steps from a thousandth of a radian to a whole one."""
+    figure = scene.figure
+    for _ in range(count):
+        step = 10.0 ** rng.uniform(-3.0, 0.0)
+        q0 = figure.clamp(
+            pin.integrate(figure.model, figure.posture("standing"), rng.normal(size=figure.model.nv) * 0.3)
+        )
+        yield q0, figure.clamp(pin.integrate(figure.model, q0, step * rng.normal(size=figure.model.nv)))
+
+
+def test_compiled_loops_find_the_pairs_that_array_code_finds(scene):
+    found, kinds = 0, len(compiled_kernel().far_moved.signatures)
+    for q0, q1 in ways(scene, np.random.default_rng(3), 60):
+        before, after = placed(scene, q0), placed(scene, q1)
+        mine = far_moved(scene.pair_table, before, after)
+        assert np.array_equal(mine, reference.far_moved(scene.pair_table, before, after))
+        found += len(mine)
+    assert found > 20
+    assert len(compiled_kernel().far_moved.signatures) == kinds  # nothing was compiled in the middle
+
+
+def test_a_pair_that_is_left_out_had_more_room_than_its_points_moved(scene):
+    """Corners of the pieces, followed in the world and seen from the other piece; distances from Pinocchio's loop."""
+    table = scene.pair_table
+    points = [swept.points for swept in table.swept]
+    left_out = 0
+    for q0, q1 in ways(scene, np.random.default_rng(5), 10):
+        before, after = placed(scene, q0), placed(scene, q1)
+        doubted = set(far_moved(table, before, after).tolist())
+        room = table.widths + distances(scene, q0) + distances(scene, q1)
+        for number, (first, second) in enumerate(table.pairs):
+            if number in doubted or not len(points[first]) or not len(points[second]):
+                continue
+            ends = before.placements, after.placements
+            in_the_world = farthest(points[first], ends, first) + farthest(points[second], ends, second)
+            seen = min(farthest(points[second], ends, second, first), farthest(points[first], ends, first, second))
+            assert min(in_the_world, seen) <= room[number] + 1e-9
+            left_out += 1
+    assert left_out > 1000
+
+
+def farthest(points, ends, piece, carrier=None):
+    """Return the longest way of a piece's points from one end to the other, in the axes of a carrier."""
+    seen = []
+    for placements in ends:
+        at = points @ placements[piece, :3] + placements[piece, 3]
+        seen.append(at if carrier is None else (at - placements[carrier, 3]) @ placements[carrier, :3].T)
+    return np.linalg.norm(seen[1] - seen[0], axis=1).max()
+
+
+def distances(scene, q):
+    data, results = scene.model.createData(), pin.GeometryData(scene.geometry)
+    pin.computeDistances(scene.model, data, scene.geometry, results, q)
+    return np.maximum([result.min_distance for result in results.distanceResults], 0.0)

@@ -1,0 +1,157 @@
+"""Overlap removed frame by frame: free of it, within limits and cones, near to what is tracked, and back at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.geometry.penetration import global_depth
+from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
+from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
+
+
+def _wall(figure: wb.Figure) -> tuple[wb.Scene, list[Any]]:
+    scene = wb.Scene(figure).add(wb.Box((0.1, 3.0, 3.0)), name="wall", at=(0.6, 0.0, 1.5))
+    return scene, [figure.posture(name) for name in ("standing", "arms_forward", "standing")]
+
+
+def _table(figure: wb.Figure) -> tuple[wb.Scene, list[Any]]:
+    scene = wb.Scene(figure).add(wb.Box((0.6, 1.6, 0.04)), name="table", at=(0.6, 0.0, 0.95))
+    standing = figure.posture("standing")
+    above = figure.with_joints(standing, {"right_shoulder_flexion": 1.2, "right_elbow_flexion": 0.9})
+    press = figure.with_joints(above, {"right_shoulder_flexion": 0.8})
+    left = figure.with_joints(press, {"right_shoulder_abduction": -0.3})
+    return scene, [above, press, left, press, above]
+
+
+def _torso(figure: wb.Figure) -> tuple[wb.Scene, list[Any]]:
+    standing = figure.posture("standing")
+    across = {"flexion": 0.4, "rotation": 0.9, "abduction": -0.2}
+    inside = {f"right_shoulder_{name}": value for name, value in across.items()} | {"right_elbow_flexion": 1.6}
+    return wb.Scene(figure), [standing, figure.with_joints(standing, inside), standing]
+
+
+def _arms(figure: wb.Figure) -> tuple[wb.Scene, list[Any]]:
+    front = figure.posture("arms_forward")
+    crossed = {"right_shoulder_abduction": -0.5, "left_shoulder_abduction": -0.5}
+    return wb.Scene(figure), [front, figure.with_joints(front, crossed), front]
+
+
+def _corner(figure: wb.Figure) -> tuple[wb.Scene, list[Any]]:
+    scene, postures = _wall(figure)
+    scene.add(wb.Box((3.0, 0.1, 3.0)), name="side", at=(0.0, -0.4, 1.5))
+    aside = figure.with_joints(postures[1], {"right_shoulder_abduction": 0.4})
+    return scene, [postures[0], postures[1], aside, postures[1], postures[0]]
+
+
+SCENES = {"wall": _wall, "table": _table, "torso": _torso, "arms": _arms, "corner": _corner}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_no_frame_overlaps_and_the_last_is_what_is_tracked(
+    name: str,
+    avatar: wb.Figure,
+    track: Callable[..., Any],
+    deepest: Callable[..., float],
+    outside: Callable[..., float],
+) -> None:
+    scene, postures = SCENES[name](avatar)
+    frames = track(avatar, *postures)
+    rng, q, wanted_inside, pushed = np.random.default_rng(0), frames[0], 0.0, 0
+    for wanted in frames + [frames[-1]] * 30:
+        before = q
+        result = resolve_overlap(scene, q, wanted, rng)
+        q = result.q
+        assert np.isfinite(q).all()
+        assert deepest(scene, q) <= 1e-3
+        assert result.deepest == pytest.approx(deepest(scene, q), abs=5e-6)
+        assert avatar.within_limits(q)
+        assert outside(avatar, q) <= 1e-9
+        assert scene.sweep(before, q, 4e-3) is None
+        wanted_inside = max(wanted_inside, deepest(scene, wanted))
+        pushed += result.iterations > 0
+    assert wanted_inside > 0.02
+    assert pushed > 10
+    assert np.abs(pin.difference(avatar.model, q, frames[-1])).max() <= 1e-3
+
+
+def test_a_hand_slides_along_what_stops_it(avatar: wb.Figure, track: Callable[..., Any]) -> None:
+    """The tracked hand is under the table and moves sideways: the shown one stays above and moves as far."""
+    scene, postures = _table(avatar)
+    rng, q, data = np.random.default_rng(0), postures[0], avatar.model.createData()
+
+    def tip(posture: Any) -> Any:
+        pin.forwardKinematics(avatar.model, data, posture)
+        return pin.updateFramePlacement(avatar.model, data, avatar.frame_id("right_wrist")).translation.copy()
+
+    shown, tracked = [], []
+    for wanted in track(avatar, *postures[:3]):
+        q = resolve_overlap(scene, q, wanted, rng).q
+        shown.append(tip(q)[1])
+        tracked.append(tip(wanted)[1])
+    way = tracked[-1] - tracked[40]
+    assert abs(way) > 0.05
+    assert shown[-1] - shown[40] == pytest.approx(way, rel=0.5)
+
+
+def test_the_same_seed_gives_the_same_frames(avatar: wb.Figure, track: Callable[..., Any]) -> None:
+    runs = []
+    for _ in range(2):
+        scene, postures = _arms(avatar)
+        rng, q = np.random.default_rng(8), postures[0]
+        for wanted in track(avatar, *postures, frames=15):
+            q = resolve_overlap(scene, q, wanted, rng).q
+        runs.append(q)
+    assert (runs[0] == runs[1]).all()
+
+
+def test_things_that_come_over_a_limb_push_it_out(avatar: wb.Figure, deepest: Callable[..., float]) -> None:
+    scene = wb.Scene(avatar).add(wb.Box((0.2, 0.2, 0.2)), name="box", at=(1.0, -0.3, 1.0))
+    q, rng = avatar.posture("arms_forward"), np.random.default_rng(0)
+    for k in range(30):
+        scene.move("box", at=(1.0 - 0.01 * k, -0.25, 1.38))
+        q = resolve_overlap(scene, q, avatar.posture("arms_forward"), rng).q
+        assert deepest(scene, q) <= 1e-3
+
+
+def test_what_is_left_is_said_of_the_posture_that_is_shown(avatar: wb.Figure, deepest: Callable[..., float]) -> None:
+    """A thing in the pelvis, which no chain moves: nothing frees it, and no posture that was tried speaks for it."""
+    standing = avatar.posture("standing")
+    for depth in (3e-4, 2e-2):
+        scene = wb.Scene(avatar).add(wb.Box((0.1, 0.1, 0.1)), name="box", at=(-0.5, 0.0, 0.95))
+        contacts = scene.contacts(standing, within=1.0)
+        box = [k for k, pair in enumerate(contacts.pair) if "box" in {scene.piece_owner[i] for i in pair}]
+        nearest = min(box, key=lambda k: float(contacts.distance[k]))
+        assert "pelvis" in {scene.piece_owner[i] for i in contacts.pair[nearest]}
+        scene.move("box", at=(-0.5 + float(contacts.distance[nearest]) + depth, 0.0, 0.95))
+        result = resolve_overlap(scene, standing, avatar.posture("arms_forward"), np.random.default_rng(0))
+        assert deepest(scene, result.q) > 1e-4
+        assert result.deepest == pytest.approx(deepest(scene, result.q), abs=5e-6)
+
+
+def test_cancelling_normals_do_not_hold_a_link_inside(
+    planar_arm: Callable[..., Any], deepest: Callable[..., float]
+) -> None:
+    """A link on both sides of a thin wall: PD_g is zero there (figure 4b of Schmidl and Lin), the separation is not."""
+    scene = wb.Scene(planar_arm((0.3, 0.3, 0.3)))
+    scene.attach(wb.Sphere(0.02), to="link2", name="knob", at=(0.15, 0.06, 0.0))
+    scene.add(wb.Box((0.2, 0.03, 0.4)), name="wall", at=(0.75, 0.03, 0.0))
+    straight = np.zeros(3)
+    contacts = scene.contacts(straight, within=0.0)
+    assert len(contacts.distance) == 2
+    assert global_depth(-contacts.distance, contacts.normal) == pytest.approx(np.zeros(3), abs=1e-6)
+    q, left = OverlapResolver(scene, scene.workspace()).resolve(straight, np.random.default_rng(0))
+    assert not left
+    assert deepest(scene, q) <= 1e-4
+    assert np.abs(q).max() < 0.4
+
+
+@pytest.mark.parametrize("bad", [np.zeros(3), np.full(38, np.nan)])
+def test_postures_that_are_none_are_refused(bad: Any, avatar: wb.Figure) -> None:
+    with pytest.raises(wb.InputError, match="q_wanted"):
+        resolve_overlap(wb.Scene(avatar), avatar.neutral, bad, np.random.default_rng(0))

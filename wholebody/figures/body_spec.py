@@ -1,0 +1,252 @@
+"""A body as plain data, its URDF text, and Pinocchio's model and geometry of it.
+
+The builders (human, avatar, hand) write a `BodySpec`; the URDF text of it is what Pinocchio reads and what is packaged,
+so that the figure in memory and the file on disk cannot differ.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.errors import InputError
+
+
+class Solid(NamedTuple):
+    """One convex piece on a segment.
+
+    Attributes:
+        name: unique in the figure: "<segment>" or "<segment>:<k>".
+        segment: name of the segment that carries it.
+        geometry: coal's Sphere, Capsule, Box or Convex.
+        placement: of the geometry in the segment's frame.
+        mesh: for a Convex, the file (relative to the URDF) and the scale along x, y, z that give its vertices.
+    """
+
+    name: str
+    segment: str
+    geometry: Any
+    placement: pin.SE3
+    mesh: tuple[str, tuple[float, float, float]] | None = None
+
+
+class Link(NamedTuple):
+    """A segment, or a massless link between two joints of one ball joint (mass 0)."""
+
+    name: str
+    mass: float = 0.0
+    center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inertia: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class Joint(NamedTuple):
+    """A revolute joint, or a fixed one if `axis` is None; `origin` is the child's place in the parent link."""
+
+    name: str
+    parent: str
+    child: str
+    origin: pin.SE3
+    axis: tuple[float, float, float] | None
+    lower: float = 0.0
+    upper: float = 0.0
+
+
+class Landmark(NamedTuple):
+    """A frame that people reach with, fixed on a segment."""
+
+    name: str
+    segment: str
+    placement: pin.SE3
+
+
+@dataclass(frozen=True)
+class BodySpec:
+    """Everything that a URDF says about a body.
+
+    Attributes:
+        name: name of the robot in the URDF.
+        title: one line for the head of the file.
+        links: the root link first.
+        joints: in the order of the links they end in.
+        landmarks: frames to reach with.
+        solids: collision pieces, also drawn.
+    """
+
+    name: str
+    title: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    landmarks: tuple[Landmark, ...]
+    solids: tuple[Solid, ...]
+
+
+def place(x: float = 0.0, y: float = 0.0, z: float = 0.0, rotation: Array | None = None) -> pin.SE3:
+    """Return a placement from a point and, if not the identity, a rotation matrix."""
+    return pin.SE3(np.eye(3) if rotation is None else rotation, np.array([x, y, z], dtype=float))
+
+
+VIRTUAL_MASS = 1e-6
+"""Kilograms of a link between two joints of a ball joint: simulators refuse moving links without mass. It is taken from
+the next link outwards, so that the total is right."""
+
+VIRTUAL_INERTIA = 1e-9
+"""Its moment of inertia about any axis, kg m^2."""
+
+SKIN = (0.85, 0.68, 0.55, 1.0)
+"""Colour of the pieces: red, green, blue, opacity."""
+
+
+def urdf_text(spec: BodySpec, extension: str = "") -> str:
+    """Return the URDF of a body specification: metres, radians (degrees in comments), capsules marked for Pinocchio.
+
+    URDF has no capsule: a cylinder is written, with Pinocchio's ``collision_checking`` tag that makes it a capsule of
+    that length between the centres of its caps.
+
+    Args:
+        spec: the body.
+        extension: text of an element to stand at the end, see `wholebody.figures.urdf_extension`.
+    """
+    lines = [
+        '<?xml version="1.0" encoding="utf-8"?>',
+        f"<!-- {spec.title} -->",
+        f'<robot name="{spec.name}">',
+    ]
+    for link in _with_virtual_masses(spec):
+        lines += _link(link, [solid for solid in spec.solids if solid.segment == link.name])
+    for joint in spec.joints:
+        lines += _joint(joint)
+    for mark in spec.landmarks:
+        lines.append(f'  <link name="{mark.name}"/>')
+        lines += _joint(Joint(f"{mark.name}_mount", mark.segment, mark.name, mark.placement, None))
+    return "\n".join(lines) + "\n" + extension + "</robot>\n"
+
+
+def _with_virtual_masses(spec: BodySpec) -> list[Link]:
+    """The links, those without mass between two joints of a ball joint with `VIRTUAL_MASS` of the next one."""
+    outwards = {joint.parent: joint.child for joint in spec.joints}
+    moving = {joint.child for joint in spec.joints}
+    masses = {link.name: link.mass for link in spec.links}
+    taken = dict.fromkeys(masses, 0.0)
+    for link in spec.links:
+        heavy = link.name
+        while not masses[heavy] and heavy in outwards:
+            heavy = outwards[heavy]
+        if not link.mass and link.name in moving and masses[heavy]:
+            taken[heavy] += VIRTUAL_MASS
+    made = []
+    for link in spec.links:
+        if not link.mass and link.name in moving:
+            made.append(link._replace(mass=VIRTUAL_MASS, inertia=(VIRTUAL_INERTIA,) * 3))
+        else:
+            made.append(link._replace(mass=link.mass - taken[link.name]) if link.mass else link)
+    return made
+
+
+def _link(link: Link, solids: Sequence[Solid]) -> list[str]:
+    if not link.mass and not solids:
+        return [f'  <link name="{link.name}"/>']
+    lines = [f'  <link name="{link.name}">']
+    if link.mass:
+        ixx, iyy, izz = link.inertia
+        lines += [
+            "    <inertial>",
+            f'      <origin xyz="{_numbers(link.center)}"/>',
+            f'      <mass value="{_number(link.mass)}"/>',
+            f'      <inertia ixx="{_number(ixx)}" ixy="0" ixz="0" iyy="{_number(iyy)}" iyz="0" izz="{_number(izz)}"/>',
+            "    </inertial>",
+        ]
+    for tag in ("visual", "collision"):
+        for solid in solids:
+            lines += [
+                f'    <{tag} name="{solid.name}">',
+                f"      {_origin(solid.placement)}",
+                f"      <geometry>{_geometry(solid)}</geometry>",
+                f"    </{tag}>",
+            ]
+    capsules = [solid.name for solid in solids if type(solid.geometry).__name__ == "Capsule"]
+    if capsules:
+        lines.append("    <collision_checking>")
+        lines += [f'      <capsule name="{name}"/>' for name in capsules]
+        lines.append("    </collision_checking>")
+    lines.append("  </link>")
+    return lines
+
+
+def _joint(joint: Joint) -> list[str]:
+    kind = "fixed" if joint.axis is None else "revolute"
+    lines = [
+        f'  <joint name="{joint.name}" type="{kind}">',
+        f'    <parent link="{joint.parent}"/>',
+        f'    <child link="{joint.child}"/>',
+        f"    {_origin(joint.origin)}",
+    ]
+    if joint.axis is not None:
+        # URDF demands an effort and a velocity; nothing here uses them.
+        lines += [
+            f'    <axis xyz="{_numbers(joint.axis)}"/>',
+            f'    <limit lower="{_number(joint.lower)}" upper="{_number(joint.upper)}" effort="1000" velocity="10"/>'
+            f" <!-- {math.degrees(joint.lower):.4g} to {math.degrees(joint.upper):.4g} degrees -->",
+        ]
+    lines.append("  </joint>")
+    return lines
+
+
+def _geometry(solid: Solid) -> str:
+    shape, kind = solid.geometry, type(solid.geometry).__name__
+    if solid.mesh is not None:
+        file, scale = solid.mesh
+        return f'<mesh filename="{file}" scale="{_numbers(scale)}"/>'
+    if kind == "Sphere":
+        return f'<sphere radius="{_number(shape.radius)}"/>'
+    if kind == "Capsule":
+        return f'<cylinder radius="{_number(shape.radius)}" length="{_number(2.0 * shape.halfLength)}"/>'
+    if kind == "Box":
+        return f'<box size="{_numbers(2.0 * np.array(shape.halfSide))}"/>'
+    raise InputError(
+        f"piece {solid.name!r} is a {kind} without a mesh file; URDF knows spheres, cylinders, boxes, meshes"
+    )
+
+
+def _origin(placement: pin.SE3) -> str:
+    angles = pin.rpy.matrixToRpy(placement.rotation)
+    text = f'<origin xyz="{_numbers(placement.translation)}"'
+    return text + (f' rpy="{_numbers(angles)}"/>' if np.abs(angles).max() > 1e-12 else "/>")
+
+
+def _numbers(values: Sequence[float] | Array) -> str:
+    return " ".join(_number(value) for value in values)
+
+
+def _number(value: float) -> str:
+    # Twelve digits: far below a nanometre, yet stable against the last bits of different processors.
+    return f"{float(value):.12g}" if abs(value) > 1e-12 else "0"
+
+
+def model_of(spec: BodySpec) -> pin.Model:
+    """Return Pinocchio's model of a spec, with a free root, read from its URDF text (without the pieces)."""
+    model = pin.buildModelFromXML(urdf_text(replace(spec, solids=())), pin.JointModelFreeFlyer())
+    model.name = spec.name
+    return model
+
+
+def geometry_of(model: pin.Model, solids: tuple[Solid, ...], pairs: tuple[tuple[str, str], ...]) -> pin.GeometryModel:
+    """Return Pinocchio's geometry: the pieces on their segments, and the pairs that can touch."""
+    geometry = pin.GeometryModel()
+    index = {}
+    for solid in solids:
+        frame_id = model.getFrameId(solid.segment)
+        frame = model.frames[frame_id]
+        piece = pin.GeometryObject(
+            solid.name, frame.parentJoint, frame_id, frame.placement * solid.placement, solid.geometry
+        )
+        piece.meshColor[:] = SKIN
+        index[solid.name] = geometry.addGeometryObject(piece)
+    for a, b in pairs:
+        geometry.addCollisionPair(pin.CollisionPair(*sorted((index[a], index[b]))))
+    return geometry

@@ -1,0 +1,112 @@
+"""Sizes of a body that its pieces and landmarks share, in metres."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from wholebody.figures.anthropometry import Body, keyed
+
+RELAXED = 0.93
+"""The arm's circumferences were measured flexed; relaxed they are 5 to 8 % less (estimate)."""
+
+HAND_BREADTH = {"M": 0.0503, "F": 0.0480}
+"""Hand breadth as a fraction of stature (ANSUR II)."""
+
+PALM_LENGTH = {"M": 0.603, "F": 0.600}
+"""Palm length as a fraction of hand length (ANSUR II)."""
+
+FOOT_LENGTH = {"M": 0.1544, "F": 0.1513}
+"""Foot length as a fraction of stature (ANSUR II)."""
+
+EYE_HEIGHT = 0.936
+CHIN_HEIGHT = 0.870
+"""Fractions of stature (Drillis & Contini, in Winter 2009)."""
+
+
+class Finger(NamedTuple):
+    """A straight finger in the hand's frame: `x` towards the thumb, `tip` from the wrist to the end, `radius`."""
+
+    x: float
+    knuckle: float
+    tip: float
+    radius: float
+
+
+class Dimensions:
+    """Sizes of one `Body`."""
+
+    def __init__(self, person: Body) -> None:
+        """Compute the sizes of a person."""
+        self.body = person
+        height, column = person.stature, person.column
+        self.stature = height
+        toe = self.joint("left_toe_extension")
+        self.toe_joint_x = toe[0]
+        self.toe_half_height = person.segment("left_toes", "radius_b") * height
+        self.toe_length = person.segment("left_toes", "length") * height
+        self.sole = toe[2] - self.toe_half_height
+        self.heel_x = toe[0] + self.toe_length - FOOT_LENGTH[column] * height
+        self.foot_half_width = person.segment("left_foot", "radius_a") * height
+        self.hip_height = -self.sole + person.length("left_thigh") + person.length("left_shank")
+
+        self.hand_length = person.length("left_hand")
+        self.hand_breadth = HAND_BREADTH[column] * height
+        self.palm_length = PALM_LENGTH[column] * self.hand_length
+        self.palm_half_thickness = keyed_hand("palm", "depth") * self.hand_breadth
+        self.index = self._finger("index")
+
+        above = sum(self.joint(name)[2] for name in _UPWARD)
+        self.head_top = height - self.hip_height - above
+        self.head_half_breadth = person.radius("head_y")
+        self.head_half_length = person.radius("head_x")
+        self.head_bottom = self.head_top - (1.0 - CHIN_HEIGHT) * height
+        self.head_x = person.center_of_mass("head")[0]
+        self.head_radius = 0.5 * (self.head_half_breadth + self.head_half_length)
+        self.eye_z = self.head_top - (1.0 - EYE_HEIGHT) * height
+        self.eye_x = self.head_x + self.head_radius
+
+    def joint(self, name: str) -> tuple[float, float, float]:
+        """Place of a joint in its parent segment's frame."""
+        row, body = keyed("joints", "name")[name], self.body
+        x, y, z = (float(row[f"o{axis}_{body.column}"]) * body.stature for axis in "xyz")
+        return x, y, z
+
+    def _finger(self, finger: str) -> Finger:
+        length = sum(keyed_hand(f"{finger}_{part}", "length") for part in ("pp", "mp", "dp"))
+        lateral, distal = FINGER_BASES[finger]
+        return Finger(
+            lateral * self.hand_breadth,
+            distal * self.hand_length,
+            (distal + length) * self.hand_length,
+            keyed_hand(f"{finger}_mp", "width") * self.hand_breadth,
+        )
+
+
+_UPWARD = (
+    "spine1_flexion",
+    "spine2_flexion",
+    "spine3_flexion",
+    "spine4_flexion",
+    "neck1_flexion",
+    "neck2_flexion",
+)
+
+FINGER_BASES = {
+    "thumb": (0.27, 0.13),
+    "index": (0.207, 0.450),
+    "middle": (0.008, 0.447),
+    "ring": (-0.158, 0.440),
+    "little": (-0.267, 0.396),
+}
+"""Knuckles, and the root of the thumb: in hand breadths to the thumb's side, in hand lengths from the wrist."""
+
+_HAND_COLUMNS = {
+    "length": "length_frac_of_hand_length",
+    "width": "semi_axis_width_frac_of_hand_breadth",
+    "depth": "semi_axis_depth_frac_of_hand_breadth",
+}
+
+
+def keyed_hand(part: str, quantity: str) -> float:
+    """Return "length" (in hand lengths), "width" or "depth" (semi-axes, in hand breadths) of one part of the hand."""
+    return float(keyed("hand", "name")[part][_HAND_COLUMNS[quantity]])

@@ -1,0 +1,103 @@
+"""The URDF files and tasks that come with the package: where they are, and how they are written."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wholebody.errors import UnknownNameError, WholebodyError
+from wholebody.files import make_folder, write
+
+if TYPE_CHECKING:
+    from wholebody.figures.anthropometry import Body
+
+
+def urdf_folder() -> Path:
+    """Return the folder of the packaged URDFs: inside an installed package, or at the top of a checkout.
+
+    Raises:
+        WholebodyError: the installation lacks it.
+    """
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package / "urdf", package.parent / "urdf"):
+        if (folder / "human.urdf").is_file():
+            return folder
+    raise WholebodyError(f"there is no urdf folder in or beside {package}; install wholebody again")
+
+
+def urdf_path(name: str) -> Path:
+    """Return the path of a packaged URDF: "human", "avatar" or "hand".
+
+    Raises:
+        UnknownNameError: there is no such file.
+    """
+    folder = urdf_folder()
+    path = folder / f"{name}.urdf"
+    if not path.is_file():
+        raise UnknownNameError("packaged URDF", name, [file.stem for file in folder.glob("*.urdf")])
+    return path
+
+
+def task_paths() -> dict[str, Path]:
+    """Return the packaged task files by name: inside an installed package, or among the examples of a checkout.
+
+    Raises:
+        WholebodyError: the installation lacks them.
+    """
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package / "examples", package.parent / "examples" / "tasks"):
+        if (folder / "shelf.toml").is_file():
+            return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    raise WholebodyError(f"there are no examples in or beside {package}; install wholebody again")
+
+
+def write_human(path: str | os.PathLike[str], person: Body) -> None:
+    """Write the URDF of a person, pieces as capsules and boxes."""
+    from wholebody.figures.body_spec import urdf_text
+    from wholebody.figures.human import human_spec
+    from wholebody.figures.human_figure import figure_of
+    from wholebody.figures.urdf_extension import extension_text
+
+    spec = human_spec(person)
+    _write(Path(path), urdf_text(spec, extension_text(figure_of(spec, "capsules"))))
+
+
+def packaged_files() -> dict[str, str]:
+    """Return the text of every packaged file below ``urdf/``: the median man, his avatar and his right hand."""
+    from wholebody.figures.body_spec import urdf_text
+    from wholebody.figures.hand import MESH, hand_figure, hand_spec
+    from wholebody.figures.human import human_spec
+    from wholebody.figures.human_figure import avatar_figure, avatar_spec, human_figure
+    from wholebody.figures.urdf_extension import extension_text
+
+    return {
+        "human.urdf": urdf_text(human_spec(), extension_text(human_figure())),
+        "avatar.urdf": urdf_text(avatar_spec(), extension_text(avatar_figure())),
+        "hand.urdf": urdf_text(hand_spec(), extension_text(hand_figure())),
+        MESH: ellipsoid_stl(),
+    }
+
+
+def write_packaged(folder: str | os.PathLike[str]) -> None:
+    """Write every packaged file below a folder."""
+    for name, text in packaged_files().items():
+        _write(Path(folder) / name, text)
+
+
+def ellipsoid_stl() -> str:
+    """Return the unit polyhedron of the hand's parts as an ASCII STL."""
+    from wholebody.figures import hulls
+
+    vertices, triangles = hulls.unit_sphere()
+    lines = ["solid ellipsoid"]
+    for triangle in triangles:
+        lines += ["facet normal 0 0 0", "outer loop"]
+        lines += [f"vertex {' '.join(f'{value + 0.0:.12g}' for value in vertices[k].round(15))}" for k in triangle]
+        lines += ["endloop", "endfacet"]
+    return "\n".join([*lines, "endsolid ellipsoid"]) + "\n"
+
+
+def _write(path: Path, text: str) -> None:
+    make_folder(path.parent)
+    write(path, text)

@@ -1,0 +1,1 @@
+"""Continuous collision detection: what happens between two postures, not only at them."""

@@ -1,0 +1,139 @@
+"""How fast pieces can approach each other on the way from one posture to another.
+
+On the geodesic q(t) = integrate(q0, t v), v = difference(q0, q1), every joint turns with a twist (l, w) that is
+constant in its own frame. A point at distance r from the joint's origin then moves, relative to the joint's base,
+with a speed of at most |l| + |w| r, and r is at most the sum of the distances between the moving joints on the way to
+the point, plus the travel of the sliding ones: lengths that do not change, because what lies between two moving
+joints is rigid. The speed of approach of two pieces is at most the sum over the joints that carry exactly one of them
+(common ancestors move both).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.arrays import Array
+from wholebody.errors import InputError
+
+TURNING_AXES = ("Composite", "SphericalZYX", "Universal", "Ellipsoid")
+"""Joints whose twist is not constant along a geodesic, by a part of Pinocchio's name for them."""
+
+_NONE: Array = np.zeros((6, 0))
+
+
+class MotionBounds:
+    """Bounds for one geometry model, renewed for each motion by `update`.
+
+    Attributes:
+        speed: (n, njoints) most speed that joint j gives to a point of piece i, metres for the whole way; 0 where it
+            gives none.
+        turn: (njoints,) angle that each joint turns by on the way, radians.
+    """
+
+    def __init__(self, model: pin.Model, joint: NDArray[np.intp], reach: Array) -> None:
+        """Read the tree once.
+
+        Args:
+            model: the model.
+            joint: (n,) the joint that carries each piece; 0 is the world.
+            reach: (n,) radius of each piece about its origin; infinite for a half-space.
+
+        Raises:
+            InputError: a joint whose axis turns as it moves (composite, Euler angles, universal).
+        """
+        for name, kind in zip(model.names, model.joints, strict=True):
+            if any(word in kind.shortname() for word in TURNING_AXES):
+                raise InputError(
+                    f"joint {name} is a {kind.shortname()}, whose motion between two postures cannot be bounded; "
+                    "use single joints in a row, or a spherical joint"
+                )
+        self.model, self.joint, self.reach = model, joint, reach
+        self.carries: NDArray[np.bool_] = np.zeros((model.njoints, model.njoints), dtype=bool)
+        for j in range(1, model.njoints):
+            self.carries[j] = self.carries[model.parents[j]]
+            self.carries[j, j] = True
+        self.turn: Array = np.zeros(model.njoints)
+        self._slide: Array = np.zeros(model.njoints)
+        self.speed: Array = np.zeros((len(joint), model.njoints))
+        self._finite = np.isfinite(reach)
+        self._size = np.where(self._finite, reach, 0.0)
+        # one column a degree of freedom, in the order of the joints: a table over all pairs of them would be large
+        joints = list(model.joints)[1:]
+        sizes = np.array([joint.nvExtended for joint in joints], dtype=np.intp)
+        self._twists: Array = np.hstack([_NONE, *(np.asarray(made.createData().S).reshape(6, -1) for made in joints)])
+        self._first = np.cumsum(sizes) - sizes
+        self._column = np.array([made.idx_v + k for made in joints for k in range(made.nvExtended)], dtype=np.intp)
+        self._parents = [int(parent) for parent in model.parents]
+
+    def update(self, data: Any, velocity: Array, centers: Array) -> None:
+        """Bound the motion from where `data` is.
+
+        Args:
+            data: Pinocchio's data after forwardKinematics at the start, with `velocity`.
+            velocity: (nv,) difference of the two postures.
+            centers: (n, 3) the origins of the pieces at the start, world.
+        """
+        if len(self._first):
+            twists = np.add.reduceat(self._twists * velocity[self._column], self._first, axis=1)
+            self._slide[1:], self.turn[1:] = np.sqrt(np.einsum("ijk,ijk->ik", *[twists.reshape(2, 3, -1)] * 2))
+        origins = np.array([place.translation for place in data.oMi])
+        self.speed = self._speeds(origins, centers, self._size)
+        if not self._finite[self.joint > 0].all():
+            # Of a half-space only the part near other pieces counts: where two pieces are nearest, either of the two
+            # points gives the same speed along the normal, and all other pieces stay within this sphere.
+            travel = self.speed.sum(axis=1)
+            extent = self._size + travel
+            around = np.linalg.norm(centers[:, None] - centers, axis=2) + extent + travel[:, None]
+            wide = np.where(self._finite, around, 0.0).max(axis=1, initial=0.0)
+            self.speed = self._speeds(origins, centers, np.where(self._finite, self.reach, wide))
+
+    def _speeds(self, origins: Array, centers: Array, reach: Array) -> Array:
+        """Slides and turns of the joints times the ways from them to the pieces, along the joints that move."""
+        moving = ((self._slide > 0.0) | (self.turn > 0.0)).tolist()
+        above = [0] * len(moving)  # the joint that moves, itself or the nearest to the root
+        inner = [0] * len(moving)  # the next one from there
+        for j in range(1, len(moving)):
+            parent = above[self._parents[j]]
+            above[j], inner[j] = (j, parent) if moving[j] else (parent, 0)
+        step = origins - origins[inner]
+        lengths = (self._slide + np.sqrt(np.einsum("ij,ij->i", step, step))).tolist()
+        depth = [0.0] * len(moving)
+        for j in range(1, len(moving)):
+            if moving[j]:
+                depth[j] = depth[inner[j]] + lengths[j]
+        along, first = np.array(depth), np.array(above)[self.joint]
+        lever = centers - origins[first]
+        own = np.sqrt(np.einsum("ij,ij->i", lever, lever)) + reach
+        farthest = (own + along[first])[:, None] - along
+        return np.where(self.carries[self.joint], self._slide + self.turn * farthest, 0.0)
+
+    def approach(self, first: NDArray[np.intp], second: NDArray[np.intp]) -> Array:
+        """Most speed with which the distance of each pair can change, (k,), metres for the whole way."""
+        against = self.speed @ ~self.carries.T  # of each piece against what each joint carries
+        return np.asarray(against[first, self.joint[second]] + against[second, self.joint[first]])
+
+    def curvature(self, first: int, second: int, gap: float) -> float:
+        """Most acceleration of a point of the first piece seen from the second, metres for the whole way squared.
+
+        With the joints between the two pieces taken as a product of exponentials, the second derivative of the point
+        is a sum over pairs of joints: each speed is turned twice by every joint nearer to the second piece, and once
+        by its own.
+
+        Args:
+            first: the piece with the points; of finite reach.
+            second: the piece it is seen from.
+            gap: distance of the two now, metres.
+        """
+        a, b = self.carries[self.joint[first]], self.carries[self.joint[second]]
+        near, far = a & ~b, b & ~a
+        turn = self.turn * (near | far)
+        speed = self.speed[first] * near + self.speed[second] * far
+        # A joint under the second piece is as far from the first one's points as from the second's, the gap, and
+        # what is across the first.
+        across = max(gap, 0.0) + float(speed.sum()) + 2.0 * float(self.reach[first])
+        speed = speed + self.turn * far * across
+        return float((speed * (2.0 * turn.sum() - turn)).sum())

@@ -1,0 +1,207 @@
+"""Whether a motion passes through something: proof for most pairs, a continuous sweep for the others.
+
+Two convex pieces that are d0 apart before a motion and d1 after it can only have changed sides if they moved against
+each other by d0 + d1 and the widths of both. Where a motion is longer (a fast hand, a thin plate), the plane that parts
+them before it, carried along by one piece, may still part them after it, up to the height of the arcs that points
+describe. What is left is swept.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.arrays import Array, Indices
+from wholebody.geometry.continuous.moved_pairs import Placed, distances, far_moved
+from wholebody.geometry.proximity import Contacts, PairTable
+
+if TYPE_CHECKING:
+    from wholebody.geometry.continuous.sweep import FirstContact, Sweep
+
+
+DIP = 5e-4  # m: between two postures a piece may dip in by this much; half of the thinnest plate that counts
+OVERLAP = 2e-4  # m: overlap on the way that does not count; finer than any piece is thick
+GRAZE = 5e-4  # m: deeper than this a way goes into something; soles that are held dip in between two postures
+SHORT = 0.03  # rad, m: a shorter way of joints whose every step was looked after dips in by less than GRAZE
+HALVINGS = 3  # of a way before what is still in doubt is swept
+
+
+class Queries(Protocol):
+    """What is asked about postures between the two, as `wholebody.workspace.Workspace` answers it."""
+
+    @property
+    def model(self) -> pin.Model:
+        """The model of the figure."""
+
+    @property
+    def table(self) -> PairTable:
+        """The pieces and pairs."""
+
+    @property
+    def sweep(self) -> Sweep:
+        """Conservative advancement with the pieces where they stand now."""
+
+    def near(self, q: Array, within: float) -> Contacts:
+        """Every pair nearer than `within` metres at a posture (nq,)."""
+
+    def placements(self, q: Array) -> Array:
+        """Where all pieces are at a posture (nq,); see `Contacts.placements`."""
+
+
+def is_free(queries: Queries, before: Array, after: Array, unswept: float) -> bool:
+    """Whether the way between two postures (nq,) goes into nothing.
+
+    Args:
+        queries: of the run.
+        before: where the way begins.
+        after: where it ends.
+        unswept: radians and metres: ways up to this are taken as they are.
+    """
+    if np.isinf(unswept) or np.abs(pin.difference(queries.model, before, after)).max(initial=0.0) <= unswept:
+        return True
+    return queries.sweep.first_contact(before, after, tolerance=GRAZE) is None
+
+
+def passes_through(queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array) -> bool:
+    """Whether some pair is on other sides of each other after a motion than before it.
+
+    A pair that touches on the way and still does at the end was bumped into, which its distance tells; one that is
+    apart again was passed through. The way is halved a few times, which parts most pairs beyond doubt at a tenth of the
+    cost of a sweep; what remains is swept.
+
+    Args:
+        queries: of the run that makes the motion; its state is moved.
+        before: where the pieces are before the motion.
+        after: where they are after it.
+        q0: (nq,) posture before the motion.
+        q1: (nq,) posture after it.
+    """
+    table = queries.table
+    moved = far_moved(table, before, after)
+    if not len(moved):
+        return False
+    moved = moved[~_passing_by(queries, before, after, q0, q1, moved)]
+    doubtful = _not_parted(table, before, after, moved)
+    return bool(len(doubtful)) and _halved(queries, before, after, q0, q1, doubtful, HALVINGS)
+
+
+def _halved(
+    queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array, doubtful: Indices, halvings: int
+) -> bool:
+    table = queries.table
+    end = distances(after, len(table.pairs))
+    if not halvings:
+        return _swept_through(queries, q0, q1, doubtful, end)
+    q = pin.interpolate(queries.model, q0, q1, 0.5)
+    middle = Placed(queries.near(q, before.within), before.within)
+    inside = distances(middle, len(table.pairs))[doubtful] < -OVERLAP
+    if (inside & (end[doubtful] > -OVERLAP)).any():
+        return True
+    for first, last, start, stop in ((before, middle, q0, q), (middle, after, q, q1)):
+        still = np.intersect1d(doubtful_pairs(table, first, last), doubtful, assume_unique=True)
+        if len(still) and _halved(queries, first, last, start, stop, still, halvings - 1):
+            return True
+    return False
+
+
+def _swept_through(queries: Queries, q0: Array, q1: Array, doubtful: Indices, end: Array) -> bool:
+    """By continuous collision detection of these pairs; `end` are the distances (pairs,) after the way."""
+    while len(doubtful):
+        hit = queries.sweep.first_contact(q0, q1, queries.table.pairs[doubtful], OVERLAP)
+        if hit is None:
+            return False
+        if end[hit.index] > -OVERLAP:
+            return True
+        doubtful = doubtful[doubtful != hit.index]
+    return False
+
+
+def first_passed(
+    queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array, overlap: float
+) -> FirstContact | None:
+    """First contact of a pair that may have changed sides, and is apart after the motion; None where there is none.
+
+    Args:
+        queries: of the run.
+        before: where the pieces are before the motion.
+        after: where they are after it.
+        q0: (nq,) posture before the motion.
+        q1: (nq,) posture after it.
+        overlap: m of overlap on the way that does not count.
+    """
+    table = queries.table
+    moved = far_moved(table, before, after)
+    doubtful = moved[distances(after, len(table.pairs))[moved] > -overlap]
+    return queries.sweep.first_contact(q0, q1, table.pairs[doubtful], overlap) if len(doubtful) else None
+
+
+def doubtful_pairs(table: PairTable, before: Placed, after: Placed) -> Indices:
+    """Pairs (indices into the collision pairs) that may have changed sides between two postures."""
+    return _not_parted(table, before, after, far_moved(table, before, after))
+
+
+def _passing_by(
+    queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array, pairs: Indices
+) -> NDArray[np.bool_]:
+    """Which of these pairs keep their bounding spheres apart all the way, as a look at its middle has it.
+
+    The centres' way against each other is taken for the two chords that meet in the middle; what it leaves them by is
+    a quarter of what the middle is off the whole chord where the way is a parabola, and taken for twice that.
+    """
+    table = queries.table
+    halfway = queries.placements(np.asarray(pin.interpolate(queries.model, q0, q1, 0.5)))
+    first, second = table.pairs[pairs, 0], table.pairs[pairs, 1]
+    start, middle, end = (
+        placements[first, 3] - placements[second, 3] for placements in (before.placements, halfway, after.placements)
+    )
+    bow = middle - 0.5 * (start + end)
+    room = np.minimum(_nearest(start, middle), _nearest(middle, end)) - 0.5 * np.sqrt(np.einsum("ij,ij->i", bow, bow))
+    apart: NDArray[np.bool_] = room > table.reach[first] + table.reach[second]
+    return apart
+
+
+def _nearest(start: Array, end: Array) -> Array:
+    """Least distance (k,) of the origin from the segments between points (k, 3)."""
+    along = end - start
+    share = -np.einsum("ij,ij->i", start, along) / np.maximum(np.einsum("ij,ij->i", along, along), 1e-30)
+    point = start + np.clip(share, 0.0, 1.0)[:, None] * along
+    nearest: Array = np.sqrt(np.einsum("ij,ij->i", point, point))
+    return nearest
+
+
+def _not_parted(table: PairTable, before: Placed, after: Placed, doubtful: Indices) -> Indices:
+    """Those of these pairs that no plane parts before and after."""
+    listed = np.full(len(table.pairs), -1, dtype=np.intp)
+    listed[before.contacts.number] = np.arange(len(before.contacts.number))
+    return np.array([k for k in doubtful if not _parted(table, before, after, int(listed[k]))], dtype=np.intp)
+
+
+def _parted(table: PairTable, before: Placed, after: Placed, contact: int) -> bool:
+    """Whether the plane between two pieces before the motion still parts them after it, carried by either."""
+    if contact < 0:
+        return False
+    first, second = before.contacts.pair[contact]
+    normal = before.contacts.normal[contact]
+    for carrier, other, direction, point in (
+        (first, second, normal, before.contacts.point_a[contact]),
+        (second, first, -normal, before.contacts.point_b[contact]),
+    ):
+        swept = table.swept[other]
+        if not len(swept.points):
+            continue
+        local_normal = before.placements[carrier, :3] @ direction
+        local_point = before.placements[carrier, :3] @ (point - before.placements[carrier, 3])
+        heights = []
+        for placed in (before.placements, after.placements):
+            world = swept.points @ placed[other, :3] + placed[other, 3]
+            local = (world - placed[carrier, 3]) @ placed[carrier, :3].T
+            heights.append(float(((local - local_point) @ local_normal).min()) - swept.radius)
+        turned = after.placements[[carrier, other], :3] - before.placements[[carrier, other], :3]
+        angle = float(np.sqrt(0.5 * np.einsum("ijk,ijk->i", turned, turned)).sum())
+        arc = 0.125 * angle**2 * (swept.reach + float(np.linalg.norm(before.placements[other, 3] - point)))
+        if min(heights) - arc > -DIP:
+            return True
+    return False

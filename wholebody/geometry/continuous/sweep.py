@@ -1,0 +1,269 @@
+"""The first contact on the way from one posture to another, by conservative advancement.
+
+Each pair is safe for as long as its distance, divided by the most speed with which it can shrink
+(`wholebody.geometry.continuous.motion_bounds`), says. The motion jumps to the end of the shortest such time, asks coal
+again for the pairs that are due, and so on: nothing can be passed between two questions, however thin (Mirtich 1996;
+Zhang, Lee and Kim 2006).
+
+Pieces that slide on each other would be asked again and again. For them the distance to a plane that moves with one of
+the two pieces is bounded to second order: heights, their exact rates and a bound of their acceleration; the plane
+supports that piece, so the least height of the other bounds the distance from below, in penetration too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array, Indices
+from wholebody.errors import InputError
+from wholebody.geometry.continuous.motion_bounds import MotionBounds
+from wholebody.geometry.guesses import Guesses
+from wholebody.geometry.memory_views import distance_view, read_result
+from wholebody.geometry.proximity import SINGLY
+from wholebody.geometry.swept_points import swept_points
+
+TOLERANCE = 1e-4
+"""Depth that is not yet a contact, metres."""
+
+MOST_QUERIES = 4000
+"""Places on the way that are looked at before giving up, some 40 us each; ordinary motions take 10 to 100."""
+
+TOGETHER = 0.05
+"""Pairs due within this share of the way are asked together: a query costs more than the pairs in it."""
+
+SLOW = 3
+"""Queries after which a pair is bounded to second order, which costs more and pays only where pieces slide."""
+
+
+@dataclass(frozen=True)
+class FirstContact:
+    """Where a motion has to stop.
+
+    Attributes:
+        fraction: share of the way, 0 to 1, that is free of contact.
+        q: (nq,) the posture there; no pair is deeper in it than the tolerance allows.
+        index: the pair that touches, as an index into the geometry model's collision pairs.
+        pair: the two pieces of it.
+        distance: its signed distance there, metres.
+        certain: true if the pair does touch there; false if the sweep gave up there: the way is free so far and unknown
+            beyond.
+    """
+
+    fraction: float
+    q: Array
+    index: int
+    pair: tuple[int, int]
+    distance: float
+    certain: bool
+
+
+class Sweep:
+    """Sweeps of one model and geometry, re-used from motion to motion."""
+
+    def __init__(self, model: pin.Model, geometry: pin.GeometryModel) -> None:
+        """Read the pieces and pairs once; placements of fixed pieces may change between sweeps.
+
+        Raises:
+            InputError: a geometry that is not a convex piece, or a joint whose motion cannot be bounded.
+        """
+        self.model, self.geometry = model, geometry
+        self._data, self._results = model.createData(), pin.GeometryData(geometry)
+        self._swept = [swept_points(piece.geometry) for piece in geometry.geometryObjects]
+        joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
+        reach = np.array([swept.reach for swept in self._swept], dtype=float)
+        self._bounds = MotionBounds(model, joint, reach)
+        pairs = [[pair.first, pair.second] for pair in geometry.collisionPairs]
+        self._pairs: Indices = np.array(pairs, dtype=np.intp).reshape(-1, 2)
+        self._number = {(int(i), int(j)): k for k, (i, j) in enumerate(self._pairs)}
+        self._reach = reach[self._pairs].sum(axis=1)
+        few = len(self._pairs) < SINGLY  # else no table over all pairs of pieces is made
+        self._active = np.zeros((geometry.ngeoms,) * 2 if few else (0, 0), dtype=bool, order="F")
+        self._place(pin.neutral(model), np.zeros(model.nv))
+        pin.computeDistances(geometry, self._results)
+        self._view = distance_view(self._results.distanceResults)
+        self._guesses = Guesses(self._results)
+
+    def first_contact(
+        self, q0: Array, q1: Array, pairs: Indices | None = None, tolerance: float = TOLERANCE
+    ) -> FirstContact | None:
+        """First contact on the geodesic ``pinocchio.interpolate(model, q0, q1, t)``.
+
+        A contact is a pair deeper by `tolerance` than touching, or, if it overlaps at the start already, deeper by
+        `tolerance` than there: soles may stay on the floor and hands on a handle, and an overlap may be left, but not
+        be made worse. A motion that makes some pair deeper by `tolerance` is always reported, one that makes none
+        deeper by half of it never. So nothing thicker than twice the tolerance is ever passed.
+
+        Args:
+            q0: (nq,) where the motion starts.
+            q1: (nq,) where it ends.
+            pairs: (k, 2) the pairs of pieces to look at, collision pairs of the geometry model; all of them by default.
+            tolerance: metres.
+
+        Returns:
+            None if the whole way is free.
+
+        Raises:
+            InputError: postures of the wrong shape, not finite or with a quaternion that is not of unit length; a
+                tolerance below 1e-5 m.
+        """
+        q0, q1 = self._checked(q0, "start"), self._checked(q1, "end")
+        if not (np.isfinite(tolerance) and tolerance >= 1e-5):
+            raise InputError(f"sweep: tolerance is {tolerance!r}; give at least 1e-5 m, ten times coal's own accuracy")
+        index = np.arange(len(self._pairs)) if pairs is None else self._indices(pairs)
+        if not len(index):
+            return None
+        self._guesses.forget()  # the same motion has the same answer, whatever was swept before
+        velocity = np.asarray(pin.difference(self.model, q0, q1))
+        self._place(q0, velocity)
+        centers = np.array([place.translation for place in self._results.oMg])
+        self._bounds.update(self._data, velocity, centers)
+        speed = self._bounds.approach(self._pairs[index, 0], self._pairs[index, 1])
+        between = centers[self._pairs[index, 0]] - centers[self._pairs[index, 1]]
+        near = np.sqrt(np.einsum("ij,ij->i", between, between)) < self._reach[index] + speed
+        near &= speed > 0.0  # spheres that cannot meet on the way need no question
+        index, speed = index[near], speed[near]
+        if not len(index):
+            return None
+        return self._advance(q0, velocity, index, speed, tolerance)
+
+    def _advance(
+        self, q0: Array, velocity: Array, index: Indices, speed: Array, tolerance: float
+    ) -> FirstContact | None:
+        start = self._query(index)[:, 0]
+        level = np.minimum(start, 0.0) - tolerance
+        free = (start - level) / speed
+        asked = np.zeros(len(index), dtype=int)
+        now = 0.0
+        for _ in range(MOST_QUERIES):
+            now = float(free.min())
+            if now >= 1.0:
+                return None
+            q = np.asarray(pin.integrate(self.model, q0, now * velocity))
+            self._place(q, velocity)
+            due = np.flatnonzero(free <= now + TOGETHER)
+            rows = self._query(index[due])
+            room = rows[:, 0] - level[due]
+            worst = int(np.argmin(room))
+            if room[worst] <= 0.5 * tolerance:
+                return self._found(now, q, int(index[due[worst]]), float(rows[worst, 0]), True)
+            safe = room / speed[due]
+            asked[due] += 1
+            for k in np.flatnonzero((asked[due] > SLOW) & (safe < TOGETHER)):
+                safe[k] = max(safe[k], self._second_order(int(index[due[k]]), rows[k], float(level[due[k]])))
+            free[due] = np.maximum(free[due], now + safe)
+        worst = int(np.argmin(free))
+        q = np.asarray(pin.integrate(self.model, q0, now * velocity))
+        self._place(q, velocity)
+        distance = float(self._query(index[worst : worst + 1])[0, 0])
+        return self._found(now, q, int(index[worst]), distance, False)
+
+    def _found(self, fraction: float, q: Array, index: int, distance: float, certain: bool) -> FirstContact:
+        first, second = (int(k) for k in self._pairs[index])
+        return FirstContact(fraction, q, index, (first, second), distance, certain)
+
+    def _indices(self, pairs: Indices) -> Indices:
+        try:
+            return np.array([self._number[int(i), int(j)] for i, j in np.asarray(pairs).reshape(-1, 2)], dtype=np.intp)
+        except KeyError as missing:
+            raise InputError(f"sweep: pieces {missing.args[0]} are not a collision pair; add the pair first") from None
+
+    def _second_order(self, index: int, row: Array, level: float) -> float:
+        """Share of the way for which a plane between the pair, carried by either piece, keeps them above `level`."""
+        first, second = (int(k) for k in self._pairs[index])
+        normal = row[1:4]
+        if not normal @ normal > 0.25:
+            return 0.0
+        best = 0.0
+        for points, plane, out in ((first, second, -normal), (second, first, normal)):
+            if len(self._swept[points].points) and (
+                len(self._swept[plane].points) or np.isinf(self._swept[plane].reach)
+            ):
+                best = max(best, self._planes_keep(points, plane, self._planes(plane, out), float(row[0]), level))
+        return best
+
+    def _planes(self, piece: int, normal: Array) -> Array:
+        """Directions (k, 3) to bound a piece in, near a normal of coal's: the normal, and its face that looks there.
+
+        Any direction gives a true bound, and a wide face a useless one if it is not met exactly: where faces touch,
+        coal's normal can be 1e-4 rad off.
+        """
+        swept, rotation = self._swept[piece], self._results.oMg[piece].rotation
+        if not len(swept.faces):
+            return normal[None]
+        faces = swept.faces[:, :3] @ rotation.T
+        face = faces[int(np.argmax(faces @ normal))]
+        return face[None] if np.isinf(swept.reach) else np.array([face, normal])
+
+    def _planes_keep(self, points: int, plane: int, normals: Array, distance: float, level: float) -> float:
+        """Time until a swept point of `points` can come down to `level` over supporting planes (k, 3) of `plane`."""
+        swept, base = self._swept[points], self._swept[plane]
+        at, below = self._results.oMg[points], self._results.oMg[plane]
+        if np.isinf(base.reach):
+            heights = base.faces[0, 3] + normals @ below.translation
+        else:
+            heights = (base.points @ below.rotation.T @ normals.T).max(axis=0) + normals @ below.translation
+        corners = swept.points @ at.rotation.T + at.translation
+        room = corners @ normals.T - (heights + swept.radius + base.radius + level)
+        above = room.min(axis=0) > 0.0
+        if not above.any():
+            return 0.0
+        room = room[:, above]
+        rate = (self._velocities(points, corners) - self._velocities(plane, corners)) @ normals[above].T
+        bend = self._bounds.curvature(points, plane, distance)
+        if bend <= 0.0:
+            times = np.where(rate < 0.0, room / np.maximum(-rate, 1e-300), np.inf)
+        else:
+            times = (rate + np.sqrt(rate * rate + 2.0 * bend * room)) / bend
+        return float(times.min(axis=0).max())
+
+    def _velocities(self, piece: int, places: Array) -> Array:
+        """Velocities (k, 3) that points at `places` have with the body that carries the piece."""
+        joint = int(self._bounds.joint[piece])
+        if joint == 0:
+            return np.zeros_like(places)
+        motion = self._data.oMi[joint].act(self._data.v[joint])
+        return np.asarray(motion.linear + places @ pin.skew(motion.angular).T)
+
+    def _place(self, q: Array, velocity: Array) -> None:
+        pin.forwardKinematics(self.model, self._data, q, velocity)
+        pin.updateGeometryPlacements(self.model, self._data, self.geometry, self._results)
+
+    def _query(self, index: Indices) -> Array:
+        """Ask coal for these pairs: rows of distance, normal and the two nearest points."""
+        if len(self._active):
+            first, second = self._pairs[index, 0], self._pairs[index, 1]
+            self._active[:] = False
+            self._active[first, second] = self._active[second, first] = True
+            self._results.setActiveCollisionPairs(self.geometry, self._active, True)
+            pin.computeDistances(self.geometry, self._results)
+        else:
+            for number in index.tolist():
+                pin.computeDistance(self.geometry, self._results, number)
+        if self._view is not None:
+            return np.asarray(self._view[index])
+        return np.array([read_result(self._results.distanceResults[int(k)]) for k in index]).reshape(-1, 10)
+
+    def _checked(self, q: Array, which: str) -> Array:
+        q = np.asarray(q, dtype=float)
+        if q.shape != (self.model.nq,):
+            raise InputError(f"sweep: the {which} has shape {q.shape}; a posture has shape ({self.model.nq},)")
+        if not np.isfinite(q).all():
+            raise InputError(f"sweep: the {which} is not finite at entry {int(np.argmin(np.isfinite(q)))}")
+        if not pin.isNormalized(self.model, q, 1e-6):
+            raise InputError(f"sweep: a quaternion of the {which} is not of unit length; use pinocchio.normalize")
+        return q
+
+
+def first_contact(
+    model: pin.Model,
+    geometry: pin.GeometryModel,
+    pairs: Indices | None,
+    q0: Array,
+    q1: Array,
+    tolerance: float = TOLERANCE,
+) -> FirstContact | None:
+    """One sweep; see `Sweep.first_contact`. Who sweeps often keeps a `Sweep`."""
+    return Sweep(model, geometry).first_contact(q0, q1, pairs, tolerance)

@@ -1,0 +1,94 @@
+"""A convex piece as swept points: points plus a radius (a swept sphere), and the flat faces between them.
+
+A sphere is one point with a radius, a capsule two, a box eight points without, a hull its vertices. Distances between
+pieces are coal's; the swept points say which places of a piece can touch next when a posture changes, which one witness
+point cannot (see `wholebody.geometry.contact_rows`).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.errors import InputError
+
+
+class SweptPoints(NamedTuple):
+    """One piece as swept points, in the piece's own frame.
+
+    Attributes:
+        points: (m, 3) swept points; empty where one witness point says everything (ellipsoid, half-space).
+        radius: what is added around the points, metres.
+        faces: (f, 4) rows [n, b] with n . x <= b inside; for a capsule only the two caps' planes.
+        reach: radius about the piece's origin that contains the piece; inf for a half-space.
+        axis: unit direction of a capsule, zero for everything else.
+        width: least distance between two parallel planes that hold the piece; inf for a half-space.
+    """
+
+    points: Array
+    radius: float
+    faces: Array
+    reach: float
+    axis: Array
+    width: float
+
+
+_NONE = np.zeros((0, 3))
+_NO_FACES = np.zeros((0, 4))
+_NO_AXIS = np.zeros(3)
+_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+
+
+def swept_points(geometry: Any) -> SweptPoints:
+    """Swept points of a coal shape: Sphere, Capsule, Box, Ellipsoid, Halfspace or Convex.
+
+    Raises:
+        InputError: another kind of geometry, which has no exact distance here.
+    """
+    if isinstance(geometry, coal.Sphere):
+        return SweptPoints(
+            np.zeros((1, 3)), geometry.radius, _NO_FACES, geometry.radius, _NO_AXIS, 2.0 * geometry.radius
+        )
+    if isinstance(geometry, coal.Capsule):
+        half = geometry.halfLength
+        points = np.array([[0.0, 0.0, -half], [0.0, 0.0, half]])
+        caps = np.array([[0.0, 0.0, 1.0, half], [0.0, 0.0, -1.0, half]])
+        along = np.array([0.0, 0.0, 1.0])
+        return SweptPoints(points, geometry.radius, caps, half + geometry.radius, along, 2.0 * geometry.radius)
+    if isinstance(geometry, coal.Box):
+        half = np.array(geometry.halfSide)
+        faces = np.vstack([np.column_stack([np.eye(3), half]), np.column_stack([-np.eye(3), half])])
+        return SweptPoints(_CORNERS * half, 0.0, faces, float(np.linalg.norm(half)), _NO_AXIS, 2.0 * float(half.min()))
+    if isinstance(geometry, coal.Ellipsoid):
+        radii = geometry.radii
+        return SweptPoints(_NONE, 0.0, _NO_FACES, float(np.max(radii)), _NO_AXIS, 2.0 * float(np.min(radii)))
+    if isinstance(geometry, coal.Halfspace):
+        return SweptPoints(_NONE, 0.0, np.array([[*geometry.n, geometry.d]]), np.inf, _NO_AXIS, np.inf)
+    if isinstance(geometry, coal.Convex):
+        points = np.array(geometry.points())
+        faces = _convex_faces(geometry, points)
+        width = float((faces[:, 3] - (points @ faces[:, :3].T).min(axis=0)).min())
+        return SweptPoints(points, 0.0, faces, float(np.linalg.norm(points, axis=1).max()), _NO_AXIS, width)
+    raise InputError(
+        f"{type(geometry).__name__} is not a convex piece; use Box, Sphere, Capsule, Ellipsoid, HalfSpace, Hull or Mesh"
+    )
+
+
+def _convex_faces(geometry: Any, points: Array) -> Array:
+    """Outward planes of a coal.Convex, coplanar triangles merged."""
+    triangles = np.array([[t[0], t[1], t[2]] for t in (geometry.polygons(i) for i in range(geometry.num_polygons))])
+    a, b, c = points[triangles[:, 0]], points[triangles[:, 1]], points[triangles[:, 2]]
+    normals = np.cross(b - a, c - a)
+    length = np.linalg.norm(normals, axis=1)
+    solid = length > 1e-14
+    normals, a = normals[solid] / length[solid, None], a[solid]
+    offsets = np.einsum("ij,ij->i", normals, a)
+    inward = offsets < normals @ points.mean(axis=0)
+    normals[inward] *= -1.0
+    offsets[inward] *= -1.0
+    planes = np.column_stack([normals, offsets])
+    _, first = np.unique(np.round(planes, 7), axis=0, return_index=True)
+    return planes[np.sort(first)]

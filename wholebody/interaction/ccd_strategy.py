@@ -1,0 +1,59 @@
+"""overlap="ccd": the overlap of an articulated figure is removed limb by limb by cyclic coordinate descent."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.interaction.overlap_strategy import Resolution
+from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
+from wholebody.scene import Scene
+
+NOTED = 1e-3
+"""Depth left, metres, that a frame's note speaks of."""
+
+SPEED = 4.0
+"""rad/s at which a joint may be displaced from the tracked one, or be drawn back: fast enough to be back from 2 rad in
+half a second, and slow enough not to look like a jump."""
+
+ROOT_SPEED = 2.0  # m/s
+
+
+class CCDStrategy:
+    """Follows tracked postures by the loop of Schmidl and Lin (`wholebody.methods.ccd.overlap_resolution`)."""
+
+    sweep_tolerance = 8e-4
+
+    def __init__(self, scene: Scene, shown: Array, dt: float, seed: int) -> None:
+        """Set up for frames of `dt` seconds.
+
+        Args:
+            scene: the figure among things.
+            shown: (nq,) where the figure is.
+            dt: seconds from frame to frame.
+            seed: of the order of the chains.
+        """
+        self.scene = scene
+        self._pace = np.full(scene.model.nv, SPEED * dt)
+        if scene.figure.root == "free":
+            self._pace[:3] = ROOT_SPEED * dt
+        self._tracked = shown
+        self._rng = np.random.default_rng(seed)
+
+    def resolve(self, shown: Array, tracked: Array) -> Resolution:
+        """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""
+        pace = self._pace + np.abs(pin.difference(self.scene.model, self._tracked, tracked))
+        self._tracked = tracked
+        result = resolve_overlap(self.scene, shown, tracked, self._rng, pace)
+        note = f"{1e3 * result.deepest:.1f} mm of overlap are left" if result.deepest > NOTED else ""
+        return Resolution(
+            candidates=(result.q,),
+            contact_seconds=result.contact_seconds,
+            solve_seconds=result.ik_seconds,
+            iterations=result.iterations,
+            joints=result.joints,
+            pairs=result.pairs,
+            note=note,
+            swept=result.swept,
+        )

@@ -1,0 +1,106 @@
+"""overlap="qp": the nearest posture to the tracked one that is inside nothing, by a few programs a frame."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.interaction.attraction import Attraction, Pace
+from wholebody.interaction.overlap_strategy import Resolution
+from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
+from wholebody.methods.qp.method import QP
+from wholebody.problem import Problem
+from wholebody.scene import Scene
+from wholebody.tasks import ReachCones
+
+CLEARANCE = 1e-3
+"""Metres kept between pieces. A step is exact to first order only, and what it neglects must fit in here."""
+
+STEPS = 2
+"""Most programs a frame. One is enough in the open; the second mends what the first, exact to first order, neglected.
+More would settle limbs in fewer frames and take longer in each."""
+
+SETTLED = 1e-4
+"""Largest entry of a step, radians and metres, below which the frame is done."""
+
+SPEED = 8.0
+"""rad/s at which joints may follow: above what people do, so that what is released returns soon but not in a jump."""
+
+ROOT_SPEED = 3.0  # m/s
+ROOT_WEIGHT = 1000.0
+"""Attraction of the root against that of a joint, 1/m^2 to 1/rad^2: limbs give way before the whole body does."""
+
+RIGID_WEIGHT = 100.0
+"""Attraction of joints and of the root's turn against that of the root's place, for what gives way as a whole. A finger
+8 cm long then takes a ten-thousandth of a displacement."""
+
+
+class QPStrategy:
+    """Follows tracked postures by a tracker of `QP`."""
+
+    sweep_tolerance = 5e-5
+
+    def __init__(self, scene: Scene, start: Array, dt: float, rigid: bool) -> None:
+        """Set up for frames of `dt` seconds, from the overlap-free posture `start`, (nq,).
+
+        Args:
+            scene: the figure among things.
+            start: (nq,) where the figure is.
+            dt: seconds from frame to frame.
+            rigid: whether the figure is displaced as a whole while its joints follow the tracker.
+        """
+        self.scene, self.dt = scene, dt
+        self._pace = Pace(scene.model, pace(scene, dt))
+        self._attraction = Attraction(scene.model, start, weights(scene, rigid))
+        cones = [ReachCones()] if scene.figure.cones else []
+        self.problem = Problem(
+            scene, start, constraints=[self._pace, *cones], measures=[self._attraction], clearance=CLEARANCE
+        )
+        self._tracker = QP().tracker(self.problem, dt)
+        self._into_cones = OverlapResolver(scene, scene.workspace()).into_cones if cones else np.array
+
+    def resolve(self, shown: Array, tracked: Array) -> Resolution:
+        """One frame: from the posture that is shown towards the tracked one, as near as it can be.
+
+        Args:
+            shown: (nq,) of the frame before, overlap-free.
+            tracked: (nq,) what the tracker says.
+        """
+        workspace = self._tracker.workspace
+        proximity = workspace.proximity
+        began, queried = time.perf_counter(), proximity.seconds
+        self._attraction.toward(self._into_cones(tracked))
+        self._pace.begin(shown)
+        q = shown
+        candidates: list[Array] = []
+        while len(candidates) < STEPS:
+            step = self._tracker.step(q)
+            q = self._into_cones(step.q)  # rows are exact to first order only, and a corner of a cone is no edge
+            candidates.append(q)
+            if np.abs(step.displacement).max() < SETTLED or not step.rows:
+                break
+        contacts = workspace.near(q, 1.01 * CLEARANCE)
+        pairs = int((contacts.distance < self.problem.clearances[contacts.number] + 0.01 * CLEARANCE).sum())
+        queried = proximity.seconds - queried
+        whole = time.perf_counter() - began
+        joints = len(candidates) * (self.scene.model.njoints - 1) if pairs else 0
+        return Resolution(tuple(candidates[::-1]), queried, whole - queried, len(candidates), joints, pairs, "")
+
+
+def weights(scene: Scene, rigid: bool) -> Array:
+    """Weights (nv,) of the attraction."""
+    result = np.full(scene.model.nv, RIGID_WEIGHT if rigid else 1.0)
+    if scene.figure.root == "free":
+        result[:3] = 1.0 if rigid else ROOT_WEIGHT
+        result[3:6] = RIGID_WEIGHT if rigid else ROOT_WEIGHT
+    return result
+
+
+def pace(scene: Scene, dt: float) -> Array:
+    """How far every degree of freedom may move in a frame, (nv,)."""
+    result = np.full(scene.model.nv, SPEED * dt)
+    if scene.figure.root == "free":
+        result[:3] = ROOT_SPEED * dt
+    return result

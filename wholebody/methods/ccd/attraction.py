@@ -1,0 +1,109 @@
+"""Attraction to the tracked posture: parts of the figure move to it in short steps, or else joint by joint.
+
+The joints that are displaced are attracted back in every frame, as far as contact allows (the coach and trainee of
+Boulic and others 1997).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.arrays import Array
+from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
+from wholebody.scene import Scene
+
+LEAST_GAIN = 1e-7  # rad^2: a part that gets no nearer than this to the tracked posture stays where it is
+BLOCKED = 0.4  # a part that gains less than this share of what attraction alone would have is blocked (2 is all of it)
+ARRIVED = 1e-12  # rad^2: a part this near is there
+
+
+class Attraction:
+    """Moves the chains of one figure, and what belongs to none (the root and trunk) as one part more.
+
+    Attributes:
+        parts: degrees of freedom (k,) of each part, and how far from each of them its farthest point can be, (k,).
+        step_length: m that a part's tip moves in one step at the most.
+        free: the wanted posture overlaps nothing: then a part may go a longer way round to it.
+        limit: of work in the resolver's counts, beyond which joints are not tried one by one.
+    """
+
+    def __init__(self, scene: Scene, resolver: OverlapResolver) -> None:
+        """Say which degrees of freedom are of which chain."""
+        self._model, self._resolver = scene.model, resolver
+        self.step_length, self.limit, self.free = 0.0, 0, False
+        self.parts: list[tuple[NDArray[np.intp], Array]] = []
+        rest = np.ones(scene.model.nv, dtype=bool)
+        for chain in resolver.chains.values():
+            joints = [scene.model.joints[joint] for joint in chain.limbs.joints]
+            dofs = np.array([joint.idx_v for joint in joints], dtype=np.intp)
+            fresh = rest[dofs]
+            rest[dofs] = False
+            self.parts.append((dofs[fresh], np.array(chain.reach)[fresh]))
+        size = max([float(reach.max(initial=0.5)) for _, reach in self.parts], default=0.5)
+        others = np.flatnonzero(rest)
+        reach = np.full(len(others), 2.0 * size)
+        if scene.figure.root == "free":
+            reach[others < 3] = 1.0
+        self.parts.append((others, reach))
+
+    def step(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
+        """Move every part that is not settled a step towards the wanted posture; None where none is left to move.
+
+        Returns:
+            The posture there, (nq,), and the share of its way that each part went, (parts,).
+        """
+        way = np.asarray(pin.difference(self._model, q, wanted))
+        shares = np.zeros(len(self.parts))
+        for k, (dofs, reach) in enumerate(self.parts):
+            part = way[dofs]
+            length = float(np.abs(part) @ reach)
+            if not settled[k] and float(part @ part) >= ARRIVED:
+                shares[k] = min(1.0, self.step_length / length)
+            way[dofs] = part * shares[k]
+        if not shares.any():
+            return None
+        return np.asarray(pin.integrate(self._model, q, way)), shares
+
+    def keep_gains(self, q: Array, trial: Array, wanted: Array, shares: Array, settled: list[bool]) -> Array:
+        """Undo what brought a part no nearer to the wanted posture, and move joints one by one where a part is blocked.
+
+        Where pushing undoes what attraction did, single joints may still be free: a shoulder that takes the whole arm
+        back, although the wrist cannot straighten yet. A part for which this gains nothing either is settled.
+        """
+        before = np.asarray(pin.difference(self._model, q, wanted))
+        after = np.asarray(pin.difference(self._model, trial, wanted))
+        back = np.zeros(self._model.nv, dtype=bool)
+        slow = []
+        for k, (dofs, _) in enumerate(self.parts):
+            old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
+            if shares[k] and old - new < LEAST_GAIN and not self.free:
+                back[dofs] = True
+            if shares[k] and old - new < BLOCKED * shares[k] * old:
+                slow.append(k)
+        if back.any():
+            way = np.asarray(pin.difference(self._model, trial, q))
+            kept = np.asarray(pin.integrate(self._model, trial, np.where(back, way, 0.0)))
+            if not self._resolver.query(kept):
+                trial = kept
+        for k in slow:
+            trial, gained = self._attract_joints(trial, wanted, k)
+            settled[k] = not gained
+        if len(slow) or back.any():
+            self._resolver.query(trial)
+        return trial
+
+    def _attract_joints(self, q: Array, wanted: Array, part: int) -> tuple[Array, bool]:
+        """Move one joint after the other, from the root outwards, where that is free; whether any moved."""
+        gained = False
+        for dof, reach in zip(*self.parts[part], strict=True):
+            way = float(pin.difference(self._model, q, wanted)[dof])
+            if way * way < LEAST_GAIN or self._resolver.counts.work > self.limit:
+                continue
+            step = np.zeros(self._model.nv)
+            step[dof] = min(max(way, -self.step_length / reach), self.step_length / reach)
+            trial = np.asarray(pin.integrate(self._model, q, step))
+            if not self._resolver.query(trial):
+                q, gained = trial, True
+        return q, gained

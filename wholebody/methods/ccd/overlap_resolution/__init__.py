@@ -1,0 +1,1 @@
+"""Removal of overlap: the penetrating link of a chain, the way out for it, chain by chain, frame by frame."""

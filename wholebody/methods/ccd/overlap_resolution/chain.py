@@ -1,0 +1,179 @@
+"""One chain: cyclic coordinate descent that takes its overlapping link to the goal outside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.methods.ccd.cones import guards
+from wholebody.methods.ccd.limbs import Limbs, moved, rotated, seen_from
+from wholebody.methods.ccd.overlap_resolution.links import Link, LinkFinder, Overlap, Vector
+from wholebody.methods.ccd.sweep import Aims, sweep
+from wholebody.scene import Scene
+from wholebody.workspace import Workspace
+
+MARGIN = 2e-4  # m: how far outside a goal lies, so that the next query finds nothing
+CLOSE = 1e-4  # m: a goal nearer than this is reached
+SWEEPS = 5  # for one goal; it is set anew afterwards, so more is lost time
+SLOW = 0.9  # a sweep that leaves more than this share of the distance is the last one
+PARALLEL = 0.26  # sine of 15 degrees: a bone at a smaller angle to the obstacle's surface is nearly parallel to it
+SHORT = 0.02  # m: a link shorter than this has no direction worth the name
+
+
+class ChainResolver:
+    """A chain of the figure with its links, limits and cones.
+
+    Attributes:
+        name: the chain's name.
+        limbs: its joints.
+        reach: for each node, an upper bound of the distance from its joint to the chain's farthest point, metres.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        workspace: Workspace,
+        name: str,
+        joints: Sequence[int],
+        foreign: frozenset[int],
+        tip: int,
+        cones: Sequence[str] | None = None,
+        exact: bool = True,
+    ) -> None:
+        """Prepare a chain.
+
+        Args:
+            scene: figure and things.
+            workspace: of the run.
+            name: of the chain.
+            joints: Pinocchio's indices of its joints.
+            foreign: joints of the other chains.
+            tip: index of the frame at its end.
+            cones: names of the reach cones to keep; all of the figure's where None.
+            exact: see `LinkFinder`.
+        """
+        self.name = name
+        self.limbs = Limbs(scene.model, joints)
+        self._finder = LinkFinder(workspace, self.limbs, foreign, exact)
+        self._guards = guards(scene.figure, self.limbs, cones)
+        self._tip = _three(scene.model.frames[tip].placement.translation)
+        self._bearing = self._links_with_pieces(workspace)
+        self.reach = self._reaches(workspace)
+
+    def _links_with_pieces(self, workspace: Workspace) -> list[int]:
+        carriers = {self.limbs.carrier(int(joint)) for joint in workspace.table.joint}
+        return sorted(node for node in carriers if node >= 0)
+
+    def _reaches(self, workspace: Workspace) -> list[float]:
+        """Lengths of the bones from each joint outwards, and the size of the last link's pieces."""
+        last = self.limbs.joints[-1]
+        sizes = [
+            float(np.linalg.norm(piece.placement.translation)) + float(size)
+            for piece, size in zip(workspace.geometry.geometryObjects, workspace.table.reach, strict=True)
+            if piece.parentJoint == last
+        ]
+        reach = max([float(np.linalg.norm(self._tip)), *sizes])
+        reaches = []
+        for joint in reversed(self.limbs.joints):
+            reaches.append(reach)
+            reach += float(np.linalg.norm(workspace.model.jointPlacements[joint].translation))
+        return reaches[::-1]
+
+    def read(self, q: Array, data: Any) -> None:
+        """Take a posture q (nq,) whose joints are placed in `data`."""
+        self.limbs.read(q, data)
+        self.limbs.forward()
+        for guard in self._guards:
+            guard.read(data)
+
+    def in_cones(self, data: Any) -> bool:
+        """Whether the limbs are in their reach cones where the joints of `data` are; `read` is not needed."""
+        return all(guard.holds(data) for guard in self._guards)
+
+    def keep_cones(self) -> bool:
+        """Bring limbs that have left their reach cones back into them; true if all are inside."""
+        inside = [guard.keep() for guard in self._guards]
+        return all(inside)
+
+    def find(self, overlaps: Sequence[Overlap]) -> Link | None:
+        """The overlapping link nearest to the root; see `LinkFinder.find`."""
+        return self._finder.find(overlaps)
+
+    def push(self, link: Link, margin: float = MARGIN) -> tuple[int, ...]:
+        """Turn the chain so that the link leaves, to `margin` metres; the nodes that took part. `read` comes before."""
+        x, y, z = link.push
+        length = (x * x + y * y + z * z) ** 0.5
+        if length < 1e-9:
+            return ()
+        grow = 1.0 + margin / length
+        push = (grow * x, grow * y, grow * z)
+        inner = self._inner(link)
+        if inner and self._parallel(link, push):
+            self._translate(link, push, inner)
+            return link.nodes
+        self._reach_out(link.node, link.nodes, link.effector, push)
+        return link.nodes
+
+    def _reach_out(self, node: int, nodes: Sequence[int], effector: Vector, push: Vector) -> None:
+        """Cyclic coordinate descent from a point of a node to that point moved by a vector."""
+        limbs = self.limbs
+        goal = (effector[0] + push[0], effector[1] + push[1], effector[2] + push[2])
+        frame = limbs.frames[node]
+        local = seen_from(frame, effector[0] - frame[9], effector[1] - frame[10], effector[2] - frame[11])
+        aims = Aims()
+        aims.add(node, effector, goal)
+        steps = [(k, (0,), 1) for k in nodes]
+        left = aims.distance()
+        for _ in range(SWEEPS):
+            sweep(limbs, aims, steps)
+            limbs.forward()
+            self.keep_cones()
+            aims.here[0] = moved(limbs.frames[node], *local)
+            before, left = left, aims.distance()
+            if left < CLOSE or left > SLOW * before:
+                return
+
+    def _translate(self, link: Link, push: Vector, inner: Sequence[int]) -> None:
+        """Move the link by pure translation: its joint goes along, and its own joints keep its orientation."""
+        limbs = self.limbs
+        own = [node for node in link.nodes if node not in inner]
+        before = limbs.frames[link.node]
+        first = limbs.frames[own[-1]]
+        self._reach_out(inner[0], inner, (first[9], first[10], first[11]), push)
+        axes = [rotated(before, *axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+        for _ in range(SWEEPS):
+            frame, aims = limbs.frames[link.node], Aims()
+            for k, wanted in enumerate(axes):
+                aims.add(link.node, (frame[k], frame[3 + k], frame[6 + k]), wanted, direction=True)
+            change = sweep(limbs, aims, [(node, (0, 1, 2), 0) for node in own])
+            limbs.forward()
+            if change < CLOSE:
+                break
+        self.keep_cones()
+
+    def _inner(self, link: Link) -> tuple[int, ...]:
+        """The nodes inside of the link's own: those that move the link before it."""
+        before = [node for node in self._bearing if node < link.node and node in link.nodes]
+        return tuple(node for node in link.nodes if node <= before[-1]) if before else ()
+
+    def _parallel(self, link: Link, push: Vector) -> bool:
+        """Whether the link's bone lies nearly in the obstacle's surface."""
+        frames = self.limbs.frames
+        here = frames[link.node]
+        after = [node for node in self._bearing if node > link.node]
+        if after:
+            x, y, z = (frames[after[0]][k] - here[k] for k in (9, 10, 11))
+        else:
+            x, y, z = rotated(here, *self._tip)
+        bone = (x * x + y * y + z * z) ** 0.5
+        length = (push[0] ** 2 + push[1] ** 2 + push[2] ** 2) ** 0.5
+        along = abs(x * push[0] + y * push[1] + z * push[2])
+        return bool(bone > SHORT and along < PARALLEL * bone * length)
+
+
+def _three(vector: Any) -> Vector:
+    x, y, z = vector.tolist()
+    return x, y, z

@@ -1,0 +1,156 @@
+"""Which link of a chain overlaps nearest to the root, where, and which way is out.
+
+Equations 1 to 3 of Schmidl and Lin: the end effector is the mean of the contact points on the link, and the goal is
+that point moved by the global penetration PD_g of the link in what it overlaps. Each obstacle has its own PD_g; in a
+corner the link moves by a translation that is as long as each of them along it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.geometry.penetration import global_depth
+from wholebody.geometry.separation import least_separation
+from wholebody.methods.ccd.limbs import Limbs
+from wholebody.workspace import Workspace
+
+Vector = tuple[float, float, float]
+
+CANCELLED = 0.3  # PD_g shorter than this share of the deepest pair: normals cancel, as in figure 4b of the paper
+ROUNDS = 4  # over the obstacles of one link; two walls need one, wedges a few
+
+
+class Overlap(NamedTuple):
+    """Two pieces that are in each other: their indices and joints, depth [m], normal from a to b, points on a and b."""
+
+    a: int
+    b: int
+    joint_a: int
+    joint_b: int
+    depth: float
+    normal: Vector
+    point_a: Vector
+    point_b: Vector
+
+
+class Link(NamedTuple):
+    """A link that overlaps, and the way out.
+
+    Attributes:
+        node: its node in the chain.
+        nodes: the nodes that move it relative to what it overlaps.
+        effector: the mean of its contact points.
+        push: PD_g, the translation that takes it out.
+        depth: depth of its deepest pair, metres.
+    """
+
+    node: int
+    nodes: tuple[int, ...]
+    effector: Vector
+    push: Vector
+    depth: float
+
+
+class LinkFinder:
+    """Finds the overlapping link of one chain."""
+
+    def __init__(self, workspace: Workspace, limbs: Limbs, foreign: frozenset[int], exact: bool = True) -> None:
+        """Say which joints belong to the chain.
+
+        Args:
+            workspace: of the run.
+            limbs: the joints of the chain.
+            foreign: joints of other chains: what they carry is no link of this one, although it may move it.
+            exact: where PD_g cancels, look for the least translation that separates.
+        """
+        self._exact = exact
+        self._workspace, self._limbs = workspace, limbs
+        self._carrier = [limbs.carrier(joint) for joint in range(workspace.model.njoints)]
+        self._own = list(self._carrier)
+        for joint in range(1, workspace.model.njoints):
+            if joint not in limbs.node_of and (joint in foreign or self._own[int(workspace.model.parents[joint])] < 0):
+                self._own[joint] = -1
+        self._paths = [frozenset(path) for path in limbs.paths]
+        self._masks: dict[tuple[tuple[int, ...], str], tuple[list[int], NDArray[np.bool_]]] = {}
+
+    def find(self, overlaps: Sequence[Overlap]) -> Link | None:
+        """The overlapping link nearest to the root; None where no link of this chain overlaps what it can leave."""
+        links: dict[int, list[tuple[Overlap, bool, tuple[int, ...]]]] = {}
+        for overlap in overlaps:
+            found = self._side(overlap)
+            if found is not None:
+                links.setdefault(found[0], []).append((overlap, found[1], found[2]))
+        if not links:
+            return None
+        node = min(links)
+        deepest = max(links[node], key=lambda item: item[0].depth)
+        same = [(overlap, is_a) for overlap, is_a, nodes in links[node] if nodes == deepest[2]]
+        points = [overlap.point_a if is_a else overlap.point_b for overlap, is_a in same]
+        count = len(points)
+        x, y, z = (sum(point[k] for point in points) / count for k in range(3))
+        return Link(node, deepest[2], (x, y, z), self._push(same), deepest[0].depth)
+
+    def _side(self, overlap: Overlap) -> tuple[int, bool, tuple[int, ...]] | None:
+        """The node of the link, whether it is piece a, and the nodes that move it against the other piece."""
+        for is_a in (True, False) if self._own[overlap.joint_a] >= self._own[overlap.joint_b] else (False, True):
+            mine, other = (overlap.joint_a, overlap.joint_b) if is_a else (overlap.joint_b, overlap.joint_a)
+            node, under = self._own[mine], self._carrier[other]
+            if node >= 0:
+                common = self._paths[under] if under >= 0 else frozenset()
+                nodes = tuple(k for k in self._limbs.paths[node] if k not in common)
+                if nodes:
+                    return node, is_a, nodes
+        return None
+
+    def _push(self, overlaps: Sequence[tuple[Overlap, bool]]) -> Vector:
+        """The translation that leaves every obstacle by its PD_g."""
+        owners = self._workspace.owners
+        by_owner: dict[str, list[tuple[Overlap, bool]]] = {}
+        for overlap, is_a in overlaps:
+            by_owner.setdefault(owners[overlap.b if is_a else overlap.a], []).append((overlap, is_a))
+        pushes = [self._global_depth(owner, group) for owner, group in by_owner.items()]
+        x, y, z = pushes[0]
+        for _ in range(ROUNDS if len(pushes) > 1 else 0):
+            for px, py, pz in pushes:
+                square = px * px + py * py + pz * pz
+                shortfall = 1.0 - (x * px + y * py + z * pz) / square if square > 0.0 else 0.0
+                if shortfall > 0.0:
+                    x, y, z = x + shortfall * px, y + shortfall * py, z + shortfall * pz
+        return x, y, z
+
+    def _global_depth(self, owner: str, group: Sequence[tuple[Overlap, bool]]) -> Vector:
+        """Equation 1 for the link and one obstacle; the exact separation where the normals cancel."""
+        if len(group) == 1:
+            overlap, is_a = group[0]
+            size = -overlap.depth if is_a else overlap.depth
+            return size * overlap.normal[0], size * overlap.normal[1], size * overlap.normal[2]
+        depths = np.array([overlap.depth for overlap, _ in group])
+        normals = np.array([overlap.normal for overlap, _ in group])
+        normals[[is_a for _, is_a in group]] *= -1.0
+        x, y, z = global_depth(depths, normals).tolist()
+        if not self._exact or (x * x + y * y + z * z) ** 0.5 >= CANCELLED * float(depths.max()):
+            return x, y, z
+        return self._separation(owner, group) or (x, y, z)
+
+    def _separation(self, owner: str, group: Sequence[tuple[Overlap, bool]]) -> Vector | None:
+        """Least translation of the link's pieces out of all pieces of the obstacle; None where there is none."""
+        workspace = self._workspace
+        mine = tuple(sorted({overlap.a if is_a else overlap.b for overlap, is_a in group}))
+        if (mine, owner) not in self._masks:
+            theirs = [k for k, name in enumerate(workspace.owners) if name == owner]
+            tested = {frozenset(pair) for pair in workspace.table.pairs.tolist()}
+            mask = np.array([[frozenset((i, j)) in tested for j in theirs] for i in mine])
+            self._masks[mine, owner] = theirs, mask
+        theirs, mask = self._masks[mine, owner]
+        placed, pieces = workspace.proximity.results.oMg, workspace.geometry.geometryObjects
+        way = least_separation(
+            [(pieces[k].geometry, placed[k]) for k in mine], [(pieces[k].geometry, placed[k]) for k in theirs], mask
+        )
+        if not way.separated:
+            return None
+        x, y, z = way.translation.tolist()
+        return x, y, z

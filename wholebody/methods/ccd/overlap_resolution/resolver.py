@@ -1,0 +1,209 @@
+"""The paper's loop: chain by chain, the penetrating link nearest to the root goes out, until none penetrates."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.figures.figure import Figure
+from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.methods.ccd.limbs import movable
+from wholebody.methods.ccd.overlap_resolution.chain import MARGIN, ChainResolver
+from wholebody.methods.ccd.overlap_resolution.links import Overlap
+from wholebody.methods.control import Control
+from wholebody.scene import Scene
+from wholebody.workspace import Workspace
+
+TOLERANCE = 1e-4  # m: an overlap that does not count; coal's own accuracy is a hundredth of it
+GOALS = 8  # most goals for one chain before the next has its turn
+PASSES = 4  # most times that every chain has its turn
+SLOW = 0.8  # a goal that leaves more than this share of the link's overlap is the last one of the turn
+GAIN = 0.98  # a pass that leaves more than this share of the deepest overlap leads nowhere
+
+
+@dataclass
+class Counts:
+    """What a removal did, summed over its parts; a joint counts once for each goal that moved it."""
+
+    queries: int = 0
+    iterations: int = 0
+    joints: int = 0
+    pairs: set[tuple[int, int]] = field(default_factory=set)
+    contact_seconds: float = 0.0
+    ik_seconds: float = 0.0
+
+    @property
+    def work(self) -> int:
+        """Looks and goals together; each takes some 60 us."""
+        return self.queries + self.iterations
+
+
+class OverlapResolver:
+    """Takes overlap out of postures of one scene, re-used from posture to posture.
+
+    Attributes:
+        workspace: of the run.
+        placed: the pieces and pairs at the last query.
+        counts: what was done since it was last set.
+        deepest: deepest overlap found by the last query, metres, against the distance asked of the pair.
+        margin: how far outside links are pushed, metres.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        workspace: Workspace,
+        clearances: Array | None = None,
+        fixed: frozenset[int] = frozenset(),
+        cones: Sequence[str] | None = None,
+        tolerance: float = TOLERANCE,
+        exact: bool = True,
+        control: Control | None = None,
+    ) -> None:
+        """Prepare the chains of the figure.
+
+        Args:
+            scene: figure and things.
+            workspace: of the run, for as long as this is used.
+            clearances: (pairs,) distance asked of every collision pair, metres; zero where None.
+            fixed: Pinocchio's indices of joints that must not move.
+            cones: names of the reach cones that are kept; all of the figure's where None.
+            tolerance: overlap that does not count, metres.
+            exact: where PD_g cancels, look for the least translation that separates, which takes up to 0.1 s.
+            control: what may end the pushing.
+        """
+        self.control = Control(np.inf) if control is None else control
+        self.exact, self.margin = exact, MARGIN
+        self.scene, self.workspace, self.clearances, self.tolerance = scene, workspace, clearances, tolerance
+        self._query_distance = 0.0 if clearances is None else float(clearances.max(initial=0.0))
+        self._data = scene.model.createData()
+        self._joints = workspace.table.joint.tolist()
+        self.counts = Counts()
+        self.deepest = 0.0
+        self._fixed, self._cones = fixed, cones
+
+    @cached_property
+    def chains(self) -> dict[str, ChainResolver]:
+        """Name to chain, in the figure's order; made when something overlaps first."""
+        named = {
+            name: ([joint for joint in joints if joint not in self._fixed], tip)
+            for name, (joints, tip) in chains_of(self.scene.figure).items()
+        }
+        everything = frozenset(joint for joints, _ in named.values() for joint in joints)
+        return {
+            name: ChainResolver(
+                self.scene, self.workspace, name, joints, everything - set(joints), tip, self._cones, self.exact
+            )
+            for name, (joints, tip) in named.items()
+            if joints
+        }
+
+    def query(self, q: Array) -> list[Overlap]:
+        """What overlaps at a posture q (nq,), the deepest first."""
+        began = time.perf_counter()
+        self.counts.queries += 1
+        pin.forwardKinematics(self.scene.model, self._data, q)
+        near = self.workspace.proximity.near(self._data, self._query_distance)
+        self.placed = Placed(near, self._query_distance)
+        depth = -near.distance if self.clearances is None else self.clearances[near.number] - near.distance
+        self.deepest = float(depth.max(initial=0.0))
+        found: list[Overlap] = []
+        if self.deepest > self.tolerance:
+            rows = np.flatnonzero(depth > self.tolerance)
+            rows = rows[np.argsort(-depth[rows], kind="stable")]
+            for pair, size, normal, a, b in zip(
+                near.pair[rows].tolist(),
+                depth[rows].tolist(),
+                near.normal[rows].tolist(),
+                near.point_a[rows].tolist(),
+                near.point_b[rows].tolist(),
+                strict=True,
+            ):
+                first, second = pair
+                joints = self._joints[first], self._joints[second]
+                found.append(Overlap(first, second, *joints, size, tuple(normal), tuple(a), tuple(b)))
+                self.counts.pairs.add((first, second))
+        self.counts.contact_seconds += time.perf_counter() - began
+        return found
+
+    def resolve(self, q: Array, rng: np.random.Generator, most_work: float = np.inf) -> tuple[Array, list[Overlap]]:
+        """Push links out until nothing overlaps or nothing gains.
+
+        Args:
+            q: (nq,) posture.
+            rng: of the order in which the chains have their turns.
+            most_work: of the counts, at which no further chain has its turn.
+
+        Returns:
+            The posture, and what still overlaps in it.
+        """
+        q = q.copy()
+        overlaps = self.query(q)
+        names = list(self.chains)
+        for _ in range(PASSES):
+            if not overlaps:
+                break
+            before = self.deepest
+            for k in rng.permutation(len(names)).tolist():
+                if self.counts.work > most_work or self.control.over:
+                    break
+                overlaps = self._leave(self.chains[names[k]], q, overlaps)
+            if overlaps and self.deepest > GAIN * before:
+                break
+        return q, overlaps
+
+    def _leave(self, chain: ChainResolver, q: Array, overlaps: list[Overlap]) -> list[Overlap]:
+        """One chain leaves what it overlaps, with its goal set anew every time; q is changed in place."""
+        worst, node = np.inf, -1
+        for _ in range(GOALS):
+            link = chain.find(overlaps)
+            if link is None or (link.node == node and link.depth > SLOW * worst):
+                break
+            worst, node = link.depth, link.node
+            began = time.perf_counter()
+            chain.read(q, self._data)
+            nodes = chain.push(link, self.margin)
+            chain.limbs.write(q)
+            self.counts.ik_seconds += time.perf_counter() - began
+            self.counts.iterations += 1
+            self.counts.joints += len(nodes)
+            overlaps = self.query(q)
+            if not nodes:
+                break
+        return overlaps
+
+    def into_cones(self, q: Array) -> Array:
+        """Copy of a posture q (nq,) with its limbs turned back into their reach cones."""
+        q = q.copy()
+        pin.forwardKinematics(self.scene.model, self._data, q)
+        for chain in self.chains.values():
+            if not chain.in_cones(self._data):
+                chain.read(q, self._data)
+                chain.keep_cones()
+                chain.limbs.write(q)
+                pin.forwardKinematics(self.scene.model, self._data, q)
+        return q
+
+
+def chains_of(figure: Figure) -> Mapping[str, tuple[Sequence[int], int]]:
+    """The figure's chains as joints that can turn or slide, and their tips; one for each leaf where it has none."""
+    model = figure.model
+    if figure.chains:
+        return {
+            name: ([k for k in map(figure.joint_id, chain.joints) if movable(model, k)], figure.frame_id(chain.tip))
+            for name, chain in figure.chains.items()
+        }
+    parents = {int(model.parents[joint]) for joint in range(1, model.njoints)}
+    found = {}
+    for leaf in range(1, model.njoints):
+        if leaf not in parents:
+            path = [int(joint) for joint in model.supports[leaf] if joint > 0 and movable(model, int(joint))]
+            tips = [k for k, frame in enumerate(model.frames) if frame.parentJoint == leaf]
+            found[str(model.names[leaf])] = path, tips[-1]
+    return found

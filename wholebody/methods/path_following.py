@@ -1,0 +1,88 @@
+"""Path following with any method: a goal is brought along a path, from one intermediate goal to the next.
+
+After Choi and Cremer 1999, section 3: the intermediate goals are evenly spaced, and the last is the first that cannot
+be reached, or the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from wholebody import checks
+from wholebody.errors import InputError
+from wholebody.methods.base import Method
+from wholebody.methods.inputs import check_problem
+from wholebody.methods.moving_goals import copied, moving_goal, refuse_assembly, retarget
+from wholebody.methods.solve import method_for_motions
+from wholebody.methods.warm_start import warm_started
+from wholebody.problem import Problem
+from wholebody.solution import Solution
+from wholebody.tasks import Point
+from wholebody.tasks.inputs import FARTHEST, point
+
+Array = NDArray[np.float64]
+
+SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from nearer
+CLOSEST = 1e-6  # m: least spacing
+MOST_GOALS = 10_000
+FRAME = 1.0 / 60.0  # s: of the tracker, of which only whole solves are asked here
+
+
+def follow_path(
+    problem: Problem, path: ArrayLike, method: str | Method = "newton", *, goal: int = 0, spacing: float = SPACING
+) -> tuple[Solution, ...]:
+    """Bring a goal along a path, through evenly spaced intermediate goals.
+
+    The first corner is gone to as `solve` would. Each goal after it is solved from the posture before; one whose
+    posture lies beyond something in the way counts as not reached.
+
+    Args:
+        problem: with the goal that moves, a `Point`.
+        path: (k, 3) corners of the path, metres; the first one is where the goal is met first.
+        method: by name, set for 1e-5 and not to restart, or a configured method.
+        goal: which of the problem's goals moves.
+        spacing: metres between intermediate goals, at most.
+
+    Returns:
+        A solution for each intermediate goal; the last one is the first that was not reached, or the end of the path.
+
+    Raises:
+        InputError: the path is not one, the spacing is not positive, or the goal is not a `Point`.
+        UnknownNameError: there is no such method.
+    """
+    refuse_assembly(problem, "follow_path")
+    check_problem(problem, "follow_path: problem")
+    places = _spaced(path, spacing)
+    term = moving_goal(problem, goal)
+    if not isinstance(term, Point):
+        raise InputError(f"follow_path moves a Point, and goals[{goal}] is a {type(term).__name__}; use Drag")
+    own, q, found = copied(problem), problem.scene.figure.clamp(problem.start), []
+    tracker = method_for_motions(method).tracker(own, FRAME)
+    for number, place in enumerate(places):
+        retarget(own, goal, place)
+        found.append(warm_started(own, tracker, q) if number else tracker.solve(q))
+        if not found[-1].solved:
+            break
+        q = found[-1].q
+    return tuple(found)
+
+
+def _spaced(path: ArrayLike, spacing: float) -> Sequence[Array]:
+    """Places (3,) along the corners of a path, its own among them."""
+    corners = checks.array(path, "path", "corners of shape (k, 3), metres")
+    if corners.ndim != 2 or corners.shape[1] != 3 or len(corners) < 1:
+        raise InputError(f"path has shape {corners.shape}; give corners of shape (k, 3), metres")
+    for place, corner in enumerate(corners):
+        point(corner, f"path[{place}]")
+    spacing = checks.number(spacing, "spacing", CLOSEST, FARTHEST, "m")
+    legs = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    if (legs.sum() / MOST_GOALS) > spacing:
+        raise InputError(f"a spacing of {spacing:g} m makes more than {MOST_GOALS} goals of this path; make it larger")
+    counts = np.ceil(legs / spacing).astype(int)
+    places = [corners[0]]
+    for begin, end, count in zip(corners, corners[1:], counts, strict=False):
+        places += [begin + (end - begin) * k / count for k in range(1, count + 1)]
+    return places

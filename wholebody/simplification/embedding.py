@@ -1,0 +1,228 @@
+"""Terms of the whole figure on a smaller one, whose postures are embedded in those of the whole one.
+
+The smaller figure has the same joints without the locked ones. A term is stated on it anew by its names. Where that
+would not be the same function (joints it names are gone, a posture it takes is too long, its weights are shares of what
+a locked joint has) the term stays as it is: it is asked at the whole posture, and gives the columns of its derivatives
+that are left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.arrays import Array, Mask
+from wholebody.figures.self_pairs import random_postures
+from wholebody.figures.state import State, Wrench
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings, Term
+
+SAMPLES = 3  # postures at which a term that was stated anew must say the same
+SAME = 1e-7  # largest difference in its values and derivatives there, beside their size
+
+_T = TypeVar("_T", bound=Term)
+
+
+class Embedding:
+    """The places of a smaller model's joints in the whole one's postures.
+
+    Attributes:
+        idx_q: (small nq,) places in the whole posture.
+        idx_v: (small nv,) places in the whole displacement.
+    """
+
+    def __init__(self, whole: pin.Model, small: pin.Model, start: Array) -> None:
+        """Match the joints by name; the locked ones stay as in `start`, (nq,)."""
+        ids = [whole.getJointId(name) for name in list(small.names)[1:]]
+        joints = [whole.joints[index] for index in ids]
+        self.idx_q = _places([(int(joint.idx_q), int(joint.nq)) for joint in joints])
+        self.idx_v = _places([(int(joint.idx_v), int(joint.nv)) for joint in joints])
+        self._model = whole
+        self._start: Array = np.array(start, dtype=float)
+
+    def embed(self, q: Array) -> Array:
+        """Whole posture (nq,) of a small one."""
+        whole: Array = self._start.copy()
+        whole[self.idx_q] = q
+        return whole
+
+    def whole(self, state: State) -> State:
+        """The whole figure at the posture of the small one; it belongs to whoever the small state belongs to."""
+        q, whole = self.embed(state.q), state.companion(self, self._model)
+        return whole if np.array_equal(q, whole.q) else whole.update(q)
+
+    def rows(self, term: Goal | Constraint, state: State) -> Array:
+        """The columns (m, small nv) of a term's Jacobian where the small figure is."""
+        whole = self.whole(state)
+        return np.asarray(_dense(term.jacobian(whole), whole)[:, self.idx_v])
+
+
+class EmbeddedGoal(Goal):
+    """A goal of the whole figure."""
+
+    def __init__(self, term: Goal, embedding: Embedding) -> None:
+        self.term, self.embedding = term, embedding
+
+    @property
+    def weight(self) -> float:
+        """As the goal's."""
+        return self.term.weight
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) as the goal's."""
+        return self.term.angular
+
+    def error(self, state: State) -> Array:
+        """(m,) as the goal's."""
+        return self.term.error(self.embedding.whole(state))
+
+    def jacobian(self, state: State) -> Array:
+        """(m, small nv)."""
+        return self.embedding.rows(self.term, state)
+
+
+class EmbeddedConstraint(Constraint):
+    """A constraint of the whole figure."""
+
+    def __init__(self, term: Constraint, embedding: Embedding) -> None:
+        self.term, self.embedding = term, embedding
+
+    @property
+    def lower(self) -> Array:
+        """(m,) as the constraint's."""
+        return self.term.lower
+
+    @property
+    def upper(self) -> Array:
+        """(m,) as the constraint's."""
+        return self.term.upper
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) as the constraint's."""
+        return self.term.angular
+
+    def value(self, state: State) -> Array:
+        """(m,) as the constraint's."""
+        return self.term.value(self.embedding.whole(state))
+
+    def jacobian(self, state: State) -> Array:
+        """(m, small nv)."""
+        return self.embedding.rows(self.term, state)
+
+
+class EmbeddedMeasure(Measure):
+    """A measure of the whole figure; the share of the locked joints is part of its value."""
+
+    def __init__(self, term: Measure, embedding: Embedding) -> None:
+        self.term, self.embedding = term, embedding
+
+    @property
+    def weight(self) -> float:
+        """As the measure's."""
+        return self.term.weight
+
+    def value(self, state: State) -> float:
+        """As the measure's."""
+        return self.term.value(self.embedding.whole(state))
+
+    def gradient(self, state: State) -> Array:
+        """(small nv,)."""
+        return np.asarray(self.term.gradient(self.embedding.whole(state))[self.embedding.idx_v])
+
+    def curvature(self, state: State) -> Array:
+        """(small nv,)."""
+        return np.asarray(self.term.curvature(self.embedding.whole(state))[self.embedding.idx_v])
+
+
+class EmbeddedBound(Bound):
+    """A bound of the whole figure."""
+
+    def __init__(self, term: Bound, embedding: Embedding) -> None:
+        self.term, self.embedding = term, embedding
+
+    def bounds(self, state: State, dt: float | None) -> tuple[Array, Array]:
+        """(small nv,) each."""
+        low, high = self.term.bounds(self.embedding.whole(state), dt)
+        return np.asarray(low)[self.embedding.idx_v], np.asarray(high)[self.embedding.idx_v]
+
+
+def restated_term(term: _T, scene: Surroundings, start: Array, embedding: Embedding) -> Term | None:
+    """The term on the smaller figure: stated anew where that is the same function, else embedded.
+
+    Rows of a constraint that no joint moves any more, and that hold, need not be asked; None where that is all of them.
+
+    Args:
+        term: a resolved term of the whole figure.
+        scene: of the smaller figure.
+        start: (small nq,).
+        embedding: of the smaller in the whole figure.
+    """
+    embedded: Term
+    if isinstance(term, Goal):
+        embedded = EmbeddedGoal(term, embedding)
+    elif isinstance(term, Constraint):
+        embedded = EmbeddedConstraint(term, embedding)
+    elif isinstance(term, Measure):
+        embedded = EmbeddedMeasure(term, embedding)
+    else:
+        assert isinstance(term, Bound)
+        return EmbeddedBound(term, embedding)
+    state = State(scene.model)
+    wanted = _values(embedded, state, start)
+    if isinstance(embedded, Constraint):
+        wanted, rows = _moving_rows(wanted)
+        if not rows:
+            return None
+    try:
+        anew = term.resolve(scene, start)
+        values = _values(anew, state, start)
+    except Exception:  # a term is anyone's code, and may fail in any way on a figure it was not meant for
+        return embedded
+    alike = len(values) == len(wanted) and all(
+        a.shape == b.shape and np.abs(a - b).max(initial=0.0) <= SAME * (1.0 + np.abs(b).max(initial=0.0))
+        for a, b in zip(values, wanted, strict=True)
+    )
+    return anew if alike else embedded
+
+
+def _values(term: Term, state: State, start: Array) -> list[Array]:
+    """What a term says at a few postures: all that a method reads, but for what is constant in a measure."""
+    postures = [start, *random_postures(state.model, SAMPLES, seed=1)]
+    ask: list[Callable[[], object]] = []
+    if isinstance(term, Goal):
+        ask = [lambda: term.error(state), lambda: _dense(term.jacobian(state), state), lambda: term.angular]
+    elif isinstance(term, Constraint):
+        ask = [lambda: np.atleast_1d(term.value(state)), lambda: _dense(term.jacobian(state), state)]
+        ask += [lambda: _wide(term.lower, term, state), lambda: _wide(term.upper, term, state)]
+    elif isinstance(term, Measure):
+        ask = [lambda: term.gradient(state), lambda: term.curvature(state)]
+    values = []
+    for q in postures:
+        state.update(q)
+        values += [np.nan_to_num(np.array(question(), dtype=float), posinf=1e300, neginf=-1e300) for question in ask]
+    return values
+
+
+def _moving_rows(values: list[Array]) -> tuple[list[Array], int]:
+    """What a constraint says, without the rows that hold and that nothing moves; and how many rows are left."""
+    value, lower, upper = values[0], values[2], values[3]
+    moves = np.any([np.abs(jacobian).max(axis=1, initial=0.0) > SAME for jacobian in values[1::4]], axis=0)
+    keep = moves | (value < lower - SAME) | (value > upper + SAME)
+    return [part[keep] for part in values], int(keep.sum())
+
+
+def _wide(bound: Array, term: Constraint, state: State) -> Array:
+    return np.broadcast_to(bound, np.shape(np.atleast_1d(term.value(state))))
+
+
+def _dense(part: Wrench | Array, state: State) -> Array:
+    return state.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part)
+
+
+def _places(spans: list[tuple[int, int]]) -> NDArray[np.intp]:
+    return np.array([place for first, size in spans for place in range(first, first + size)], dtype=np.intp)

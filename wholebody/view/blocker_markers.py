@@ -1,0 +1,64 @@
+"""What keeps a posture from what was asked, named at its place: contacts, joints at their limits, held frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.figures.state import State
+from wholebody.view import style
+from wholebody.view.scene_graph import Keyframe, Marker
+from wholebody.view.viewed_scene import ViewedContacts, ViewedScene
+
+MOST = 4  # of the hardest are marked; more labels hide each other
+
+_BALL = Marker("ball", style.BLOCKER, style.BLOCKER_RADIUS)
+
+
+def mark_blockers(
+    keyframe: Keyframe, scene: ViewedScene, state: State, contacts: ViewedContacts, blockers: Sequence[Any]
+) -> None:
+    """Mark each of the hardest blockers by a ball and its name.
+
+    Args:
+        keyframe: what is shown.
+        scene: whose figure and things they are.
+        state: of the figure, where it is shown.
+        contacts: pairs near each other there.
+        blockers: `Blocker`s of an assessment, the hardest first.
+    """
+    for number, blocker in enumerate(blockers[:MOST]):
+        place = _place(scene, state, contacts, blocker)
+        if place is None:
+            continue
+        matrix = np.eye(4)
+        matrix[:3, 3] = place
+        root = f"{style.BLOCKER_NODE}/{number}"
+        keyframe.markers[f"{root}/ball"] = (_BALL, matrix)
+        above = matrix.copy()
+        above[2, 3] += 2.0 * style.BLOCKER_RADIUS
+        keyframe.markers[f"{root}/text"] = (
+            Marker("label", style.BLOCKER_LABEL, style.LABEL_SIZE, f"in the way: {blocker}"),
+            above,
+        )
+
+
+def _place(scene: ViewedScene, state: State, contacts: ViewedContacts, blocker: Any) -> Array | None:
+    """Where a blocker is (3,), or None for one that is nowhere, such as a balance."""
+    if blocker.kind == "contact":
+        owners = scene.piece_owner
+        for row, (a, b) in enumerate(np.asarray(contacts.pair)):
+            if {owners[a], owners[b]} == set(blocker.names):
+                return np.asarray(0.5 * (contacts.point_a[row] + contacts.point_b[row]))
+        return None
+    if blocker.kind == "constraint":
+        frame = blocker.frame
+        if frame is None:
+            return None
+        frame_id = scene.model.getFrameId(frame)
+        joint = scene.model.frames[frame_id].parentJoint
+        return np.array(state.data.oMi[joint].act(scene.model.frames[frame_id].placement.translation))
+    return np.array(state.data.oMi[scene.model.getJointId(blocker.names[0])].translation)

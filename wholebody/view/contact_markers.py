@@ -1,0 +1,66 @@
+"""Contacts and penetrations: colours of the pieces, normals, witness points, and the way out of each other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.geometry.proximity import PENETRATION
+from wholebody.view import drawing, style
+from wholebody.view.bodies import Bodies
+from wholebody.view.scene_graph import Keyframe, Marker
+from wholebody.view.viewed_scene import ViewedContacts
+
+MOST = 60
+"""Markers are drawn for this many of the nearest contacts; a page with thousands of nodes stutters."""
+
+LABELLED = 3
+"""The depth is written beside this many of the deepest penetrations."""
+
+_NORMAL = Marker("arrow", style.NORMAL, 0.8)
+_WITNESS = Marker("ball", style.WITNESS, style.WITNESS_RADIUS)
+_DEPTH = Marker("arrow", style.DEPTH, 1.3)
+
+
+def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) -> None:
+    """Give every piece that touches the colour of its state; penetration outweighs contact."""
+    for pairs, state in (
+        (contacts.pair, style.CONTACT),
+        (contacts.pair[np.asarray(contacts.distance) < -PENETRATION], style.PENETRATION),
+    ):
+        for index in np.unique(pairs):
+            body = bodies.all[int(index)]
+            keyframe.colors[body.path] = body.state_color(state)
+
+
+def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) -> None:
+    """Mark witness points and normals; for penetrations the vector by which the figure's piece would come out.
+
+    A normal starts at the first piece's witness point and leads to the second piece. A penetration vector is as long as
+    the depth, but at least `style.SHORTEST_DEPTH`; the label of the deepest ones says how deep.
+    """
+    for row in range(min(len(contacts.distance), MOST)):
+        root = f"{style.CONTACT_NODE}/{row}"
+        distance, normal = float(contacts.distance[row]), np.asarray(contacts.normal[row])
+        start, end = np.asarray(contacts.point_a[row]), np.asarray(contacts.point_b[row])
+        for name, point in (("a", start), ("b", end)):
+            keyframe.markers[f"{root}/{name}"] = (_WITNESS, _at(point))
+        if distance >= -PENETRATION:
+            place = drawing.arrow_placement(start, normal, style.NORMAL_LENGTH)
+            keyframe.markers[f"{root}/normal"] = (_NORMAL, place)
+            continue
+        first, second = (bodies.all[int(index)] for index in contacts.pair[row])
+        out, origin = -normal, start
+        if first.joint == 0 or (first.thing is not None and second.thing is None):
+            out, origin = normal, end
+        length = max(-distance, style.SHORTEST_DEPTH)
+        keyframe.markers[f"{root}/depth"] = (_DEPTH, drawing.arrow_placement(origin, out, length))
+        if row < LABELLED:
+            text = Marker("label", style.DEPTH_LABEL, style.LABEL_SIZE, f"{-1000 * distance:.1f} mm")
+            keyframe.markers[f"{root}/text"] = (text, _at(origin + out * length))
+
+
+def _at(point: Array) -> Array:
+    placement = np.eye(4)
+    placement[:3, 3] = point
+    return placement

@@ -1,0 +1,60 @@
+"""A filmstrip: several postures of a scene side by side in one picture."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from numpy.typing import ArrayLike
+
+from wholebody.checks import a, listed
+from wholebody.checks import path as checked_path
+from wholebody.errors import InputError
+from wholebody.files import Scratch, check_writable, write
+from wholebody.view.screenshot import check_size
+from wholebody.view.viewer import Viewer
+
+GAP = 6  # pixels between two pictures
+
+
+def write_filmstrip(
+    viewer: Viewer,
+    postures: Sequence[ArrayLike],
+    path: str | os.PathLike[str],
+    size: tuple[int, int] = (400, 560),
+) -> Path:
+    """Write postures as one PNG, the first one left; the camera should have been set with `viewer.look`.
+
+    Args:
+        viewer: shows the postures one after the other, and the last one afterwards.
+        postures: each (nq,).
+        path: of the file.
+        size: width and height of each picture, pixels.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: there is no posture, one has the wrong shape, or the file cannot be written.
+        MissingPackageError: there is no Chromium.
+    """
+    from PIL import Image
+
+    if not isinstance(viewer, Viewer):
+        raise InputError(f"write_filmstrip: viewer is {a(type(viewer))}, not a Viewer; make one with wb.Viewer(scene)")
+    postures = listed(postures, "postures", "[q], each of shape (nq,)")
+    if not postures:
+        raise InputError("a filmstrip has at least one posture; give a list of postures, each of shape (nq,)")
+    width, height = check_size(size)
+    strip = Image.new("RGB", (len(postures) * (width + GAP) - GAP, height), "white")
+    place = check_writable(checked_path(path, "path"))
+    with Scratch() as folder:
+        for number, q in enumerate(postures):
+            viewer.show(q)
+            with Image.open(viewer.picture(folder / "one.png", size)) as picture:
+                strip.paste(picture, (number * (width + GAP), 0))
+    made = io.BytesIO()
+    strip.save(made, format="PNG")
+    return write(place, made.getvalue())

@@ -1,0 +1,146 @@
+"""Goals: what is to be reached, how far it is, and in words how much is left."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.checks import a
+from wholebody.errors import InputError
+from wholebody.figures.state import State
+from wholebody.geometry.placement import placement
+from wholebody.view import drawing, style
+from wholebody.view.scene_graph import Keyframe, Marker
+from wholebody.view.viewed_scene import ViewedScene
+
+_TARGET = Marker("ball", style.TARGET, style.TARGET_RADIUS)
+_MISS = Marker("rod", style.MISS)
+
+
+class Goals:
+    """The goals of a problem, drawn at any posture."""
+
+    def __init__(self, scene: ViewedScene, problem: Any) -> None:
+        """Take the goals of a `wholebody.Problem`, which has resolved them on its scene.
+
+        Raises:
+            InputError: it is no problem.
+        """
+        self.scene = scene
+        goals = getattr(problem, "goals", None)
+        if not isinstance(goals, (tuple, list)):
+            raise InputError(f"problem is {a(type(problem))}, not a Problem; state one with wb.Problem(scene)")
+        self.goals = goals
+
+    def mark(self, keyframe: Keyframe, state: State) -> None:
+        """Mark each goal that has a place: target, the way to it, axes where it asks for an orientation, the error."""
+        for number, goal in enumerate(self.goals):
+            root = f"{style.GOAL_NODE}/{number}"
+            here = self._here(goal, state)
+            target, directed = _target(goal, here, state, self.scene)
+            if here is None or target is None:
+                continue
+            if np.linalg.norm(target.translation - here.translation) > 1e-9 or not (directed or hasattr(goal, "axis")):
+                keyframe.markers[f"{root}/target"] = (_TARGET, _at(target.translation))
+            line = drawing.rod_placement(here.translation, target.translation, style.LINE_RADIUS)
+            if line is not None:
+                keyframe.markers[f"{root}/line"] = (_MISS, line)
+            if directed:
+                _triad(keyframe, f"{root}/axes", target, style.AXES_LENGTH)
+                _triad(keyframe, f"{root}/frame", here, style.AXES_LENGTH / 2)
+            self._point(keyframe, root, goal, here)
+            text = f"{getattr(goal, 'frame', 'centre of mass')}  {left(goal, state)}"
+            label = Marker("label", style.GOAL_LABEL, style.LABEL_SIZE, text)
+            keyframe.markers[f"{root}/text"] = (label, _at(target.translation))
+
+    def targets(self, state: State) -> Array:
+        """Places (n, 3) that should be in the picture."""
+        found = [np.zeros((0, 3))]
+        for goal in self.goals:
+            target, _ = _target(goal, self._here(goal, state), state, self.scene)
+            if target is not None:
+                found.append(target.translation[None])
+        return np.concatenate(found)
+
+    def _here(self, goal: Any, state: State) -> pin.SE3 | None:
+        """Placement of what the goal moves; None for a goal without a place."""
+        name = getattr(goal, "frame", None)
+        if isinstance(name, str):
+            here = state.frame(self.scene.figure.frame_id(name)).copy()
+            offset = np.asarray(getattr(goal, "offset", (0.0, 0.0, 0.0)), dtype=float)
+            here.translation = here.act(offset)
+            return here
+        if hasattr(goal, "axes") and hasattr(goal, "target"):
+            return pin.SE3(np.eye(3), state.center_of_mass())
+        return None
+
+    def _point(self, keyframe: Keyframe, root: str, goal: Any, here: pin.SE3) -> None:
+        """The axis that a goal points somewhere, and where it should point."""
+        axis = getattr(goal, "axis", None)
+        if axis is None:
+            return
+        now = here.rotation @ np.asarray(axis, dtype=float)
+        wanted = _wanted(goal, here)
+        blue, green = style.AXES[2], style.TARGET
+        for name, color, way in (("is", blue, now), ("wanted", green, wanted)):
+            place = drawing.arrow_placement(here.translation, way / np.linalg.norm(way), 2.5 * style.AXES_LENGTH)
+            keyframe.markers[f"{root}/{name}"] = (Marker("arrow", color, 0.35), place)
+
+
+def _wanted(goal: Any, here: pin.SE3) -> Array:
+    if goal.direction is not None:
+        return np.asarray(goal.direction, dtype=float)
+    return np.asarray(np.asarray(goal.toward, dtype=float) - here.translation)
+
+
+def _target(goal: Any, here: pin.SE3 | None, state: State, scene: ViewedScene) -> tuple[pin.SE3 | None, bool]:
+    """Where the goal wants its frame, and whether it asks for an orientation too."""
+    if here is None:
+        return None, False
+    target = getattr(goal, "target", None)
+    if hasattr(goal, "axis"):
+        return pin.SE3(
+            np.eye(3), here.translation if goal.toward is None else np.asarray(goal.toward, dtype=float)
+        ), False
+    if hasattr(goal, "to"):
+        base = state.frame(scene.figure.frame_id(goal.to))
+        return (base * placement(goal.placement), True) if goal.placement is not None else (None, False)
+    if target is None or isinstance(target, str):
+        return None, False
+    if not isinstance(target, pin.SE3) and np.shape(target) in ((4,), (3, 3)):
+        values = np.asarray(target, dtype=float)
+        rotation = pin.Quaternion(values).matrix() if values.shape == (4,) else values
+        return pin.SE3(rotation, here.translation), True
+    if getattr(goal, "axes", "") == "xy":
+        return pin.SE3(np.eye(3), np.array([target[0], target[1], 0.0])), False
+    try:
+        return placement(target), isinstance(target, pin.SE3) or np.shape(target) != (3,)
+    except InputError:
+        return None, False
+
+
+def left(goal: Any, state: State) -> str:
+    """How much of a goal is left, in words: "3.2 mm", "1.5°", or both."""
+    error = np.atleast_1d(goal.error(state))
+    angular = np.broadcast_to(goal.angular, error.shape)
+    parts: Iterable[str] = (
+        f"{1000 * np.linalg.norm(error[~angular]):.1f} mm" if (~angular).any() else "",
+        f"{np.degrees(np.linalg.norm(error[angular])):.1f}°" if angular.any() else "",
+    )
+    return "  ".join(part for part in parts if part)
+
+
+def _triad(keyframe: Keyframe, path: str, place: pin.SE3, length: float) -> None:
+    for name, color, direction in zip("xyz", style.AXES, place.rotation.T, strict=True):
+        arrow = drawing.arrow_placement(place.translation, direction, length)
+        keyframe.markers[f"{path}/{name}"] = (Marker("arrow", color, 0.7), arrow)
+
+
+def _at(point: Array) -> Array:
+    matrix = np.eye(4)
+    matrix[:3, 3] = point
+    return matrix

@@ -1,0 +1,218 @@
+"""The page's content as a scene graph: tells the live page of changes only, and turns keyframes into an animation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.view import commands, drawing, style
+from wholebody.view.commands import Track
+from wholebody.view.sender import Sender
+from wholebody.view.server import Command, Store
+from wholebody.view.style import Color
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A small thing drawn on top of the picture. Made once and then only moved.
+
+    Attributes:
+        kind: "arrow", "rod", "ball" or "label".
+        color: red, green, blue; of a label, its CSS colour.
+        size: of an arrow its width relative to the usual, of a ball its radius, of a label its height.
+        text: of a label.
+    """
+
+    kind: str
+    color: Any
+    size: float = 1.0
+    text: str = ""
+
+
+@dataclass
+class Keyframe:
+    """Everything that can differ from one posture to the next.
+
+    Attributes:
+        transforms: placement (4, 4) by node, relative to the node above.
+        colors: by node.
+        markers: marker and placement (4, 4) by node. Markers of earlier keyframes that are not named are hidden.
+    """
+
+    transforms: dict[str, Array] = field(default_factory=dict)
+    colors: dict[str, Color] = field(default_factory=dict)
+    markers: dict[str, tuple[Marker, Array]] = field(default_factory=dict)
+
+
+class SceneGraph:
+    """The page's content. Without a connection it is only kept, ready to be saved."""
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self.store = Store()
+        self._sender: Sender | None = None
+        self._waiting: list[Command] = []
+        self._markers: dict[str, Marker] = {}
+
+    def connect(self, sender: Sender) -> None:
+        """Show everything in the live page from now on."""
+        self._sender = sender
+        self._waiting.clear()
+        sender.send(self.store.commands())
+
+    def disconnect(self) -> None:
+        """Only keep the content from now on."""
+        self._sender = None
+        self._waiting.clear()
+
+    def put(self, path: str, three: Mapping[str, Any]) -> None:
+        """Put a three.js object at a node, in place of what was there."""
+        self.do(commands.set_object(path, three))
+
+    def remove(self, path: str) -> None:
+        """Remove a node and all below it."""
+        if any(name == path or name.startswith(path + "/") for name in self.store.nodes):
+            self.do(commands.delete(path))
+
+    def place(self, path: str, matrix: Array) -> None:
+        """Place a node relative to the one above."""
+        self.do(commands.set_transform(path, matrix))
+
+    def set(self, path: str, name: str, value: Any) -> None:
+        """Set a property of a node."""
+        self.do(commands.set_property(path, name, value))
+
+    def flush(self) -> None:
+        """Send what has changed since the last time, in one go."""
+        if self._sender is not None and self._waiting:
+            self._sender.send(self._waiting)
+        self._waiting.clear()
+
+    def show(self, keyframe: Keyframe) -> None:
+        """Make the page show this keyframe."""
+        if self.store.animation is not None:
+            self.do(commands.stop_animation())
+        for path, (marker, _) in keyframe.markers.items():
+            self._provide(path, marker)
+        for path, matrix in keyframe.transforms.items():
+            self.place(path, matrix)
+        for path, color in keyframe.colors.items():
+            self.set(path, "color", color)
+        for path in self._markers:
+            shown = path in keyframe.markers
+            self.set(path, "visible", shown)
+            if shown:
+                self.place(path, keyframe.markers[path][1])
+        self.flush()
+
+    def play(self, keyframes: Sequence[Keyframe], dt: float, repetitions: float) -> None:
+        """Let the page play these keyframes, dt seconds apart. A marker that changes its looks is left out."""
+        for keyframe in keyframes[1:]:
+            for path, (marker, _) in keyframe.markers.items():
+                if path not in keyframes[0].markers:
+                    self._provide(path, marker)
+        self.show(keyframes[0])
+        tracks = [*_placements(keyframes), *_colors(keyframes), *self._appearances(keyframes)]
+        self.do(commands.set_animation(tracks, dt, len(keyframes), repetitions))
+        self.flush()
+
+    def do(self, command: Command) -> None:
+        """Carry out a command, unless everything is already as it would make it."""
+        if self.store.has(command):
+            return
+        self.store.apply(command)
+        if self._sender is not None:
+            self._waiting.append(command)
+
+    def _provide(self, path: str, marker: Marker) -> None:
+        """Make a marker unless it is there already."""
+        if self._markers.get(path) == marker:
+            return
+        self._markers[path] = marker
+        if marker.kind == "label":
+            self.do(commands.label(path, marker.text, marker.color, marker.size))
+        elif marker.kind == "arrow":
+            self.put(path, drawing.arrow(path, marker.color, marker.size))
+        elif marker.kind == "rod":
+            self.put(path, drawing.rod(path, marker.color))
+        else:
+            self.put(path, drawing.ball(path, marker.color, marker.size))
+
+    def _appearances(self, keyframes: Sequence[Keyframe]) -> list[Track]:
+        """Tracks of the markers: when they are seen, and where."""
+        tracks: list[Track] = []
+        for path, marker in self._markers.items():
+            found = [keyframe.markers.get(path) for keyframe in keyframes]
+            places = [entry[1] if entry is not None and entry[0] == marker else None for entry in found]
+            if all(place is None for place in places):
+                continue
+            if any(place is None for place in places):
+                tracks.append(Track(path, "visible", "bool", [place is not None for place in places], steps=True))
+            last = next(place for place in places if place is not None)
+            matrices = np.array([last := place if place is not None else last for place in places])
+            tracks.extend(_motion(path, matrices, steps=path.startswith(style.CONTACT_NODE)))
+        return tracks
+
+
+def _placements(keyframes: Sequence[Keyframe]) -> list[Track]:
+    """Tracks of the nodes that move."""
+    return [
+        track
+        for path in keyframes[0].transforms
+        for track in _motion(path, np.array([keyframe.transforms[path] for keyframe in keyframes]))
+    ]
+
+
+def _colors(keyframes: Sequence[Keyframe]) -> list[Track]:
+    """Tracks of the pieces whose colour changes; opacity stays as it is."""
+    tracks = []
+    for path in keyframes[0].colors:
+        colors = np.array([keyframe.colors[path][:3] for keyframe in keyframes])
+        if (colors != colors[0]).any():
+            tracks.append(Track(f"{path}/<object>", "material.color", "color", colors, steps=True))
+    return tracks
+
+
+def _motion(path: str, matrices: Array, *, steps: bool = False) -> list[Track]:
+    """Tracks of one node's placements (n, 4, 4); none where it rests."""
+    if (np.ptp(matrices, axis=0) < 1e-9).all():
+        return []
+    scales = np.linalg.norm(matrices[:, :3, :3], axis=1)
+    tracks = [
+        Track(path, "position", "vector3", matrices[:, :3, 3], steps),
+        Track(path, "quaternion", "quaternion", quaternions(matrices[:, :3, :3] / scales[:, None, :]), steps),
+    ]
+    if (np.ptp(scales, axis=0) > 1e-9).any():
+        tracks.append(Track(path, "scale", "vector3", scales, steps))
+    return tracks
+
+
+def quaternions(rotations: Array) -> Array:
+    """Unit quaternions (n, 4) as x, y, z, w of rotations (n, 3, 3), neighbours on the same half of the sphere.
+
+    Each is a row of the matrix 4 q q^T, which is linear in the rotation; the row with the largest diagonal is well
+    conditioned (Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978).
+    """
+    r = rotations
+    xx, yy, zz = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
+    outer = np.empty((len(r), 4, 4))
+    outer[:, 0, 0] = 1 + xx - yy - zz
+    outer[:, 1, 1] = 1 - xx + yy - zz
+    outer[:, 2, 2] = 1 - xx - yy + zz
+    outer[:, 3, 3] = 1 + xx + yy + zz
+    outer[:, 0, 1] = outer[:, 1, 0] = r[:, 1, 0] + r[:, 0, 1]
+    outer[:, 0, 2] = outer[:, 2, 0] = r[:, 0, 2] + r[:, 2, 0]
+    outer[:, 1, 2] = outer[:, 2, 1] = r[:, 2, 1] + r[:, 1, 2]
+    outer[:, 0, 3] = outer[:, 3, 0] = r[:, 2, 1] - r[:, 1, 2]
+    outer[:, 1, 3] = outer[:, 3, 1] = r[:, 0, 2] - r[:, 2, 0]
+    outer[:, 2, 3] = outer[:, 3, 2] = r[:, 1, 0] - r[:, 0, 1]
+    best = np.argmax(np.einsum("nii->ni", outer), axis=1)
+    q = outer[np.arange(len(r)), best]
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
+    flips = np.sign(np.einsum("ni,ni->n", q[1:], q[:-1]))
+    q[1:] *= np.cumprod(np.where(flips == 0, 1.0, flips))[:, None]
+    return np.asarray(q)

@@ -1,0 +1,89 @@
+"""What the viewer needs to know of a scene: this much and no more."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.arrays import Array
+from wholebody.checks import a
+from wholebody.errors import InputError
+
+
+def checked_scene(scene: Any) -> Any:
+    """What a viewer shows.
+
+    Raises:
+        InputError: it is no scene; what else might have been meant is told how to be shown.
+    """
+    if isinstance(getattr(scene, "model", None), pin.Model) and callable(getattr(scene, "contacts", None)):
+        return scene
+    if hasattr(scene, "scene"):  # a problem
+        mend = f"give the scene of the {type(scene).__name__}"
+    elif hasattr(scene, "bodies"):  # an assembly
+        mend = (
+            "its bodies have no shapes; say what they look like with wholebody.view.parts.Parts, and show "
+            "parts.posture(solution.placements)"
+        )
+    else:
+        mend = "make one with wb.Scene(figure)"
+    raise InputError(f"Viewer: scene is {a(type(scene))}, not a Scene; {mend}")
+
+
+class ViewedContacts(Protocol):
+    """Pairs of pieces near each other; k rows each."""
+
+    @property
+    def pair(self) -> NDArray[np.intp]:
+        """(k, 2) indices of the two pieces."""
+
+    @property
+    def distance(self) -> Array:
+        """(k,) signed distance, metres."""
+
+    @property
+    def normal(self) -> Array:
+        """(k, 3) unit vector from the first piece to the second."""
+
+    @property
+    def point_a(self) -> Array:
+        """(k, 3) witness point on the first piece."""
+
+    @property
+    def point_b(self) -> Array:
+        """(k, 3) witness point on the second piece."""
+
+
+class ViewedScene(Protocol):
+    """A figure among things, as `wholebody.Scene` is."""
+
+    @property
+    def figure(self) -> Any:
+        """The figure; only goals ask it for its frames."""
+
+    @property
+    def model(self) -> Any:
+        """Pinocchio's model of the figure."""
+
+    @property
+    def geometry(self) -> Any:
+        """Pinocchio's geometry model with all pieces."""
+
+    @property
+    def objects(self) -> Mapping[str, Any]:
+        """Things by name; each may have a `color`, red, green, blue, alpha."""
+
+    @property
+    def piece_owner(self) -> Sequence[str]:
+        """Segment or object that each piece is part of."""
+
+    @property
+    def revision(self) -> int:
+        """A number that changes whenever things come or go."""
+
+    def contacts(self, q: Array, within: float = ...) -> ViewedContacts:
+        """Pairs nearer than `within` metres at the posture q, nearest first."""
