@@ -22,6 +22,7 @@ ROOMS = (
         "files",
         "compiled",
         "pool",
+        "runner",
         "geometry",
         "figures",
         "scene_geometry",

@@ -8,8 +8,7 @@ import pytest
 
 pytest.importorskip("joblib")
 
-from wholebody.bench.compare.jobs import Task, work
-from wholebody.bench.compare.worker import own_worker
+from wholebody.bench.compare.jobs import Task, own_child, work
 
 
 def test_what_a_method_compiles_is_not_taken_for_what_its_solves_cost(fakes: ModuleType) -> None:
@@ -18,7 +17,7 @@ def test_what_a_method_compiles_is_not_taken_for_what_its_solves_cost(fakes: Mod
     try:
         chunk = work(Task(fakes.SET, 0, 0, solves, cap=10.0, most=1.0))
     finally:
-        own_worker().close()
+        own_child().close()
     assert chunk.spent["sleeps"] >= 0.4
     assert chunk.spent["compiles"] < 1.5  # which it takes to compile
     assert [record.outcome for record in chunk.records] == ["answered", "answered", "failed"]

@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from wholebody.bench.attack.case import KINDS, SCRIPT, Case
-from wholebody.bench.attack.child import put
 from wholebody.bench.attack.counting import SLOW, Row, counted, is_slow, percentiles
-from wholebody.bench.attack.running import Ended
+from wholebody.bench.attack.running import Ended, put
 from wholebody.bench.intervals import wilson
 from wholebody.bench.machine import sentence
 from wholebody.bench.tables import markdown, write_text

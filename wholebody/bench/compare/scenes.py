@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from wholebody.bench.compare.cases import Shown
-from wholebody.bench.compare.messages import Build, Draw
 from wholebody.bench.compare.record import DEFAULT
-from wholebody.bench.compare.worker import EndedError, Worker
+from wholebody.bench.compare.solving import BUILDING, Which, drawn
 from wholebody.bench.entrants.base import Entrant
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.files import Scratch
+from wholebody.runner import ONE_THREAD, Child, EndedError
 
 if TYPE_CHECKING:
     from wholebody.bench.compare.solving import Ready
@@ -40,13 +40,12 @@ def draw(
     shown: Sequence[Shown], families: Mapping[str, ProblemSet], entrants: Mapping[str, Entrant], seed: int, cap: float
 ) -> list[Scene]:
     """Solve the chosen cases again and draw them; one that cannot be drawn is left out."""
-    worker, scenes = Worker(), []
+    child, scenes = Child(ONE_THREAD), []
     try:
         for case in shown:
             try:
-                if worker.build(Build(families[case.set], case.number, seed)):
-                    continue
-                page = worker.draw(Draw(entrants[case.good], entrants[case.bad], cap))
+                which, pair = Which(families[case.set], case.number, seed), (entrants[case.good], entrants[case.bad])
+                page = child.call(drawn, which, *pair, cap, seconds=BUILDING)
             except EndedError:
                 continue
             head, _, rest = page.partition(OPENING)
@@ -54,7 +53,7 @@ def draw(
             packed = base64.b64encode(gzip.compress(picture.encode("ascii"), mtime=0)).decode("ascii")
             scenes.append(Scene(case, f"{head}{OPENING}{CLOSING}{tail}", packed))
     finally:
-        worker.close()
+        child.close()
     return scenes
 
 

@@ -1,4 +1,8 @@
-"""One solve of one case, timed, and judged by `assess` alone."""
+"""One solve of one case, timed, and judged by `assess` alone.
+
+`built`, `warmed`, `solved` and `drawn` are jobs of a process of `wholebody.runner`, which keeps the last case and knows
+which methods have run in it.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +10,29 @@ import copy
 import gc
 import time
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.assessment import Assessment, assess
-from wholebody.bench.compare.record import ANSWERED, FAILED, REFUSED, Record
+from wholebody.bench.compare.record import ANSWERED, DEFAULT, FAILED, REFUSED, Record
 from wholebody.bench.entrants.base import Budget, Entrant, set_up
 from wholebody.bench.problem_sets.case import Case, ProblemSet
 from wholebody.errors import WholebodyError
 from wholebody.problem import Problem
+from wholebody.runner import allow
+
+BUILDING = 120.0  # s: to build a case and what belongs to its scene; compiling once included
+FRAME_CAP = 0.1  # s: most for a frame, on the average, where goals move; slower than that nobody drags
+GLIMPSE = 3  # frames of a moving case that a method sees before it is timed
+
+
+class Which(NamedTuple):
+    """A case of a set."""
+
+    family: ProblemSet
+    number: int
+    seed: int
 
 
 @dataclass(frozen=True)
@@ -29,6 +46,56 @@ class Ready:
 
     case: Case
     best: float
+
+
+_kept: dict[tuple[str, int, int], Ready] = {}  # the last case of this process
+_warm: set[tuple[str, bool]] = set()  # methods that have run in this process, on cases that stand still or move
+
+
+def built(which: Which) -> str | None:
+    """Build a case; return what went wrong, if anything."""
+    try:
+        _ready(which)
+    except Exception as error:
+        return f"{type(error).__name__}: {sentence(error)}"
+    return None
+
+
+def warmed(which: Which, entrant: Entrant, cap: float) -> None:
+    """Let a method import and compile what it needs, before it is timed for the first time in this process."""
+    made = _ready(which)
+    key = (entrant.name, bool(made.case.frames))
+    if key not in _warm:
+        _warm.add(key)
+        allow(cap)
+        solve(entrant, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:GLIMPSE])))
+
+
+def solved(which: Which, entrant: Entrant, level: Budget, cap: float) -> Record:
+    """Solve a case; the process ends where that takes longer than it may."""
+    warmed(which, entrant, cap)
+    made = _ready(which)
+    allow(max(cap, FRAME_CAP * len(made.case.frames)))
+    return solve(entrant, level, made)
+
+
+def drawn(which: Which, good: Entrant, bad: Entrant, cap: float) -> str:
+    """HTML of a case: the answer of one method solid, that of the other transparent."""
+    from wholebody.bench.compare.scenes import page
+
+    made = _ready(which)
+    allow(2.0 * cap)
+    return page(good, bad, made)
+
+
+def _ready(which: Which) -> Ready:
+    key = (which.family.name, which.number, which.seed)
+    if key not in _kept:
+        _kept.clear()
+        gc.collect()
+        allow(BUILDING)
+        _kept[key] = ready(*which)
+    return _kept[key]
 
 
 def ready(family: ProblemSet, number: int, seed: int) -> Ready:

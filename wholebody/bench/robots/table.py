@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import os
-import subprocess
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +11,12 @@ from xml.etree import ElementTree
 import numpy as np
 
 from wholebody.bench.machine import sentence
-from wholebody.bench.robots.reaching import Loaded
+from wholebody.bench.robots.reaching import Loaded, examine
 from wholebody.bench.tables import markdown
 from wholebody.errors import InputError
 from wholebody.files import Scratch
 from wholebody.geometry.mesh_cache import VARIABLE
+from wholebody.runner import Child, EndedError
 
 LONGEST = 300.0
 """Seconds after which a description is given up."""
@@ -79,17 +77,15 @@ def measure(folder: Path, reaches: int) -> Iterator[Robot]:
 
 
 def _examined(path: Path, reaches: int, cache: str) -> Loaded:
-    command = [sys.executable, "-m", "wholebody.bench.robots.reaching", str(path), str(reaches)]
-    environment = {**os.environ, VARIABLE: cache, "OMP_NUM_THREADS": "1"}
+    child = Child({VARIABLE: cache, "OMP_NUM_THREADS": "1"})
     try:
-        ended = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, env=environment, check=False)
-    except subprocess.TimeoutExpired:
-        return Loaded(LONGEST, refused=f"it takes more than {LONGEST:g} s")
-    if ended.returncode != 0:
-        last = (ended.stderr.strip().splitlines() or [""])[-1]
-        return Loaded(0.0, refused=f"the process ended with {ended.returncode}: {last[-200:]}")
-    found = json.loads(ended.stdout.strip().splitlines()[-1])
-    return Loaded(**{**found, "times": tuple(found["times"]), "statuses": tuple(found["statuses"])})
+        found: Loaded = child.call(examine, str(path), reaches, seconds=LONGEST)
+    except EndedError as error:
+        refused = f"it takes more than {LONGEST:g} s" if error.overtime else str(error)
+        return Loaded(LONGEST if error.overtime else 0.0, refused=refused)
+    finally:
+        child.close()
+    return found
 
 
 def page(robots: list[Robot], facts: Mapping[str, str], reaches: int) -> str:
