@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from wholebody.bench import style
+from wholebody.bench.adapters import STEPPING
 from wholebody.bench.reaches import ReachRow
 from wholebody.bench.solve import MemoryRow, SolveRow
 from wholebody.bench.step import StepRow, StepTime
 from wholebody.bench.tables import read_rows
-from wholebody.bench.tools import NEEDS
 from wholebody.bench.track import VARIANTS
 from wholebody.cli.bench import add_to
 
@@ -94,7 +94,7 @@ def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
 
 
 def test_every_tool_has_a_colour_of_its_own() -> None:
-    assert set(NEEDS) <= set(style.COLORS)
+    assert set(STEPPING) <= set(style.COLORS)
     assert set(style.MARKERS) <= set(style.COLORS)
     twice = {"wholebody/osqp": "qp/osqp", "wholebody/daqp": "qp/daqp"}  # the same method in another chart
     for tool, method in twice.items():

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from wholebody.bench.tools.wholebody_tool import WholebodyTool
+from wholebody.bench.adapters.own import WholebodyTool
 from wholebody.bench.track import DT, Track
 
 WITHIN_STEP = 0.06  # m beyond the clearance: as far as a step of `QP` looks

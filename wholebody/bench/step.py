@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wholebody.bench.adapters import make_tool
+from wholebody.bench.adapters.base import Tool
 from wholebody.bench.judge import Verdict, judge
-from wholebody.bench.tools import make_tool
-from wholebody.bench.tools.base import Tool
 from wholebody.bench.track import CLEARANCE, Array, Track
 
 REFERENCE = "placo"

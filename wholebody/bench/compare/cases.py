@@ -44,9 +44,9 @@ def _candidates(results: Results, family: str) -> list[tuple[float, Shown]]:
         return []
     good = _by_number(results, family, OURS) or _by_number(results, family, _most_successful(results, family))
     found = []
-    for other in results.entrants:
+    for other in results.adapters:
         failing = [
-            (_size(bad), Shown(family, number, good[number].entrant, other, _about(good[number], bad)))
+            (_size(bad), Shown(family, number, good[number].method, other, _about(good[number], bad)))
             for number, bad in _by_number(results, family, other).items()
             if bad.answered and not bad.success(COARSE) and number in good and good[number].success(COARSE)
         ]
@@ -67,15 +67,15 @@ def _about(good: Record, bad: Record) -> str:
         faults.append(f"is {1e3 * bad.penetration:.0f} mm inside of something")
     elif bad.broken > COARSE:
         faults.append(f"breaks what must hold by {1e3 * bad.broken:.1f} mm or mrad")
-    return f"{good.entrant} solves it in {1e3 * good.seconds:.0f} ms; {bad.entrant} {claim} and {' and '.join(faults)}."
+    return f"{good.method} solves it in {1e3 * good.seconds:.0f} ms; {bad.method} {claim} and {' and '.join(faults)}."
 
 
-def _by_number(results: Results, family: str, entrant: str) -> dict[int, Record]:
-    return {record.number: record for record in results.taken(family, entrant)}
+def _by_number(results: Results, family: str, adapter: str) -> dict[int, Record]:
+    return {record.number: record for record in results.taken(family, adapter)}
 
 
 def _most_successful(results: Results, family: str) -> str:
-    def solved(entrant: str) -> int:
-        return sum(record.success(COARSE) for record in results.default(family, entrant))
+    def solved(adapter: str) -> int:
+        return sum(record.success(COARSE) for record in results.default(family, adapter))
 
-    return max(results.entrants, key=solved)
+    return max(results.adapters, key=solved)

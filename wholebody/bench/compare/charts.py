@@ -32,18 +32,18 @@ def speed_accuracy(results: Results, family: str, title: str, path: Path) -> tup
         panel.set_visible(False)
     drawn: dict[str, Any] = {}
     for panel, quantity in zip(panels, quantities, strict=False):
-        for entrant in reversed(results.entrants):
-            points = curve(results, family, entrant, quantity)
+        for adapter in reversed(results.adapters):
+            points = curve(results, family, adapter, quantity)
             if points:
-                drawn[entrant] = _draw(panel, points, entrant, quantity)
+                drawn[adapter] = _draw(panel, points, adapter, quantity)
         _dress(panel, quantity, "a frame" if results.moving(family) else "a solve")
     chart.suptitle(title, x=0.01, ha="left", fontsize=13)
     _legend(chart, results, drawn)
     return style.save(chart, path)
 
 
-def _draw(panel: Any, points: list[Point], entrant: str, quantity: Quantity) -> Any:
-    seen = look(entrant)
+def _draw(panel: Any, points: list[Point], adapter: str, quantity: Quantity) -> Any:
+    seen = look(adapter)
     order = 3 if seen.principal else 2
     width, size = (1.8, 6.0) if seen.principal else (0.9, 4.0)
     x = [MS * point.seconds for point in points]
@@ -98,17 +98,17 @@ def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Pat
     """Share of the cases solved within a time at the default budget, to a millimetre and to a tenth of one."""
     chart, axes = style.figure(1, 2, (11.0, 4.6))
     drawn: dict[str, Any] = {}
-    known = [time for entrant in results.entrants for time in profile(results, family, entrant, COARSE)[0]]
+    known = [time for adapter in results.adapters for time in profile(results, family, adapter, COARSE)[0]]
     start, end = 0.7 * MS * min(known, default=1.0), 1.5 * MS * max(known, default=1.0)
     for panel, tolerance in zip(axes[0], (COARSE, FINE), strict=True):
-        for entrant in reversed(results.entrants):
-            times, cases = profile(results, family, entrant, tolerance)
+        for adapter in reversed(results.adapters):
+            times, cases = profile(results, family, adapter, tolerance)
             if not cases:
                 continue
-            seen = look(entrant)
+            seen = look(adapter)
             shares = [100.0 * (place + 1) / cases for place in range(len(times))]
             x = [MS * time for time in times]
-            (drawn[entrant],) = panel.step(
+            (drawn[adapter],) = panel.step(
                 [start, *x, end], [0.0, *shares, shares[-1] if shares else 0.0], where="post",
                 color=seen.color, linewidth=1.9 if seen.principal else 0.9, zorder=3 if seen.principal else 2,
             )  # fmt: skip
@@ -134,7 +134,7 @@ def _time_axis(panel: Any) -> None:
 
 
 def _legend(chart: Any, results: Results, drawn: dict[str, Any]) -> None:
-    names = [entrant for entrant in results.entrants if entrant in drawn]
+    names = [adapter for adapter in results.adapters if adapter in drawn]
     if names:
         chart.legend(
             [drawn[name] for name in names], names, loc="outside lower center", ncols=min(len(names), 6),

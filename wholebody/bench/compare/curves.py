@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wholebody.bench.adapters.base import Budget
 from wholebody.bench.compare.results import Quantity, Results, middle
-from wholebody.bench.entrants.base import Budget
 
 
 class Point(NamedTuple):
@@ -30,12 +30,12 @@ class Point(NamedTuple):
     high: float
 
 
-def curve(results: Results, family: str, entrant: str, quantity: Quantity) -> list[Point]:
+def curve(results: Results, family: str, adapter: str, quantity: Quantity) -> list[Point]:
     """Points of a method in a set, from the fastest budget to the slowest."""
-    cases = results.swept(family, entrant)
+    cases = results.swept(family, adapter)
     points = []
-    for level in results.levels(family, entrant):
-        seconds, values = results.values(family, entrant, level, quantity, cases)
+    for level in results.levels(family, adapter):
+        seconds, values = results.values(family, adapter, level, quantity, cases)
         spent = seconds[np.isfinite(seconds)]
         if not len(spent):
             continue
@@ -44,7 +44,7 @@ def curve(results: Results, family: str, entrant: str, quantity: Quantity) -> li
     return points
 
 
-def profile(results: Results, family: str, entrant: str, tolerance: float) -> tuple[list[float], int]:
+def profile(results: Results, family: str, adapter: str, tolerance: float) -> tuple[list[float], int]:
     """Times of the cases that a method solved at its default budget, sorted, and how many it took."""
-    mine = results.taken(family, entrant)
+    mine = results.taken(family, adapter)
     return sorted(record.seconds for record in mine if record.success(tolerance)), len(mine)

@@ -11,10 +11,10 @@ from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from typing import Any
 
+from wholebody.bench.adapters.base import FIRST_FIT, Adapter, Budget
 from wholebody.bench.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Record
 from wholebody.bench.compare.solving import BUILDING, Which, built, solved, warmed
 from wholebody.bench.compare.store import Chunk
-from wholebody.bench.entrants.base import FIRST_FIT, Budget, Entrant
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.errors import MissingPackageError, WholebodyError
 from wholebody.runner import ONE_THREAD, Child, EndedError
@@ -38,7 +38,7 @@ class Task:
     family: ProblemSet
     number: int
     seed: int
-    solves: tuple[tuple[Entrant, tuple[Budget, ...]], ...]
+    solves: tuple[tuple[Adapter, tuple[Budget, ...]], ...]
     cap: float
     most: float
 
@@ -57,21 +57,21 @@ def work(task: Task) -> Chunk:
         return Chunk(task.family.name, task.number, (), building=building, fault=fault)
     records: list[Record] = []
     spent, swept = {}, {}
-    for entrant, ladder in task.solves:
-        _warm_up(child, which, entrant, task.cap)  # seconds of compiling, which say nothing of what its solves cost
+    for adapter, ladder in task.solves:
+        _warm_up(child, which, adapter, task.cap)  # seconds of compiling, which say nothing of what its solves cost
         began = time.perf_counter()
-        first, ended = _solve(child, entrant, DEFAULT, task)
+        first, ended = _solve(child, adapter, DEFAULT, task)
         records.append(first)
         between = time.perf_counter()
-        spent[entrant.name] = between - began
-        if ladder and spent[entrant.name] * len(ladder) <= task.most:
-            records += _sweep(child, entrant, ladder, task, first, ended)
-            swept[entrant.name] = time.perf_counter() - between
+        spent[adapter.name] = between - began
+        if ladder and spent[adapter.name] * len(ladder) <= task.most:
+            records += _sweep(child, adapter, ladder, task, first, ended)
+            swept[adapter.name] = time.perf_counter() - between
     return Chunk(task.family.name, task.number, tuple(records), spent, swept, building)
 
 
 def _sweep(
-    child: Child, entrant: Entrant, ladder: Iterable[Budget], task: Task, first: Record, ended: bool
+    child: Child, adapter: Adapter, ladder: Iterable[Budget], task: Task, first: Record, ended: bool
 ) -> list[Record]:
     """All further budgets; where the process has ended over one, the rest count as what they would have been.
 
@@ -85,34 +85,34 @@ def _sweep(
         kind = level[1] == FIRST_FIT
         record, over = last[kind]
         if not over:
-            last[kind] = record, over = _solve(child, entrant, level, task)
+            last[kind] = record, over = _solve(child, adapter, level, task)
             records.append(record)
         else:
             records.append(replace(record, tolerance=level[0], budget=level[1] or 0))
     return records
 
 
-def _solve(child: Child, entrant: Entrant, level: Budget, task: Task) -> tuple[Record, bool]:
+def _solve(child: Child, adapter: Adapter, level: Budget, task: Task) -> tuple[Record, bool]:
     """What came of a solve, and whether the process has ended over it."""
     try:
         which = Which(task.family, task.number, task.seed)
-        record: Record = child.call(solved, which, entrant, level, task.cap, seconds=BUILDING)
+        record: Record = child.call(solved, which, adapter, level, task.cap, seconds=BUILDING)
     except EndedError as error:
-        empty = Record(task.family.name, task.number, entrant.name, level[0], level[1] or 0, FAILED)
+        empty = Record(task.family.name, task.number, adapter.name, level[0], level[1] or 0, FAILED)
         if error.overtime:
             return replace(empty, outcome=OVERTIME, said=f"ended after {task.cap:g} s"), True
         return replace(empty, said=str(error)), True
     return record, False
 
 
-def _warm_up(child: Child, which: Which, entrant: Entrant, cap: float) -> None:
+def _warm_up(child: Child, which: Which, adapter: Adapter, cap: float) -> None:
     """Let a method import and compile what it needs. What goes wrong over it will do so again in its solve."""
-    if entrant.name in _local.hopeless:
+    if adapter.name in _local.hopeless:
         return
     try:
-        child.call(warmed, which, entrant, cap, seconds=BUILDING)
+        child.call(warmed, which, adapter, cap, seconds=BUILDING)
     except EndedError:
-        _local.hopeless.add(entrant.name)
+        _local.hopeless.add(adapter.name)
 
 
 def own_child() -> Child:

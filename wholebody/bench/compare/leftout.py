@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.advice import words
 from wholebody.bench.compare.blocks import Block, Heading, Points, Table, Text
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.compare.summary import Summary
-from wholebody.bench.entrants.base import Entrant
 
 SHOWN = 110  # characters of a message
 
@@ -29,15 +29,15 @@ def part(
     return told or [Text("Nothing: every method took every problem of every set.")]
 
 
-def setup(entrant: Entrant) -> str:
+def setup(adapter: Adapter) -> str:
     """How a method was set up, and what it cannot express."""
-    differences = "".join(f"; {sentence}" for sentence in entrant.differences)
-    return f"**{entrant.name}**: {entrant.setup.rstrip('.')}{differences}."
+    differences = "".join(f"; {sentence}" for sentence in adapter.differences)
+    return f"**{adapter.name}**: {adapter.setup.rstrip('.')}{differences}."
 
 
 def _refusals(rows: Sequence[Summary]) -> list[Block]:
     found = [
-        (row.entrant, words(row.set), "all" if row.refused == row.cases else f"{row.refused} of {row.cases}",
+        (row.method, words(row.set), "all" if row.refused == row.cases else f"{row.refused} of {row.cases}",
          _cut(row.said))
         for row in rows
         if row.refused
@@ -52,7 +52,7 @@ def _refusals(rows: Sequence[Summary]) -> list[Block]:
 
 def _failures(rows: Sequence[Summary]) -> list[Block]:
     found = [
-        (row.entrant, words(row.set), str(row.failed), str(row.overtime), _cut(row.said))
+        (row.method, words(row.set), str(row.failed), str(row.overtime), _cut(row.said))
         for row in rows
         if row.failed or row.overtime
     ]
@@ -67,7 +67,7 @@ def _failures(rows: Sequence[Summary]) -> list[Block]:
 def _slow(settings: Settings, rows: Sequence[Summary]) -> list[Block]:
     asked = {family.name: settings.asked(family) for family in settings.sets}
     found = [
-        (row.entrant, words(row.set), f"{row.cases} of {cases}", f"{row.swept} of {sweep}")
+        (row.method, words(row.set), f"{row.cases} of {cases}", f"{row.swept} of {sweep}")
         for row in rows
         for cases, sweep in [asked[row.set]]
         if row.cases < cases or (row.swept < sweep and row.refused < row.cases)

@@ -33,11 +33,11 @@ _SOLVERS = ("#7f9fc4", "#4b6a9b", "#9fb8d0", "#35507a", "#b3c6e0", "#5f86b3")
 _OTHERS = ("#882255", "#117733", "#999933", "#661100", "#aa4499", "#44aa99")
 
 
-def look(entrant: str) -> Look:
+def look(adapter: str) -> Look:
     """Return how a method looks; one that is not known here has a look of its own by its name."""
-    if entrant in _LOOKS:
-        return _LOOKS[entrant]
-    number = sha256(entrant.encode()).digest()[0]
-    if entrant.startswith("qp/"):
+    if adapter in _LOOKS:
+        return _LOOKS[adapter]
+    number = sha256(adapter.encode()).digest()[0]
+    if adapter.startswith("qp/"):
         return Look(_SOLVERS[number % len(_SOLVERS)], ".", False)
     return Look(_OTHERS[number % len(_OTHERS)], "p", True)

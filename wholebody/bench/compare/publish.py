@@ -53,14 +53,14 @@ def publish(
         write_rows(folder / "front.csv", facts, front)
     say("charts and scenes")
     families = {family.name: family for family in settings.sets}
-    methods = {entrant.name: entrant for entrant in settings.entrants}
+    methods = {adapter.name: adapter for adapter in settings.adapters}
     with ThreadPoolExecutor(1) as pool:  # scenes are drawn in a process of their own, charts in this one
         drawn = pool.submit(draw, chosen(given.results), families, methods, settings.seed, settings.cap)
         titles = [(family.name, family.title) for family in settings.sets]
         charts = draw_all(given.results, titles, folder / "charts")
         scenes = drawn.result()
     say("report")
-    subtitle = f"{len(settings.sets)} problem sets, {len(settings.entrants)} methods, {len(store.records)} solves. " + (
+    subtitle = f"{len(settings.sets)} problem sets, {len(settings.adapters)} methods, {len(store.records)} solves. " + (
         f"Measured {facts.get('date', '')} with wholebody {facts.get('wholebody', '')} on {facts.get('processor', '')}."
     )
     write_text(folder / PAGE, write_html(report.blocks(given), charts, scenes, subtitle))

@@ -47,7 +47,7 @@ def material(
     """Put the records of a run in order."""
     records = [record for chunk in chunks for record in chunk.records]
     results = Results(
-        records, [family.name for family in settings.sets], [entrant.name for entrant in settings.entrants]
+        records, [family.name for family in settings.sets], [adapter.name for adapter in settings.adapters]
     )
     return Material(settings, chunks, results, summaries(results), facts, missing)
 
@@ -70,13 +70,13 @@ def blocks(given: Material) -> list[Block]:
         *_reading(given),
         *(block for family in given.settings.sets for block in sections.of_set(given.results, given.rows, family)),
         Heading(2, "Who is on the front"),
-        *sections.front_part(given.results, given.settings.entrants),
+        *sections.front_part(given.results, given.settings.adapters),
         Heading(2, "Scenes of chosen cases"),
         Scenes(),
         Heading(2, "What was left out"),
         *leftout.part(given.settings, given.chunks, given.rows, given.missing),
         Heading(2, "How the methods were set up"),
-        Points([leftout.setup(entrant) for entrant in given.settings.entrants]),
+        Points([leftout.setup(adapter) for adapter in given.settings.adapters]),
         Heading(2, "Settings and machine"),
         Text(settings_sentence(given)),
         Text(sentence(given.facts)),
@@ -99,7 +99,7 @@ def short(given: Material) -> list[Block]:
         _standings(given),
         *charts,
         Heading(3, "Who is on the front"),
-        *sections.front_part(given.results, given.settings.entrants),
+        *sections.front_part(given.results, given.settings.adapters),
         Heading(3, "What was left out"),
         *leftout.part(given.settings, given.chunks, given.rows, given.missing),
         Text(settings_sentence(given)),
@@ -176,8 +176,8 @@ def _choices(given: Material) -> Table:
     return Table(("problems", "fastest dependable", "most accurate dependable", "least effort", "solves most"), rows)
 
 
-def _plain(entrants: Sequence[str]) -> str:
-    return ", ".join(algorithms(entrants))
+def _plain(adapters: Sequence[str]) -> str:
+    return ", ".join(algorithms(adapters))
 
 
 def _standings(given: Material) -> Table:
@@ -186,7 +186,7 @@ def _standings(given: Material) -> Table:
         worst = f"{words(standing.worst_set)} ({100 * standing.worst_share:.0f} %)" if standing.worst_set else ""
         rows.append(
             (
-                standing.entrant, f"{standing.taken} of {len(given.results.sets)}", str(standing.dependable), worst,
+                standing.method, f"{standing.taken} of {len(given.results.sets)}", str(standing.dependable), worst,
                 slowness(standing.slowness), str(standing.slowness.cases), str(standing.false_claims),
                 f"{standing.deepest_mm:.2g}" if isfinite(standing.deepest_mm) else "",
             )

@@ -7,10 +7,10 @@ import gzip
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.cases import Shown
 from wholebody.bench.compare.record import DEFAULT
 from wholebody.bench.compare.solving import BUILDING, Which, drawn
-from wholebody.bench.entrants.base import Entrant
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.files import Scratch
 from wholebody.runner import ONE_THREAD, Child, EndedError
@@ -37,14 +37,14 @@ class Scene(NamedTuple):
 
 
 def draw(
-    shown: Sequence[Shown], families: Mapping[str, ProblemSet], entrants: Mapping[str, Entrant], seed: int, cap: float
+    shown: Sequence[Shown], families: Mapping[str, ProblemSet], adapters: Mapping[str, Adapter], seed: int, cap: float
 ) -> list[Scene]:
     """Solve the chosen cases again and draw them; one that cannot be drawn is left out."""
     child, scenes = Child(ONE_THREAD), []
     try:
         for case in shown:
             try:
-                which, pair = Which(families[case.set], case.number, seed), (entrants[case.good], entrants[case.bad])
+                which, pair = Which(families[case.set], case.number, seed), (adapters[case.good], adapters[case.bad])
                 page = child.call(drawn, which, *pair, cap, seconds=BUILDING)
             except EndedError:
                 continue
@@ -57,12 +57,12 @@ def draw(
     return scenes
 
 
-def page(good: Entrant, bad: Entrant, made: Ready) -> str:
+def page(good: Adapter, bad: Adapter, made: Ready) -> str:
     """HTML of a case: the answer of one method solid, that of the other transparent."""
     from wholebody.view.viewer import Viewer
 
     problem = made.case.problem
-    right, wrong = (entrant.make(*DEFAULT).solve(problem).q for entrant in (good, bad))
+    right, wrong = (adapter.make(*DEFAULT).solve(problem).q for adapter in (good, bad))
     with Viewer(problem.scene, title=f"{made.case.set} {made.case.number}") as viewer:
         viewer.ghosts([right])
         viewer.show(wrong, problem=problem)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf, isfinite
 
+from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.advice import words
 from wholebody.bench.compare.blocks import Block, Chart, Heading, Table, Text
 from wholebody.bench.compare.front import MOST, OURS, Rival, fronts
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.summary import Summary
-from wholebody.bench.entrants.base import Entrant
 from wholebody.bench.problem_sets.case import ProblemSet
 
 
@@ -39,9 +39,9 @@ def figures(results: Results, rows: Sequence[Summary], family: str) -> Table:
 
 def _row(row: Summary, moving: bool) -> list[str]:
     if row.refused == row.cases:
-        return [row.entrant, str(row.cases), "all", *[""] * (15 if moving else 12)]
+        return [row.method, str(row.cases), "all", *[""] * (15 if moving else 12)]
     cells = [
-        row.entrant, str(row.cases), str(row.refused), str(row.swept), _percent(row.success),
+        row.method, str(row.cases), str(row.refused), str(row.swept), _percent(row.success),
         _percent(row.success_fine), str(row.false_claims), _number(row.median_ms), _number(row.p95_ms),
         _number(row.cpu_median_ms), _number(row.setup_ms), f"{row.iterations:.3g}" if isfinite(row.iterations) else "",
         f"{row.worst_median:.0e}" if isfinite(row.worst_median) else "", _number(row.deepest_mm),
@@ -51,7 +51,7 @@ def _row(row: Summary, moving: bool) -> list[str]:
     return [*cells, f"{100 * row.effort:.2g} %" if isfinite(row.effort) else ""]
 
 
-def front_part(results: Results, entrants: Sequence[Entrant]) -> list[Block]:
+def front_part(results: Results, adapters: Sequence[Adapter]) -> list[Block]:
     """Whether our method is on the front of every chart, by wall time, the processor's, and nine problems in ten."""
     wall, processor, dependable = fronts(results), fronts(results.by_processor()), fronts(results, share=MOST)
     if not wall:
@@ -67,7 +67,7 @@ def front_part(results: Results, entrants: Sequence[Entrant]) -> list[Block]:
     still = sum(rival.on_front for rival in dependable)
     by_cpu, by_most = ({(rival.set, rival.quantity): rival for rival in rivals} for rivals in (processor, dependable))
     ahead = sorted({rival.method for rival in off})
-    known = {entrant.name: entrant.differences for entrant in entrants}
+    known = {adapter.name: adapter.differences for adapter in adapters}
     return [
         Text(
             "A method is on the front where no other is faster at any accuracy from 1e-3 down to 1e-8. The time to an "

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.assessment import Assessment, assess
+from wholebody.bench.adapters.base import Adapter, Budget, set_up
 from wholebody.bench.compare.record import ANSWERED, DEFAULT, FAILED, REFUSED, Record
-from wholebody.bench.entrants.base import Budget, Entrant, set_up
 from wholebody.bench.problem_sets.case import Case, ProblemSet
 from wholebody.errors import WholebodyError
 from wholebody.problem import Problem
@@ -61,25 +61,25 @@ def built(which: Which) -> str | None:
     return None
 
 
-def warmed(which: Which, entrant: Entrant, cap: float) -> None:
+def warmed(which: Which, adapter: Adapter, cap: float) -> None:
     """Let a method import and compile what it needs, before it is timed for the first time in this process."""
     made = _ready(which)
-    key = (entrant.name, bool(made.case.frames))
+    key = (adapter.name, bool(made.case.frames))
     if key not in _warm:
         _warm.add(key)
         allow(cap)
-        solve(entrant, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:GLIMPSE])))
+        solve(adapter, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:GLIMPSE])))
 
 
-def solved(which: Which, entrant: Entrant, level: Budget, cap: float) -> Record:
+def solved(which: Which, adapter: Adapter, level: Budget, cap: float) -> Record:
     """Solve a case; the process ends where that takes longer than it may."""
-    warmed(which, entrant, cap)
+    warmed(which, adapter, cap)
     made = _ready(which)
     allow(max(cap, FRAME_CAP * len(made.case.frames)))
-    return solve(entrant, level, made)
+    return solve(adapter, level, made)
 
 
-def drawn(which: Which, good: Entrant, bad: Entrant, cap: float) -> str:
+def drawn(which: Which, good: Adapter, bad: Adapter, cap: float) -> str:
     """HTML of a case: the answer of one method solid, that of the other transparent."""
     from wholebody.bench.compare.scenes import page
 
@@ -112,13 +112,13 @@ def ready(family: ProblemSet, number: int, seed: int) -> Ready:
     return Ready(case, assess(case.problem, case.witness).measure)
 
 
-def solve(entrant: Entrant, level: Budget, made: Ready) -> Record:
+def solve(adapter: Adapter, level: Budget, made: Ready) -> Record:
     """Solve a case with a fresh method. Whatever the method does, this returns what came of it."""
     from wholebody.bench.compare.following import follow
 
-    empty = blank(entrant, level, made.case.set, made.case.number)
+    empty = blank(adapter, level, made.case.set, made.case.number)
     try:
-        method = entrant.make(*level)
+        method = adapter.make(*level)
         moving = bool(made.case.frames)
         problem = copy.copy(made.case.problem) if moving else made.case.problem  # each moves the goals of its own copy
         began = time.perf_counter()
@@ -136,10 +136,10 @@ def solve(entrant: Entrant, level: Budget, made: Ready) -> Record:
         gc.enable()
 
 
-def blank(entrant: Entrant, level: Budget, family: str, number: int) -> Record:
+def blank(adapter: Adapter, level: Budget, family: str, number: int) -> Record:
     """A record without an answer."""
     tolerance, iterations = level
-    return Record(family, number, entrant.name, tolerance, iterations or 0, FAILED)
+    return Record(family, number, adapter.name, tolerance, iterations or 0, FAILED)
 
 
 def sentence(error: BaseException) -> str:

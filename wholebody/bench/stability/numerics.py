@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.bench.entrants.base import Entrant
+from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.stability.bodies import planar_arm, spatial_arm
 from wholebody.bench.stability.case import HardCase, Kind, Nonsense, Posed
 from wholebody.geometry.shapes import Box
@@ -108,13 +108,13 @@ class NotNumbers(HardCase):
         """A start, a goal, a goal in the middle of a drag, a thing's place, and the method's own tolerance."""
         return Nonsense(
             {
-                "NaN in the start": lambda entrant: _solve(entrant, start=NAN),
-                "NaN in a goal": lambda entrant: _solve(entrant, goal=NAN),
-                "infinity in a goal": lambda entrant: _solve(entrant, goal=INFINITE),
-                "NaN in a thing's place": lambda entrant: _solve(entrant, box=NAN),
-                "NaN in a drag": lambda entrant: Drag(_reach(), entrant.make(1e-5, None)).to((NAN, 0.0, 0.5)),
+                "NaN in the start": lambda adapter: _solve(adapter, start=NAN),
+                "NaN in a goal": lambda adapter: _solve(adapter, goal=NAN),
+                "infinity in a goal": lambda adapter: _solve(adapter, goal=INFINITE),
+                "NaN in a thing's place": lambda adapter: _solve(adapter, box=NAN),
+                "NaN in a drag": lambda adapter: Drag(_reach(), adapter.make(1e-5, None)).to((NAN, 0.0, 0.5)),
                 "NaN in where a drag is": _drag_from_nowhere,
-                "NaN as tolerance": lambda entrant: entrant.make(NAN, None).solve(_reach()),
+                "NaN as tolerance": lambda adapter: adapter.make(NAN, None).solve(_reach()),
             },
             _reach(),
         )
@@ -129,12 +129,12 @@ def _reach(start: float = 0.5, goal: float = 0.5, box: float = 0.0) -> Problem:
     return problem
 
 
-def _solve(entrant: Entrant, **changed: float) -> object:
-    return entrant.make(1e-5, None).solve(_reach(**changed))
+def _solve(adapter: Adapter, **changed: float) -> object:
+    return adapter.make(1e-5, None).solve(_reach(**changed))
 
 
-def _drag_from_nowhere(entrant: Entrant) -> object:
-    drag = Drag(_reach(), entrant.make(1e-5, None))
+def _drag_from_nowhere(adapter: Adapter) -> object:
+    drag = Drag(_reach(), adapter.make(1e-5, None))
     drag.q = np.array([-0.6, NAN, 0.5])
     return drag.to((0.7, 0.0, 0.4))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from wholebody.bench.entrants.base import Entrant
+from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.machine import sentence
 from wholebody.bench.stability.case import HardCase, Kind
 from wholebody.bench.stability.pictures import Drawn
@@ -33,12 +33,12 @@ def report(result: Result, facts: Mapping[str, str]) -> str:
     )
 
 
-def page(result: Result, entrants: Sequence[Entrant], facts: Mapping[str, str], drawn: Drawn, folder: str) -> str:
+def page(result: Result, adapters: Sequence[Adapter], facts: Mapping[str, str], drawn: Drawn, folder: str) -> str:
     """The section of the page that is written by the command.
 
     Args:
         result: all cells.
-        entrants: who was asked.
+        adapters: who was asked.
         facts: of the machine.
         drawn: pictures by case.
         folder: of the pictures, relative to the page.
@@ -46,7 +46,7 @@ def page(result: Result, entrants: Sequence[Entrant], facts: Mapping[str, str], 
     parts = [
         f"![{len(result.cases)} cases by {len(result.methods)} methods: a colour and a sign a cell]({folder}/{CHART})",
         _counts(result),
-        _setups(entrants),
+        _setups(adapters),
     ]
     group = ""
     for case in result.cases:
@@ -112,14 +112,14 @@ def _cells(result: Result, kind: Kind, none: str) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def _setups(entrants: Sequence[Entrant]) -> str:
+def _setups(adapters: Sequence[Adapter]) -> str:
     lines = [
         "How each method was set up; the others are called by adapters of this project, and may do better alone:",
         "",
     ]
-    for entrant in entrants:
-        differences = "; ".join(entrant.differences)
-        lines.append(f"- `{entrant.name}`: {entrant.setup}" + (f" Besides: {differences}." if differences else ""))
+    for adapter in adapters:
+        differences = "; ".join(adapter.differences)
+        lines.append(f"- `{adapter.name}`: {adapter.setup}" + (f" Besides: {differences}." if differences else ""))
     return "\n".join(lines)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from wholebody.bench.entrants.base import Entrant
+from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.stability.answering import NOTHING, Answer, ask
 from wholebody.bench.stability.case import HardCase
 from wholebody.bench.stability.judging import Judged, judge
@@ -25,17 +25,17 @@ class Cell:
     judged: Judged
 
 
-def run(cases: Sequence[HardCase], entrants: Sequence[Entrant], jobs: int = 1, cap: float = CAP) -> Iterator[Cell]:
+def run(cases: Sequence[HardCase], adapters: Sequence[Adapter], jobs: int = 1, cap: float = CAP) -> Iterator[Cell]:
     """Every case by every method, as they end.
 
     Args:
         cases: what is asked.
-        entrants: who is asked.
+        adapters: who is asked.
         jobs: processes at a time.
         cap: seconds for an answer, or for a frame of one.
     """
     _warm()
-    left = (Job((case, entrant.name), _cell, (case, entrant, cap), cap) for case in cases for entrant in entrants)
+    left = (Job((case, adapter.name), _cell, (case, adapter, cap), cap) for case in cases for adapter in adapters)
     for outcome in run_jobs(lambda: next(left, None), [Child(forked=True) for _ in range(jobs)]):
         case, method = outcome.job.name
         answer = outcome.notes[0] if outcome.notes else Answer(NOTHING)
@@ -55,9 +55,9 @@ def _warm() -> None:
     question.problem.scene.sweep(question.problem.start, judged.q)
 
 
-def _cell(case: HardCase, entrant: Entrant, cap: float) -> Judged:
+def _cell(case: HardCase, adapter: Adapter, cap: float) -> Judged:
     """Ask, send the answer, then judge it: the clock for the method stops with the answer."""
-    answer = ask(case, entrant, lambda: allow(cap))
+    answer = ask(case, adapter, lambda: allow(cap))
     allow(JUDGING)
     tell(answer)
     return judge(case, answer)

@@ -24,11 +24,11 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 def run(arguments: argparse.Namespace) -> int:
     """Measure steps."""
     from wholebody.bench import charts, stages
+    from wholebody.bench.adapters import chosen_tools, differences
     from wholebody.bench.machine import machine
     from wholebody.bench.report import step_report
     from wholebody.bench.step import goal_lines, measure
     from wholebody.bench.tables import write_rows
-    from wholebody.bench.tools import chosen_tools, differences
     from wholebody.bench.track import VARIANTS, track
 
     tools = chosen_tools(arguments.tools)

@@ -1,15 +1,19 @@
-"""pink: `solve_ik` with its tasks, limits and SelfCollisionBarrier, iterated; the QPs are solved by DAQP."""
+"""pink: `solve_ik` with its tasks, limits and SelfCollisionBarrier; the QPs are solved by DAQP.
+
+To solve a problem it is iterated; a reach is followed with one call a step.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.bench.entrants.base import LADDER, Budget, Entrant
-from wholebody.bench.entrants.loop import GAIN, STEP, Array, Loop, StepError, Stepper, kept_apart, pulls
+from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
+from wholebody.bench.adapters.loop import GAIN, STEP, Loop, StepError, Stepper, kept_apart, pulls
+from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Array, Track
 from wholebody.problem import Problem
 from wholebody.tasks import (
     CenterOfMass,
@@ -26,16 +30,18 @@ from wholebody.tasks import (
 )
 from wholebody.tasks.residuals import PlacementResidual
 
-NEAREST = 60  # pairs that its barrier looks at; it gets slower with more, and loses contacts with fewer
+NEAREST = 60  # pairs that its barrier looks at in a solve; it gets slower with more, and loses contacts with fewer
+NEAREST_IN_STEPS = 20  # the same where time counts
+BARRIER_GAIN = 0.5 / DT  # 1/s: half of what is free of a gap may be used up in one step of a reach
 MARGIN = 1e-3  # m: kept beyond the clearance, since inside its barrier pulls the wrong way
 
 
-def pink_entrant() -> Entrant:
+def pink_adapter() -> Adapter:
     """The kinematics of pink in our loop."""
-    return Entrant(
+    return Adapter(
         name="pink",
         make=PinkLoop,
-        loose=(*_few(5, 10, 20), *LADDER),
+        loose=(*few(5, 10, 20), *LADDER),
         setup="pink.solve_ik on our own Pinocchio model, with DAQP: FrameTask, RelativeFrameTask, ComTask and "
         "LinearHolonomicTask (posture and measures, with a weight that fades) as soft tasks, whole holds and frozen "
         f"joints as hard ones, ConfigurationLimit, VelocityLimit and FloatingBaseVelocityLimit of {STEP} rad or m a "
@@ -52,10 +58,6 @@ def pink_entrant() -> Entrant:
         ),
         package="pin-pink",
     )
-
-
-def _few(*iterations: int) -> tuple[Budget, ...]:
-    return tuple((1e-3, count) for count in iterations)
 
 
 class PinkLoop(Loop):
@@ -208,3 +210,61 @@ def _geometry(problem: Problem, least: float) -> tuple[Any, list[tuple[int, Any]
         elif surface:
             made.addCollisionPair(pin.CollisionPair(piece(first, 0.0), piece(second, least - clearance)))
     return made, pieces
+
+
+class PinkTool(Tool):
+    """One `solve_ik` and `integrate_inplace` a step."""
+
+    name = "pink"
+    differences: ClassVar[tuple[str, ...]] = (
+        f"pink's barrier takes the {NEAREST_IN_STEPS} nearest pairs, whatever their distance, not all within a "
+        "distance",
+    )
+
+    def __init__(self, track: Track) -> None:
+        """Set the tasks up."""
+        import pink
+        from pink.barriers import SelfCollisionBarrier
+        from pink.limits import FloatingBaseVelocityLimit
+        from pink.tasks import FrameTask, PostureTask
+
+        self._pink, self._scene = pink, track.scene
+        self._model = track.scene.model.copy()
+        self._model.velocityLimit = np.full(self._model.nv, JOINT_SPEED)
+        self._model.floating_base_velocity_limit = FloatingBaseVelocityLimit(self._model, None, ROOT_SPEED, ROOT_TURN)
+        self._solvers_failure = pink.exceptions.NoSolutionFound
+        self.reset(track.start)
+        self._reach = FrameTask(track.tip, position_cost=REACH_COST, orientation_cost=0.0)
+        self._at = pin.SE3.Identity()
+        posture = PostureTask(cost=POSTURE_COST)
+        posture.set_target(track.start)
+        self._tasks = [self._reach, posture]
+        self._feet = [FrameTask(foot, position_cost=1.0, orientation_cost=1.0) for foot in track.feet]
+        for task in self._feet:
+            task.set_target_from_configuration(self._configuration)
+        self._barrier = SelfCollisionBarrier(n_collision_pairs=NEAREST_IN_STEPS, gain=BARRIER_GAIN, d_min=CLEARANCE)
+
+    def reset(self, q: Array) -> None:
+        """Go to a posture."""
+        self._configuration = self._pink.Configuration(
+            self._model, self._model.createData(), np.array(q), collision_model=self._scene.geometry
+        )
+        self.failures = 0
+
+    def step(self, target: Array) -> None:
+        """Move one step."""
+        self._at.translation = target
+        self._reach.set_target(self._at)
+        try:
+            velocity = self._pink.solve_ik(
+                self._configuration, self._tasks, DT, solver="daqp", damping=POSTURE_COST**2,
+                barriers=[self._barrier], constraints=self._feet, safety_break=False,
+            )  # fmt: skip
+        except self._solvers_failure:
+            self.failures += 1
+            return
+        self._configuration.integrate_inplace(velocity, DT)
+
+    def posture(self) -> Array:
+        """Where it is."""
+        return np.array(self._configuration.q)

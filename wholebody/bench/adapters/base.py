@@ -1,11 +1,13 @@
-"""What a comparison has to know of a method."""
+"""What comparisons ask of an adapter: a method that solves, and a tool that follows a reach step by step."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
+from wholebody.bench.track import Array
 from wholebody.methods.solve import Method
 from wholebody.problem import Problem
 
@@ -26,7 +28,12 @@ LADDER: tuple[Budget, ...] = (
     (1e-6, None),
     (1e-8, None),
 )
-"""Tolerances from cheap to exact; each entrant begins and ends where it makes sense for it."""
+"""Tolerances from cheap to exact; each adapter begins and ends where it makes sense for it."""
+
+
+REACH_COST = 1.0
+POSTURE_COST = 1e-3
+"""Ratio of what a metre and a radian cost in the tools that weigh them: errors are squared after this."""
 
 
 @runtime_checkable
@@ -42,7 +49,7 @@ class Prepared(Protocol):
 
 
 @dataclass(frozen=True)
-class Entrant:
+class Adapter:
     """A method as it takes part in comparisons.
 
     Attributes:
@@ -70,3 +77,38 @@ def set_up(method: Method, problem: Problem) -> None:
     """
     if isinstance(method, Prepared):
         method.prepare(problem)
+
+
+def few(*iterations: int) -> tuple[Budget, ...]:
+    """Budgets of so many iterations each."""
+    return tuple((1e-3, count) for count in iterations)
+
+
+class Tool(ABC):
+    """Follows one reach, step by step, from its own last posture.
+
+    Attributes:
+        name: for tables.
+        differences: what it cannot express of the task, or does otherwise; one sentence each.
+        failures: steps for which it found no answer; it then stays where it is.
+    """
+
+    name: str
+    differences: ClassVar[tuple[str, ...]] = ()
+    failures: int = 0
+
+    @abstractmethod
+    def reset(self, q: Array) -> None:
+        """Go to a posture (nq,)."""
+
+    @abstractmethod
+    def step(self, target: Array) -> None:
+        """Move one step towards a target (3,); this is what is timed."""
+
+    @abstractmethod
+    def posture(self) -> Array:
+        """Where it is now: a fresh posture (nq,) of our figure."""
+
+    def remarks(self) -> dict[str, float]:
+        """What a tool tells of its own steps; empty where it tells nothing."""
+        return {}

@@ -1,7 +1,7 @@
-"""placo: `KinematicsSolver` with its documented tasks, feet and self-collision constraint hard.
+"""placo: our method of that name, and `KinematicsSolver` with its documented tasks for a reach.
 
-placo knows collisions of a robot with itself only. The objects are added to its collision model, fixed to the world; it
-then treats them as parts of the robot.
+In a reach, feet and the self-collision constraint are hard tasks. placo knows collisions of a robot with itself only.
+The objects are added to its collision model, fixed to the world; it then treats them as parts of the robot.
 """
 
 from __future__ import annotations
@@ -12,9 +12,37 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
-from wholebody.bench.tools.base import POSTURE_COST, REACH_COST, Tool
+from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, WITHIN, Array, Track
 from wholebody.figures.shipped import urdf_path
+from wholebody.methods.solve import Method
+
+
+def placo_adapter() -> Adapter:
+    """The adapter to placo's kinematics solver."""
+    return Adapter(
+        name="placo",
+        make=_placo,
+        loose=(*few(5, 10, 20), *LADDER),
+        setup="wb.Placo(), all else as it comes: goals as soft tasks, holds and the self-collision constraint hard, "
+        "joint limits, at most 0.05 rad or m a program, joints tasks for the measures with a weight that fades; one "
+        "start, at most 200 programs. The objects are added to its collision model, with the clearance of each pair. "
+        "Building its robot is set-up.",
+        differences=(
+            "placo has no class for objects in the world: they are added to its collision model as parts of the robot",
+            "placo minimises Effort and Displacement only",
+            "placo has no reach cones, no half-spaces for frames and no axis toward a place",
+            "placo has one row a pair, between the two nearest points",
+            "placo finds no solution where hard tasks repeat each other, as in a redundant closed loop",
+        ),
+        package="placo",
+    )
+
+
+def _placo(tolerance: float, iterations: int | None) -> Method:
+    from wholebody.methods.placo.method import Placo
+
+    return Placo(tolerance=tolerance) if iterations is None else Placo(tolerance=tolerance, iterations=iterations)
 
 
 class PlacoTool(Tool):

@@ -11,10 +11,10 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.bench.adapters import chosen_tools, differences, installed_tools, make_tool
+from wholebody.bench.adapters.mjcf import mjcf
+from wholebody.bench.adapters.own import MovingPoint
 from wholebody.bench.judge import judge
-from wholebody.bench.tools import chosen_tools, differences, installed_tools, make_tool
-from wholebody.bench.tools.mjcf import mjcf
-from wholebody.bench.tools.wholebody_tool import MovingPoint
 from wholebody.bench.track import Track
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 

@@ -1,4 +1,4 @@
-"""Every installed entrant solves a free reach of an arm, and says what it is."""
+"""Every installed adapter solves a free reach of an arm, and says what it is."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench import style
+from wholebody.bench.adapters import Adapter, Prepared, adapters, missing, names, set_up
+from wholebody.bench.adapters.base import FIRST_FIT
 from wholebody.bench.compare.settings import Settings
-from wholebody.bench.entrants import Entrant, Prepared, entrants, missing, names, set_up
-from wholebody.bench.entrants.base import FIRST_FIT
 from wholebody.bench.problem_sets.registry import SETS
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
-INSTALLED = entrants()
+INSTALLED = adapters()
 CUBE = 0.05 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 
 
-by_name = pytest.mark.parametrize("entrant", INSTALLED, ids=lambda entrant: entrant.name)
+by_name = pytest.mark.parametrize("adapter", INSTALLED, ids=lambda adapter: adapter.name)
 
 
 @pytest.fixture(scope="module")
@@ -36,19 +36,19 @@ def reach(root: Path) -> wb.Problem:
 
 
 @by_name
-def test_it_states_what_it_is_and_its_budgets_are_usable(entrant: Entrant) -> None:
-    assert entrant.name in names()
-    assert entrant.setup.endswith(".")
-    assert all(sentence and not sentence.endswith(".") for sentence in entrant.differences)
-    tolerances = [tolerance for tolerance, iterations in entrant.loose if iterations is None]
+def test_it_states_what_it_is_and_its_budgets_are_usable(adapter: Adapter) -> None:
+    assert adapter.name in names()
+    assert adapter.setup.endswith(".")
+    assert all(sentence and not sentence.endswith(".") for sentence in adapter.differences)
+    tolerances = [tolerance for tolerance, iterations in adapter.loose if iterations is None]
     assert tolerances == sorted(tolerances, reverse=True)
-    for budget in entrant.loose:
-        assert entrant.make(*budget) is not entrant.make(*budget)
+    for budget in adapter.loose:
+        assert adapter.make(*budget) is not adapter.make(*budget)
 
 
 @by_name
-def test_it_solves_a_free_reach_of_an_arm(entrant: Entrant, reach: wb.Problem) -> None:
-    method = entrant.make(1e-4, None)
+def test_it_solves_a_free_reach_of_an_arm(adapter: Adapter, reach: wb.Problem) -> None:
+    method = adapter.make(1e-4, None)
     set_up(method, reach)
     solution = method.solve(reach)
     judged = wb.assess(reach, solution.q)
@@ -72,22 +72,22 @@ def table() -> wb.Problem:
 
 
 @by_name
-def test_it_solves_a_reach_of_a_human_or_refuses_or_says_what_is_wrong(entrant: Entrant, table: wb.Problem) -> None:
-    method = entrant.make(1e-4, None)
+def test_it_solves_a_reach_of_a_human_or_refuses_or_says_what_is_wrong(adapter: Adapter, table: wb.Problem) -> None:
+    method = adapter.make(1e-4, None)
     solution = method.solve(table)
     judged = wb.assess(table, solution.q)
     assert np.isfinite(solution.q).all()
     assert table.scene.figure.within_limits(solution.q)
     assert solution.solved == (judged.met(1.1e-4) and judged.holds(1.1e-4))
-    if entrant.name not in ("ccd", "dls", "newton/slack", "newton/barrier", "newton/kkt"):
+    if adapter.name not in ("ccd", "dls", "newton/slack", "newton/barrier", "newton/kkt"):
         assert solution.solved, solution.message
 
 
 @by_name
-def test_out_of_reach_by_a_metre_is_not_called_solved(entrant: Entrant, reach: wb.Problem) -> None:
+def test_out_of_reach_by_a_metre_is_not_called_solved(adapter: Adapter, reach: wb.Problem) -> None:
     figure = reach.scene.figure
     problem = wb.Problem(wb.Scene(figure), goals=[wb.Point(figure.model.names[-1], (0.0, 2.2, 0.3))])
-    solution = entrant.make(1e-4, 60).solve(problem)
+    solution = adapter.make(1e-4, 60).solve(problem)
     assert np.isfinite(solution.q).all()
     assert figure.within_limits(solution.q)
     assert solution.status in ("unreachable", "stalled")
@@ -95,26 +95,26 @@ def test_out_of_reach_by_a_metre_is_not_called_solved(entrant: Entrant, reach: w
 
 
 @by_name
-def test_what_it_cannot_express_is_refused_by_name(entrant: Entrant, table: wb.Problem) -> None:
-    if entrant.name.startswith(("qp/", "newton/")):
+def test_what_it_cannot_express_is_refused_by_name(adapter: Adapter, table: wb.Problem) -> None:
+    if adapter.name.startswith(("qp/", "newton/")):
         pytest.skip("it takes every term that there is")
     refused = [wb.Plane("head", (0, 0, 1), side="above"), wb.ReachCones()]
     problem = wb.Problem(table.scene, goals=table.goals, constraints=refused)
     with pytest.raises(InputError, match=r"Plane|ReachCones"):
-        entrant.make(1e-4, None).solve(problem)
-    method = entrant.make(1e-4, None)
+        adapter.make(1e-4, None).solve(problem)
+    method = adapter.make(1e-4, None)
     if isinstance(method, Prepared):
         with pytest.raises(InputError, match=r"Plane|ReachCones"):
             method.prepare(problem)
 
 
 @by_name
-def test_objects_that_moved_are_where_they_are_now(entrant: Entrant, planar_arm: Callable[..., wb.Figure]) -> None:
-    if entrant.name == "dls":
+def test_objects_that_moved_are_where_they_are_now(adapter: Adapter, planar_arm: Callable[..., wb.Figure]) -> None:
+    if adapter.name == "dls":
         pytest.skip("it sees no objects")
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.2))).add(wb.Hull(CUBE), name="cube", at=(3.0, 0.0, 0.0))
     problem = wb.Problem(scene, np.array([0.3, 0.4, 0.4]), goals=[wb.Point("tip", (0.1, 0.7, 0.0))])
-    method = entrant.make(1e-4, None)
+    method = adapter.make(1e-4, None)
     first = method.solve(problem)
     assert first.solved, first.message
     elbow = scene.state(first.q).frame(scene.frame_id("link2")).translation
@@ -122,41 +122,41 @@ def test_objects_that_moved_are_where_they_are_now(entrant: Entrant, planar_arm:
     assert wb.assess(problem, first.q).penetration > 0.005
     second = method.solve(problem)
     inside = wb.assess(problem, second.q).penetration
-    if entrant.name == "mink":  # it drops pairs of the world and the body that hangs on it
+    if adapter.name == "mink":  # it drops pairs of the world and the body that hangs on it
         assert inside < 1e-3 or second.status == "infeasible"
     else:
         assert inside < 1e-3
 
 
-def test_unknown_and_missing_entrants_are_named() -> None:
+def test_unknown_and_missing_adapters_are_named() -> None:
     with pytest.raises(UnknownNameError, match="qp/osqp"):
-        entrants(["qp/osqq"])
-    assert [entrant.name for entrant in entrants(["ccd", "qp/daqp"])] == ["ccd", "qp/daqp"]
-    assert [entrant.name for entrant in entrants(["newton", "newton/kkt"])] == [
+        adapters(["qp/osqq"])
+    assert [adapter.name for adapter in adapters(["ccd", "qp/daqp"])] == ["ccd", "qp/daqp"]
+    assert [adapter.name for adapter in adapters(["newton", "newton/kkt"])] == [
         "newton/slack", "newton/barrier", "newton/kkt",
     ]  # fmt: skip
-    assert {entrant.name for entrant in INSTALLED} | set(missing()) == set(names())
+    assert {adapter.name for adapter in INSTALLED} | set(missing()) == set(names())
     for name, command in missing().items():
         assert command.startswith("pip install")
         with pytest.raises(MissingPackageError, match="pip install"):
-            entrants([name])
+            adapters([name])
 
 
-def test_every_entrant_has_a_colour_and_a_marker_of_its_own() -> None:
+def test_every_adapter_has_a_colour_and_a_marker_of_its_own() -> None:
     known = [name for name in names() if name in style.MARKERS]
     assert {"qp/osqp", "qp/daqp", "newton/slack", "ccd", "dls", "placo", "pink", "mink"} <= set(known)
     assert len({style.color(name) for name in known}) == len({style.marker(name) for name in known}) == len(known)
 
 
 def test_budgets_of_first_fit_leave_the_measures_out_and_have_no_part_in_drags(table: wb.Problem) -> None:
-    (entrant,) = entrants(["qp/osqp"])
-    solutions = [entrant.make(1e-4, most).solve(table) for most in (None, FIRST_FIT)]
+    (adapter,) = adapters(["qp/osqp"])
+    solutions = [adapter.make(1e-4, most).solve(table) for most in (None, FIRST_FIT)]
     assert all(solution.solved for solution in solutions)
     assert solutions[1].iterations < solutions[0].iterations
     assert solutions[1].assessment.measure > solutions[0].assessment.measure
-    kinds = [level[1] for level in entrant.loose]
+    kinds = [level[1] for level in adapter.loose]
     assert FIRST_FIT in kinds
     assert FIRST_FIT not in kinds[kinds.index(None) :]
-    settings = Settings(sets=tuple(SETS.values()), entrants=(entrant,))
-    assert FIRST_FIT in [level[1] for level in settings.ladder(entrant)]
-    assert FIRST_FIT not in [level[1] for level in settings.ladder(entrant, moving=True)]
+    settings = Settings(sets=tuple(SETS.values()), adapters=(adapter,))
+    assert FIRST_FIT in [level[1] for level in settings.ladder(adapter)]
+    assert FIRST_FIT not in [level[1] for level in settings.ladder(adapter, moving=True)]

@@ -1,12 +1,18 @@
-"""Our own methods as they take part: qp with every QP solver, newton in three ways, ccd, dls and placo."""
+"""Our own methods as they take part: qp with every QP solver, newton in three ways, ccd and dls."""
 
 from __future__ import annotations
 
 from functools import partial
 from typing import Any
 
-from wholebody.bench.entrants.base import FIRST_FIT, LADDER, Budget, Entrant
+import numpy as np
+
+import wholebody as wb
+from wholebody.bench.adapters.base import FIRST_FIT, LADDER, Adapter, Budget, Tool, few
+from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Array, Track
+from wholebody.figures.state import State, Wrench
 from wholebody.methods.solve import Method
+from wholebody.tasks.base import Goal, Surroundings, filled
 
 _QP_BUDGETS: tuple[Budget, ...] = (
     *((tolerance, FIRST_FIT) for tolerance in (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),
@@ -27,9 +33,9 @@ _NEWTON_SETUPS = {
 }
 
 
-def qp_entrant(solver: str, package: str | None = None) -> Entrant:
+def qp_adapter(solver: str, package: str | None = None) -> Adapter:
     """The QP method with one of its solvers."""
-    return Entrant(
+    return Adapter(
         name=f"qp/{solver}",
         make=partial(_qp, solver),
         loose=_QP_BUDGETS,
@@ -40,12 +46,12 @@ def qp_entrant(solver: str, package: str | None = None) -> Entrant:
     )
 
 
-def ccd_entrant() -> Entrant:
+def ccd_adapter() -> Adapter:
     """Cyclic coordinate descent."""
-    return Entrant(
+    return Adapter(
         name="ccd",
         make=_ccd,
-        loose=(*_few(2, 5, 20), *LADDER[:8]),
+        loose=(*few(2, 5, 20), *LADDER[:8]),
         setup="wb.CCD(), all else as it comes: 400 sweeps from one start and at most 12 further starts. A budget of "
         "few iterations has no further starts.",
         differences=(
@@ -56,12 +62,12 @@ def ccd_entrant() -> Entrant:
     )
 
 
-def dls_entrant() -> Entrant:
+def dls_adapter() -> Adapter:
     """Damped least squares, the textbook baseline."""
-    return Entrant(
+    return Adapter(
         name="dls",
         make=_dls,
-        loose=(*_few(2, 3, 4, 6), *LADDER),
+        loose=(*few(2, 3, 4, 6), *LADDER),
         setup="wb.DampedLeastSquares(), all else as it comes: one start, at most 300 steps, damping by Sugihara 2011.",
         differences=(
             "dls knows no contacts: it passes through things and may end inside of them",
@@ -71,43 +77,18 @@ def dls_entrant() -> Entrant:
     )
 
 
-def placo_entrant() -> Entrant:
-    """The adapter to placo's kinematics solver."""
-    return Entrant(
-        name="placo",
-        make=_placo,
-        loose=(*_few(5, 10, 20), *LADDER),
-        setup="wb.Placo(), all else as it comes: goals as soft tasks, holds and the self-collision constraint hard, "
-        "joint limits, at most 0.05 rad or m a program, joints tasks for the measures with a weight that fades; one "
-        "start, at most 200 programs. The objects are added to its collision model, with the clearance of each pair. "
-        "Building its robot is set-up.",
-        differences=(
-            "placo has no class for objects in the world: they are added to its collision model as parts of the robot",
-            "placo minimises Effort and Displacement only",
-            "placo has no reach cones, no half-spaces for frames and no axis toward a place",
-            "placo has one row a pair, between the two nearest points",
-            "placo finds no solution where hard tasks repeat each other, as in a redundant closed loop",
-        ),
-        package="placo",
-    )
-
-
-def newton_entrant(way: str) -> Entrant:
+def newton_adapter(way: str) -> Adapter:
     """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
-    return Entrant(
+    return Adapter(
         name=f"newton/{way}",
         make=partial(_newton, way),
-        loose=(*_few(3, 6, 12, 25), *LADDER[1:]),
+        loose=(*few(3, 6, 12, 25), *LADDER[1:]),
         setup=f"wb.Newton() with {_NEWTON_SETUPS[way]}; all else as it comes. A budget of few iterations has one "
         "start.",
         differences=(
             "newton minimises measures up to what the stopping of its iteration leaves, and PotentialEnergy not at all",
         ),
     )
-
-
-def _few(*iterations: int) -> tuple[Budget, ...]:
-    return tuple((1e-3, count) for count in iterations)
 
 
 def _qp(solver: str, tolerance: float, iterations: int | None) -> Method:
@@ -142,7 +123,73 @@ def _dls(tolerance: float, iterations: int | None) -> Method:
     return DampedLeastSquares(tolerance=tolerance, iterations=iterations)
 
 
-def _placo(tolerance: float, iterations: int | None) -> Method:
-    from wholebody.methods.placo.method import Placo
+class MovingPoint(Goal):
+    """The origin of a frame at a place that moves: write the place into `target`, shape (3,)."""
 
-    return Placo(tolerance=tolerance) if iterations is None else Placo(tolerance=tolerance, iterations=iterations)
+    def __init__(self, frame: str, target: Array) -> None:
+        """Name the frame; the array is kept, not copied."""
+        self.frame, self.target = frame, target
+        self._id = self._joint = 0
+
+    def resolve(self, scene: Surroundings, start: Array) -> MovingPoint:
+        """Find the frame."""
+        index = scene.figure.frame_id(self.frame)
+        return filled(self, _id=index, _joint=int(scene.model.frames[index].parentJoint))
+
+    def error(self, state: State) -> Array:
+        """(3,) from the target to the frame [m]."""
+        return np.asarray(state.frame(self._id).translation - self.target)
+
+    def jacobian(self, state: State) -> Wrench:
+        """Three forces along the world's axes, through the frame's origin."""
+        x, y, z = state.frame(self._id).translation
+        rows = np.array([[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]])
+        return Wrench(rows, self._joint)
+
+
+class WholebodyTool(Tool):
+    """One program a step, with the workspace of the step before."""
+
+    def __init__(self, track: Track, solver: str) -> None:
+        """State the problem; the target is moved afterwards."""
+        self.name = f"wholebody/{solver}"
+        self._target = np.array(track.targets[0])
+        self.problem = wb.Problem(
+            track.scene,
+            track.start,
+            goals=[MovingPoint(track.tip, self._target)],
+            constraints=[
+                *(wb.Hold(foot) for foot in track.feet),
+                wb.StepLimit(JOINT_SPEED, root_velocity=ROOT_SPEED, root_turn=ROOT_TURN),
+            ],
+            measures=[wb.Displacement()],
+            clearance=CLEARANCE,
+        )
+        self._tracker = wb.QP(solver=solver).tracker(self.problem, DT)
+        self._q = np.array(track.start)
+        self._told: list[tuple[int, bool, int]] = []
+
+    def reset(self, q: Array) -> None:
+        """Go to a posture."""
+        self._q = np.array(q)
+        self._told.clear()
+
+    def step(self, target: Array) -> None:
+        """Move one step."""
+        self._target[:] = target
+        step = self._tracker.step(self._q)
+        self._q = step.q
+        self._told.append((step.rows, step.exact, step.iterations))
+
+    def posture(self) -> Array:
+        """Where it is."""
+        return np.array(self._q)
+
+    def remarks(self) -> dict[str, float]:
+        """Mean number of contact rows, and shares of steps that were closed exactly, and without the solver."""
+        rows, exact, iterations = zip(*self._told, strict=True)
+        return {
+            "rows": float(np.mean(rows)),
+            "exact": float(np.mean(exact)),
+            "at_once": float(np.mean(np.array(iterations) == 0)),
+        }
