@@ -33,6 +33,7 @@ ROOMS = (
         "problem",
         "first_order",
         "assessment",
+        "motion_assessment",
         "simplification",
         "methods",
     ),

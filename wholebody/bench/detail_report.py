@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.bench import style
+from wholebody.bench import plot_style
 from wholebody.bench.detail import ARM_THINGS, FINEST, INSIDE, LEVELS, DetailRow
-from wholebody.bench.machine import sentence
-from wholebody.bench.tables import markdown
+from wholebody.bench.report import render
 from wholebody.simplification.simplify import GROWTH
 
 COLORS = {"spheres": "#d55e00", "capsules": "#0072b2", "hulls": "#009e73", "own": "#444444"}
@@ -72,7 +71,7 @@ def chart(rows: Sequence[DetailRow], path: Path) -> tuple[Path, Path]:
     """Time of a solve with its judgement against the deepest overlap, and against the effort above the finest."""
     found = summaries(rows)
     tasks = list(dict.fromkeys(one.task for one in found))
-    drawn, axes = style.figure(2, len(tasks), (4.3 * len(tasks), 7.2))
+    drawn, axes = plot_style.figure(2, len(tasks), (4.3 * len(tasks), 7.2))
     for column, task in enumerate(tasks):
         above, below = axes[0][column], axes[1][column]
         for one in (one for one in found if one.task == task):
@@ -93,59 +92,22 @@ def chart(rows: Sequence[DetailRow], path: Path) -> tuple[Path, Path]:
         for axis in (above, below):
             axis.set_xscale("log")
             axis.set_xlim(0.7 * min(times), 1.4 * max(times))
-            _plain(axis)
+            plot_style.plain_log(axis)
         below.axhline(0.0, color="#666666", linewidth=0.8)
         above.set_title(TITLES[task], loc="left")
         below.set_xlabel("a solve with its judgement, median [ms]")
     axes[0][0].set_ylabel("deepest overlap in the finest model [mm]")
     axes[1][0].set_ylabel("effort above the finest model's, worst case [%]")
     _legends(axes[0][-1], [one.detail for one in found])
-    return style.save(drawn, path)
+    return plot_style.save(drawn, path)
 
 
 def report(rows: Sequence[DetailRow], refused: Sequence[str], facts: Mapping[str, str]) -> str:
     """Table of all models of all tasks."""
-    columns = ("task", "detail", "level", "freedoms", "pairs", "solved", "a solve ms", "judgement ms", "leaving out ms",
-               "inside", "deepest mm", "clearance missed mm", "goal missed mm", "effort above, median %",
-               "effort above, worst %")  # fmt: skip
-    table = markdown(
-        columns,
-        [
-            (
-                one.task, one.detail, one.level, str(one.freedoms), str(one.pairs), f"{one.solved} of {one.cases}",
-                f"{one.solve_ms:.1f}", f"{one.judge_ms:.1f}", f"{one.prepare_ms:.0f}" if one.prepare_ms else "",
-                str(one.inside), f"{one.worst_penetration_mm:.2f}", f"{one.worst_lack_mm:.2f}",
-                f"{one.worst_goal_error_mm:.3f}", _percent(one.above), _percent(one.worst_above),
-            )
-            for one in summaries(rows)
-        ],
+    return render(
+        "detail.md", rows=summaries(rows), refused=dict.fromkeys(refused), facts=facts, finest=FINEST, inside=INSIDE,
+        growth=GROWTH, simplify="scene.simplified",
     )  # fmt: skip
-    parts = [
-        f"Answers of `qp` that their own model calls solved, judged in the model of {FINEST} with everything in it: "
-        f"how many are inside something by more than {1e3 * INSIDE:g} mm, how deep, by how much a pair misses its "
-        "clearance, a goal its place, and how far the effort is above that of the finest model's own answer (below "
-        "it where another local optimum was found). Medians over the cases, of "
-        "the faster of two solves by the clock; what is left out is left out once "
-        f"for a problem, before. *Simplified* is `scene.simplified`, its coarser pieces at most {1e3 * GROWTH:g} mm "
-        "larger.",
-        table,
-    ]
-    if refused:
-        parts.append("\n".join(f"- {line}" for line in dict.fromkeys(refused)))
-    return "\n\n".join([*parts, sentence(facts)])
-
-
-def _percent(share: float) -> str:
-    return "" if np.isnan(share) else f"{100.0 * share:.2f}"
-
-
-def _plain(axis: Any) -> None:
-    """Times written out."""
-    from matplotlib.ticker import LogLocator, NullLocator
-
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.xaxis.set_major_formatter("{x:g}")
-    axis.xaxis.set_minor_locator(NullLocator())
 
 
 def _legends(axis: Any, details: Sequence[str]) -> None:

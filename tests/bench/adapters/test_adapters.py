@@ -10,7 +10,6 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench import style
 from wholebody.bench.adapters import Adapter, Prepared, adapters, missing, names, set_up
 from wholebody.bench.adapters.base import FIRST_FIT
 from wholebody.bench.compare.settings import Settings
@@ -140,12 +139,6 @@ def test_unknown_and_missing_adapters_are_named() -> None:
         assert command.startswith("pip install")
         with pytest.raises(MissingPackageError, match="pip install"):
             adapters([name])
-
-
-def test_every_adapter_has_a_colour_and_a_marker_of_its_own() -> None:
-    known = [name for name in names() if name in style.MARKERS]
-    assert {"qp/osqp", "qp/daqp", "newton/slack", "ccd", "dls", "placo", "pink", "mink"} <= set(known)
-    assert len({style.color(name) for name in known}) == len({style.marker(name) for name in known}) == len(known)
 
 
 def test_budgets_of_first_fit_leave_the_measures_out_and_have_no_part_in_drags(table: wb.Problem) -> None:

@@ -15,12 +15,12 @@ from wholebody.bench.compare import publish as publishing
 from wholebody.bench.compare.cases import Shown, chosen
 from wholebody.bench.compare.charts import BAND, lowest
 from wholebody.bench.compare.curves import Point
-from wholebody.bench.compare.looks import look
 from wholebody.bench.compare.record import ANSWERED, OVERTIME, REFUSED, Record
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.scenes import CLOSING, OPENING, Scene, draw
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk, Store
+from wholebody.bench.plot_style import look
 from wholebody.bench.tables import read_rows
 from wholebody.errors import InputError
 
@@ -104,7 +104,7 @@ def test_the_report_says_what_was_left_out_and_why(folder: Path) -> None:
 def test_the_report_has_the_scene_of_a_false_answer(folder: Path) -> None:
     page = (folder / "out" / publishing.PAGE).read_text()
     assert page.count("<iframe") == 1
-    assert "lies says &#x27;solved&#x27; and misses the goals by 400 mm" in page
+    assert "lies says &#39;solved&#39; and misses the goals by 400 mm" in page
 
 
 def test_the_page_of_results_gets_its_part(folder: Path) -> None:

@@ -10,8 +10,8 @@ from wholebody.bench.attack.case import KINDS, SCRIPT, Case
 from wholebody.bench.attack.counting import SLOW, Row, counted, is_slow, percentiles
 from wholebody.bench.attack.running import Ended, put
 from wholebody.bench.intervals import wilson
-from wholebody.bench.machine import sentence
-from wholebody.bench.tables import markdown, write_text
+from wholebody.bench.report import render
+from wholebody.bench.tables import write_text
 
 ATTACKED = {
     "solve": "solves, judged by coal over all pairs and by Pinocchio",
@@ -33,35 +33,18 @@ _QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"|\([^)]*\)")
 
 def report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:
     """Return the counts as Markdown."""
-    lines = []
+    kinds = []
     for kind in KINDS:
         found = counted(rows, kind)
-        total = sum(found.values())
-        if total:
-            most = 100.0 * wilson(found["wrong"], total)[1]
-            counts = [str(found[name]) for name in ("right", "refused", "gave up")]
-            lines.append([ATTACKED[kind], str(total), *counts, _strong(found["wrong"]), f"{most:.2g} %"])
-    head = ["attacked", "cases", "right", "refused", "gave up", "wrong", "wrong at most"]
-    parts = [markdown(head, lines)]
-    if any(one.kind == "solve" for one in rows):
-        parts += [_times(rows), f"Solves that took more than {SLOW:g} s: {_strong(sum(map(is_slow, rows)))}."]
-    seeds = ", ".join(str(seed) for seed in sorted({one.seed for one in rows}))
-    return "\n\n".join([*parts, f"Seed {seeds}. {sentence(facts)}"])
-
-
-def _times(rows: Sequence[Row]) -> str:
+        if found.total():
+            kinds.append((ATTACKED[kind], found, wilson(found["wrong"], found.total())[1]))
     statuses: list[str | None] = ["solved", "unreachable", "infeasible", "stalled", None]
-    lines = []
-    for status in statuses:
-        count, middle, high, most = percentiles(rows, status)
-        if count:
-            times = [f"{1e3 * value:.3g}" for value in (middle, high, most)]
-            lines.append([f"`{status}`" if status else "all", str(count), *times])
-    return markdown(["solves that end", "count", "p50 [ms]", "p95 [ms]", "longest [ms]"], lines)
-
-
-def _strong(count: int) -> str:
-    return f"**{count}**" if count else "0"
+    solves = [(status, count, times) for status in statuses for count, *times in [percentiles(rows, status)] if count]
+    asked = any(one.kind == "solve" for one in rows)
+    return render(
+        "attack.md", kinds=kinds, asked=asked, solves=solves, slow=SLOW, late=sum(map(is_slow, rows)),
+        seeds=sorted({one.seed for one in rows}), facts=facts,
+    )  # fmt: skip
 
 
 def keep(ended: Ended, folder: Path) -> None:
@@ -85,12 +68,11 @@ def index(rows: Sequence[Row], folder: Path) -> None:
         late = is_slow(one) and one.outcome != "wrong"
         if one.outcome == "wrong" or late:
             alike.setdefault((one.kind, f"slow: {one.status}" if late else signature(one.words)), []).append(one)
-    lines = ["# Failures", "", f"Each folder has a {SCRIPT} that repeats its failure: `python FOLDER/{SCRIPT}`.", ""]
     order = sorted(alike.items(), key=lambda item: (list(KINDS).index(item[0][0]), -len(item[1])))
-    for (kind, _), found in order:
-        lines.append(f"- **{kind}**, {len(found)} times: {found[0].words} ({found[0].seconds:.2f} s)")
-        lines += [f"    - {Case(one.seed, one.number, one.kind).name}" for one in found[:5]]
-    write_text(folder / INDEX, "\n".join(lines) + "\n")
+    listed = [
+        (kind, found, [Case(one.seed, one.number, one.kind).name for one in found[:5]]) for (kind, _), found in order
+    ]
+    write_text(folder / INDEX, render("attack_failures.md", script=SCRIPT, alike=listed) + "\n")
 
 
 def signature(words: str) -> str:

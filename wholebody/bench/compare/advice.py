@@ -13,6 +13,7 @@ from wholebody.bench.compare.record import FLOOR
 from wholebody.bench.compare.results import EFFORT_FLOOR, Results, middle
 from wholebody.bench.compare.summary import GOOD, Summary
 from wholebody.bench.intervals import wilson
+from wholebody.bench.report import words
 
 NOTHING = Ratio(nan, 0.0, inf, 0)
 
@@ -199,8 +200,3 @@ def slowness(found: Ratio) -> str:
     if not isfinite(found.value):
         return ""
     return f"× {found.value:.2g} [{found.low:.2g}, {found.high:.2g}]"
-
-
-def words(name: str) -> str:
-    """The name of a set as one reads it."""
-    return name.replace("_", " ")

@@ -7,11 +7,11 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from wholebody.bench import style
+from wholebody.bench import plot_style
 from wholebody.bench.compare.curves import Point, curve, profile
-from wholebody.bench.compare.looks import look
 from wholebody.bench.compare.record import COARSE, FINE
 from wholebody.bench.compare.results import Quantity, Results
+from wholebody.bench.plot_style import look
 
 BAND = 30.0  # where points are drawn whose median is no answer: above all values, which are metres, radians, shares
 GREY = "#666666"
@@ -26,7 +26,7 @@ def speed_accuracy(results: Results, family: str, title: str, path: Path) -> tup
     quantities = results.quantities(family)
     columns = 2
     rows = -(-len(quantities) // columns)
-    chart, axes = style.figure(rows, columns, (11.0, 3.9 * rows + 0.7))
+    chart, axes = plot_style.figure(rows, columns, (11.0, 3.9 * rows + 0.7))
     panels = [axes[place // columns][place % columns] for place in range(rows * columns)]
     for panel in panels[len(quantities) :]:
         panel.set_visible(False)
@@ -39,7 +39,7 @@ def speed_accuracy(results: Results, family: str, title: str, path: Path) -> tup
         _dress(panel, quantity, "a frame" if results.moving(family) else "a solve")
     chart.suptitle(title, x=0.01, ha="left", fontsize=13)
     _legend(chart, results, drawn)
-    return style.save(chart, path)
+    return plot_style.save(chart, path)
 
 
 def _draw(panel: Any, points: list[Point], adapter: str, quantity: Quantity) -> Any:
@@ -81,7 +81,7 @@ def lowest(points: list[Point]) -> list[Point]:
 def _dress(panel: Any, quantity: Quantity, what: str) -> None:
     from matplotlib.ticker import LogLocator, NullLocator
 
-    _time_axis(panel)
+    plot_style.plain_log(panel)
     panel.set_yscale("log")
     panel.yaxis.set_minor_locator(NullLocator())  # ten decades have a hundred, and each is laid out
     panel.yaxis.set_major_locator(LogLocator(numticks=12))
@@ -96,7 +96,7 @@ def _dress(panel: Any, quantity: Quantity, what: str) -> None:
 
 def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Path, Path]:
     """Share of the cases solved within a time at the default budget, to a millimetre and to a tenth of one."""
-    chart, axes = style.figure(1, 2, (11.0, 4.6))
+    chart, axes = plot_style.figure(1, 2, (11.0, 4.6))
     drawn: dict[str, Any] = {}
     known = [time for adapter in results.adapters for time in profile(results, family, adapter, COARSE)[0]]
     start, end = 0.7 * MS * min(known, default=1.0), 1.5 * MS * max(known, default=1.0)
@@ -113,7 +113,7 @@ def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Pat
                 color=seen.color, linewidth=1.9 if seen.principal else 0.9, zorder=3 if seen.principal else 2,
             )  # fmt: skip
         panel.axhline(98.0, color=GREY, linewidth=0.9, linestyle="--", zorder=1)
-        _time_axis(panel)
+        plot_style.plain_log(panel)
         panel.set_xlim(start, end)
         panel.set_ylim(0.0, 103.0)
         panel.set_title(f"solved to {tolerance:g} m and rad", loc="left", fontsize=10)
@@ -121,16 +121,7 @@ def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Pat
         panel.set_ylabel("cases solved within the time [%]")
     chart.suptitle(title, x=0.01, ha="left", fontsize=13)
     _legend(chart, results, drawn)
-    return style.save(chart, path)
-
-
-def _time_axis(panel: Any) -> None:
-    from matplotlib.ticker import LogLocator, NullLocator
-
-    panel.set_xscale("log")
-    panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    panel.xaxis.set_major_formatter("{x:g}")
-    panel.xaxis.set_minor_locator(NullLocator())
+    return plot_style.save(chart, path)
 
 
 def _legend(chart: Any, results: Results, drawn: dict[str, Any]) -> None:

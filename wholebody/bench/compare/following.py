@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
@@ -19,6 +17,7 @@ from wholebody.methods.newton.method import Newton
 from wholebody.methods.newton.tracking import NewtonTracker
 from wholebody.methods.qp.method import QP
 from wholebody.methods.qp.tracking import Tracker
+from wholebody.motion_assessment import third_differences
 from wholebody.problem import Problem
 
 Array = NDArray[np.float64]
@@ -108,10 +107,8 @@ def _summary(frames: list[_Frame], case: Case, empty: Record) -> Record:
 
 def jerk(model: Any, postures: list[Array], dt: float) -> float:
     """Root mean square over frames and degrees of freedom of the third difference of postures [rad/s^3, m/s^3]."""
-    steps = np.array([pin.difference(model, a, b) for a, b in pairwise(postures)])
-    if len(steps) < 3:
-        return 0.0
-    return float(np.sqrt(np.mean(np.diff(steps, 2, axis=0) ** 2))) / dt**3
+    found = third_differences(model, np.array(postures), dt)
+    return float(np.sqrt(np.mean(found**2))) if len(found) else 0.0
 
 
 def turns(gaps: Array) -> int:

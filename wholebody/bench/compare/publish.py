@@ -7,12 +7,10 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from wholebody.bench.compare import blocks as kinds
 from wholebody.bench.compare import report
 from wholebody.bench.compare.cases import chosen
 from wholebody.bench.compare.charts import draw_all
 from wholebody.bench.compare.front import fronts
-from wholebody.bench.compare.html import write_html
 from wholebody.bench.compare.scenes import draw
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Store
@@ -63,8 +61,8 @@ def publish(
     subtitle = f"{len(settings.sets)} problem sets, {len(settings.adapters)} methods, {len(store.records)} solves. " + (
         f"Measured {facts.get('date', '')} with wholebody {facts.get('wholebody', '')} on {facts.get('processor', '')}."
     )
-    write_text(folder / PAGE, write_html(report.blocks(given), charts, scenes, subtitle))
-    short = kinds.as_markdown(report.short(given))
+    write_text(folder / PAGE, report.as_page(given, charts, scenes, subtitle) + "\n")
+    short = report.as_markdown(given, False, "assets/bench")
     write_text(folder / "compare.md", short + "\n")
     if docs is not None:
         replace_section(docs / "results.md", "compare", short)

@@ -60,6 +60,16 @@ class Loaded:
     times: tuple[float, ...] = ()
     statuses: tuple[str, ...] = ()
 
+    @property
+    def whole(self) -> bool:
+        """Whether all reaches were solved."""
+        return self.solved == len(self.times)
+
+    @property
+    def median(self) -> float:
+        """Median of the reaches' times."""
+        return float(np.median(self.times))
+
 
 def examine(path: str, reaches: int) -> Loaded:
     """Load a description, and reach.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from wholebody.bench import style
+from wholebody.bench import plot_style
 from wholebody.bench.stability.case import Kind
 from wholebody.bench.stability.rows import Result
 from wholebody.bench.stability.verdict import SYMBOLS, WORDS, Verdict
@@ -25,7 +25,7 @@ def matrix(result: Result, path: Path) -> tuple[Path, Path]:
     """Draw all verdicts; return the paths of the SVG and the PNG."""
     lines = _lines(result)
     width = max(LEAST, MARGIN[0] + CELL[0] * len(result.methods))
-    chart, axes = style.figure(1, 1, (width, MARGIN[1] + CELL[1] * len(lines)))
+    chart, axes = plot_style.figure(1, 1, (width, MARGIN[1] + CELL[1] * len(lines)))
     axis = axes[0][0]
     for row, (case, title) in enumerate(lines):
         if case is None:
@@ -44,7 +44,7 @@ def matrix(result: Result, path: Path) -> tuple[Path, Path]:
     for side in axis.spines.values():
         side.set_visible(False)
     _legend(chart)
-    return style.save(chart, path)
+    return plot_style.save(chart, path)
 
 
 def _lines(result: Result) -> list[tuple[str | None, str]]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from wholebody.errors import MissingPackageError
 
@@ -13,47 +14,43 @@ COLORS = {
     "placo": "#d55e00",
     "mink": "#009e73",
     "pink": "#cc79a7",
-    "qp/osqp": "#0072b2",
-    "qp/daqp": "#56b4e9",
-    "qp/quadprog": "#332288",
-    "qp/proxqp": "#44aaaa",
-    "qp/piqp": "#8888dd",
-    "newton/slack": "#e69f00",
-    "newton/barrier": "#996515",
-    "newton/kkt": "#f0d03c",
-    "ccd": "#000000",
-    "dls": "#888888",
 }
-"""Okabe and Ito's colours, which people with any colour vision tell apart; a family's others are shades of its own."""
+"""Of the tools that make a step: Okabe and Ito's colours, which people with any colour vision tell apart."""
 
-MARKERS = {
-    "qp/osqp": "o",
-    "qp/daqp": "s",
-    "qp/quadprog": "D",
-    "qp/proxqp": "p",
-    "qp/piqp": "h",
-    "newton/slack": "^",
-    "newton/barrier": "v",
-    "newton/kkt": "<",
-    "ccd": "X",
-    "dls": "x",
-    "placo": "P",
-    "pink": "*",
-    "mink": ">",
+
+class Look(NamedTuple):
+    """Colour and marker of a method; the principal ones are drawn wide and with their spread."""
+
+    color: str
+    marker: str
+    principal: bool
+
+
+_LOOKS = {
+    "qp/osqp": Look(COLORS["wholebody/osqp"], "o", True),
+    "qp/daqp": Look(COLORS["wholebody/daqp"], "o", True),
+    "newton/slack": Look("#e69f00", "s", True),
+    "newton/barrier": Look("#a06a00", "D", True),
+    "newton/kkt": Look("#f3cf7a", "s", False),
+    "ccd": Look("#000000", "v", True),
+    "dls": Look("#8c8c8c", "X", True),
+    "placo": Look(COLORS["placo"], "P", True),
+    "mink": Look(COLORS["mink"], "h", True),
+    "pink": Look(COLORS["pink"], "*", True),
 }
-"""Markers of the methods, so that charts are read without colours too."""
-
-OTHER_COLOR, OTHER_MARKER = "#bbbbbb", "."
-
-
-def color(name: str) -> str:
-    """The colour of a tool or method; grey for a QP solver that only this machine has."""
-    return COLORS.get(name, OTHER_COLOR)
+_SOLVERS = ("#7f9fc4", "#4b6a9b", "#9fb8d0", "#35507a", "#b3c6e0", "#5f86b3")
+"""Shades for the QP method with further solvers: one family, seen at a glance."""
+_OTHERS = ("#882255", "#117733", "#999933", "#661100", "#aa4499", "#44aa99")
 
 
-def marker(name: str) -> str:
-    """The marker of a method; a dot for one that has none."""
-    return MARKERS.get(name, OTHER_MARKER)
+def look(adapter: str) -> Look:
+    """Return how a method looks; one that is not known here has a look of its own by its name."""
+    if adapter in _LOOKS:
+        return _LOOKS[adapter]
+    number = sha256(adapter.encode()).digest()[0]
+    if adapter.startswith("qp/"):
+        return Look(_SOLVERS[number % len(_SOLVERS)], ".", False)
+    return Look(_OTHERS[number % len(_OTHERS)], "p", True)
 
 
 _SETTINGS = {
@@ -100,3 +97,13 @@ def save(chart: Any, path: Path) -> tuple[Path, Path]:
     chart.savefig(png, dpi=PNG_DPI, metadata={"Software": None})
     pyplot.close(chart)
     return svg, png
+
+
+def plain_log(axis: Any) -> None:
+    """Make the x axis logarithmic, with 1, 2, 5, 10, ... written out."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    axis.set_xscale("log")
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_locator(NullLocator())
