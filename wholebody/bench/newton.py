@@ -11,10 +11,8 @@ from functools import partial
 
 import numpy as np
 
-from wholebody.bench.newton_drags import DragRow
-from wholebody.bench.newton_shapes import SHAPES
-from wholebody.bench.newton_solves import AgreementRow, SolveRow
-from wholebody.bench.newton_time import median_us
+from wholebody.bench.newton_shapes import SHAPES, median_us
+from wholebody.bench.newton_solves import AgreementRow, DragRow, SolveRow
 from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
 from wholebody.methods.newton.linear_algebra.base import LinearSystem

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wholebody.bench.compare.advice import advice, choices, standings
-from wholebody.bench.compare.curves import curve, profile
+from wholebody.bench.compare.charts import curve, profile
 from wholebody.bench.compare.front import OURS, front, fronts, time_to
 from wholebody.bench.compare.record import ANSWERED, FAILED, REFUSED, Record
 from wholebody.bench.compare.results import QUANTITIES, Results

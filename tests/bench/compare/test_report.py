@@ -12,12 +12,10 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from wholebody.bench.compare import publish as publishing
-from wholebody.bench.compare.cases import Shown, chosen
-from wholebody.bench.compare.charts import BAND, lowest
-from wholebody.bench.compare.curves import Point
+from wholebody.bench.compare.charts import BAND, Point, lowest
 from wholebody.bench.compare.record import ANSWERED, OVERTIME, REFUSED, Record
 from wholebody.bench.compare.results import Results
-from wholebody.bench.compare.scenes import CLOSING, OPENING, Scene, draw
+from wholebody.bench.compare.scenes import CLOSING, OPENING, Scene, Shown, chosen, draw
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk, Store
 from wholebody.bench.plot_style import look

@@ -1,13 +1,17 @@
-"""The counts of an attack as text, and its failures as folders with scripts that repeat them."""
+"""The counts of an attack, as rows and as text, and its failures as folders with scripts that repeat them."""
 
 from __future__ import annotations
 
+import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from wholebody.bench.attack.case import KINDS, SCRIPT, Case
-from wholebody.bench.attack.counting import SLOW, Row, counted, is_slow, percentiles
+import numpy as np
+
+from wholebody.bench.attack.case import KINDS, SCRIPT, Case, Outcome
 from wholebody.bench.attack.running import Ended, put
 from wholebody.bench.intervals import wilson
 from wholebody.bench.report import render
@@ -78,3 +82,52 @@ def index(rows: Sequence[Row], folder: Path) -> None:
 def signature(words: str) -> str:
     """Return words without their numbers and names, by which alike failures are found."""
     return _NUMBER.sub("#", _QUOTED.sub("...", words.partition(";")[0]))[:120]
+
+
+SLOW = 5.0  # s: of CPU time for a solve
+
+
+@dataclass(frozen=True)
+class Row:
+    """One case, as it is written down.
+
+    Attributes:
+        kind, seed, number: which case.
+        outcome: what came of it.
+        status: what the answer says of itself.
+        seconds: CPU time of the call under attack.
+        words: what was found.
+    """
+
+    kind: str
+    seed: int
+    number: int
+    outcome: str
+    status: str
+    seconds: float
+    words: str
+
+
+def row(ended: Ended) -> Row:
+    """Return the line of a case."""
+    case, verdict = ended.case, ended.verdict
+    words = " ".join(verdict.words.split()).encode("ascii", errors="backslashreplace").decode()
+    return Row(case.kind, case.seed, case.number, verdict.outcome, verdict.status, verdict.seconds, words)
+
+
+def counted(rows: Sequence[Row], kind: str) -> Counter[Outcome]:
+    """Return how many cases of a kind came to what."""
+    return Counter(one.outcome for one in rows if one.kind == kind)  # type: ignore[misc]
+
+
+def is_slow(one: Row) -> bool:
+    """Whether a solve took longer than `SLOW`."""
+    return one.kind == "solve" and one.seconds > SLOW
+
+
+def percentiles(rows: Sequence[Row], status: str | None = None) -> tuple[int, float, float, float]:
+    """Return how many solves there are with a status (None for any), and their p50, p95 and longest, seconds."""
+    times = [one.seconds for one in rows if one.kind == "solve" and one.status and status in (None, one.status)]
+    if not times:
+        return 0, math.nan, math.nan, math.nan
+    return len(times), float(np.median(times)), float(np.quantile(times, 0.95)), max(times)

@@ -8,10 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from wholebody.bench.compare import report
-from wholebody.bench.compare.cases import chosen
 from wholebody.bench.compare.charts import draw_all
 from wholebody.bench.compare.front import fronts
-from wholebody.bench.compare.scenes import draw
+from wholebody.bench.compare.scenes import chosen, draw
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Store
 from wholebody.bench.tables import replace_section, write_rows, write_text
