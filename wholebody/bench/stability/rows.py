@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from wholebody.bench.stability.audit import audited
 from wholebody.bench.stability.case import HardCase, Kind
 from wholebody.bench.stability.judging import INSIDE
 from wholebody.bench.stability.running import Cell
-from wholebody.bench.stability.verdict import WORDS, Verdict, decide
+from wholebody.bench.stability.verdict import WORDS, Verdict, audited, decide
 
 
 @dataclass(frozen=True)

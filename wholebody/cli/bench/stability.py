@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Ask, judge, and write it down; 0 whatever the verdicts are."""
     from wholebody.bench.adapters import adapters
     from wholebody.bench.machine import machine
-    from wholebody.bench.stability import catalogue, chart, page
+    from wholebody.bench.stability import catalogue, page
     from wholebody.bench.tables import write_rows, write_text
 
     check_count(arguments.jobs, "--jobs")
@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     write_rows(arguments.out / "stability.csv", facts, result.rows())
     report = page.report(result, facts)
     write_text(arguments.out / "stability.md", report + "\n")
-    svg, _ = chart.matrix(result, arguments.out / "stability.svg")
+    svg, _ = page.matrix(result, arguments.out / "stability.svg")
     _print(result)
     print(f"wrote {arguments.out}")
     if arguments.update_docs is not None:
