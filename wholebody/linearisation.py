@@ -7,6 +7,7 @@ One pass of Pinocchio, one cull, coal for the pairs that survive, and one matrix
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,6 +107,12 @@ class Lineariser:
             raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
         self.goals, self.clearances = goals, clearances
         self._largest_clearance = float(clearances.max()) if len(clearances) else 0.0
+
+    def relaxed(self, depth: float) -> Lineariser:
+        """The same, with less distance asked of every pair by `depth` metres; both move one workspace."""
+        other = copy(self)
+        other.take(self.goals, self.clearances - depth)
+        return other
 
     def at(self, q: Array, within: float) -> Linearisation:
         """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance."""

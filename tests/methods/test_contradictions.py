@@ -100,6 +100,44 @@ def test_problems_with_a_witness_contradict_nothing(name):
         assert found(case.problem) == ()
 
 
+@pytest.mark.parametrize("deep", [0.02, 0.1])
+@pytest.mark.parametrize("turned", [0.0, 0.6])
+def test_a_tip_asked_into_a_wall_misses_by_its_depth_and_the_clearance(standing, deep, turned):
+    """The wall is all that is in reach; the way out of it is known, and so is the least that is left."""
+    normal = np.array([-np.cos(turned), -np.sin(turned), 0.0])
+    wall = np.array([0.45, -0.2, 1.2])  # a point of its face
+    problem = standing(goals=[wb.Point("right_index_tip", wall - deep * normal)], clearance=0.005)
+    problem.scene.add(wb.HalfSpace(), name="wall", at=pin.SE3(_facing(normal), wall))
+    problem = wb.Problem(problem.scene, goals=problem.goals, constraints=[wb.Hold("left_foot")], clearance=0.005)
+    entries = found(problem)
+    assert len(entries) == 1, [entry.text for entry in entries]
+    (only,) = entries
+    assert only.least == pytest.approx(deep + 0.005, abs=1e-5)
+    assert "goals[0], Point('right_index_tip'), is in wall" in only.text
+    answer = wb.QP().solve(problem)
+    assert answer.status == "unreachable"
+    assert only.least - 1e-5 < answer.assessment.goal_error < 1.02 * only.least
+    assert answer.iterations < 300
+
+
+def test_a_point_off_its_own_piece_may_be_inside(standing):
+    """A tool's tip that has no shape of its own can be anywhere."""
+    goal = wb.Point("right_index_tip", (0.4, -0.3, 0.5), offset=(0.0, 0.0, -0.6))
+    problem = standing((wb.Box((0.2, 0.2, 0.2)), (0.4, -0.3, 0.5)), goals=[goal])
+    assert found(problem) == ()
+
+
+def test_a_tip_may_be_asked_onto_a_face(standing):
+    goal = wb.Point("right_index_tip", (0.4, -0.3, 1.0))
+    assert found(standing((wb.Box((0.2, 0.2, 0.2)), (0.4, -0.3, 0.9)), goals=[goal])) == ()
+
+
+def _facing(normal):
+    """A rotation that turns z to a normal (3,)."""
+    aside = np.cross(normal, [0.0, 0.0, 1.0])
+    return np.column_stack([aside, np.cross(normal, aside), normal])
+
+
 def test_a_hold_where_the_start_is_not_is_taken_at_its_word(free_bodies):
     scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 0.0))
     into = wb.Hold("body0", at=pin.SE3(np.eye(3), np.array([0.9, 0.0, 0.0])))

@@ -3,6 +3,9 @@
 Joints that cannot turn make rigid groups of segments; a hold of a frame tells where its whole group is. Two tellings
 that differ, a group that is held inside of something that does not move, and a goal that is elsewhere on a group whose
 place is told, contradict each other whatever the other joints do.
+
+So do a goal inside of something that does not move and the part that is to be there: where a piece of that part holds
+the point that is to reach the goal, the point stays outside by the clearance, and the goal's depth is left as well.
 """
 
 from __future__ import annotations
@@ -25,6 +28,8 @@ from wholebody.workspace import Workspace
 Array = NDArray[np.float64]
 
 CLEAR = 1e-4  # m, rad: what differs by less is left to the search
+NEAREST = 1.02  # times the least that can be left of the goals, up to which a posture is taken for the nearest
+ON_SURFACE = 2e-6  # m: a point that is outside of a piece by less, coal's accuracy twice, is on its surface
 
 
 class Contradiction(NamedTuple):
@@ -33,10 +38,12 @@ class Contradiction(NamedTuple):
     Attributes:
         status: what an answer can be at best: "infeasible", or "unreachable" where a goal is one of the two.
         text: both, and how far apart they are.
+        least: by how much, metres, any posture misses the goal, where it matters which posture it is; else zero.
     """
 
     status: Literal["infeasible", "unreachable"]
     text: str
+    least: float = 0.0
 
 
 class _Told(NamedTuple):
@@ -57,6 +64,7 @@ def contradictions(problem: Problem, workspace: Workspace) -> tuple[Contradictio
     finder.holds()
     finder.pairs()
     finder.goals()
+    finder.goals_inside()
     return tuple(finder.found)
 
 
@@ -141,6 +149,42 @@ class _Finder:
                         self._report("unreachable", name, abs(float(apart)), 0.0, its_name)
                 points.append((group, place, wanted, name))
 
+    def goals_inside(self) -> None:
+        """Find points that are to be inside of things which their own piece may not enter."""
+        table, geometry = self._workspace.table, self._workspace.geometry
+        for number, goal in enumerate(self._problem.goals):
+            if not isinstance(goal, (Point, Frame)):
+                continue
+            found = find_place(self._problem.scene, goal.frame, "")
+            place = self._problem.scene.model.frames[found.frame].placement
+            if isinstance(goal, Point):
+                here, wanted = place.act(np.asarray(goal.offset, dtype=float)), np.asarray(goal.target, dtype=float)
+            else:
+                here, wanted = place.translation, placement(goal.target).translation
+            own = [k for k in np.flatnonzero(table.joint == found.joint).tolist() if self._depth(k, here) > -ON_SURFACE]
+            pairs = np.isin(table.pairs, own).any(axis=1) & (table.joint[table.pairs] == 0).any(axis=1)
+            deepest, thing = 0.0, -1
+            for pair in np.flatnonzero(pairs).tolist() if found.joint else ():
+                a, b = table.pairs[pair].tolist()
+                other = b if table.joint[b] == 0 else a
+                centre = geometry.geometryObjects[other].placement.translation
+                if np.linalg.norm(wanted - centre) < table.reach[other]:
+                    depth = self._depth(other, wanted)
+                    if depth > CLEAR and depth + self._problem.clearances[pair] > deepest:
+                        deepest, thing = depth + float(self._problem.clearances[pair]), other
+            if thing >= 0:
+                name = f"goals[{number}], {type(goal).__name__}({goal.frame!r})"
+                text = f"{name}, is in {self._workspace.owners[thing]}, {1e3 * deepest:.3g} mm from where it can be"
+                self.found.append(Contradiction("unreachable", text, deepest))
+
+    def _depth(self, index: int, point: Array) -> float:
+        """How deep a point (3,) is inside a piece, metres, both in the frame of the piece's joint."""
+        body = self._workspace.geometry.geometryObjects[index]
+        at = coal.Transform3s(body.placement.rotation, body.placement.translation)
+        there = coal.Transform3s(np.eye(3), np.asarray(point, dtype=float))
+        ask, answer = coal.DistanceRequest(), coal.DistanceResult()
+        return -float(coal.distance(body.geometry, at, coal.Sphere(ON_SURFACE), there, ask, answer)) - ON_SURFACE
+
     def _centers(self, group: NDArray[np.intp]) -> Array:
         """Origins (n, 3) of the pieces, of told groups where they are told to be."""
         center: Array = self._workspace.near(self._problem.start, 0.0).placements[:, 3].copy()
@@ -194,6 +238,13 @@ def in_words(found: tuple[Contradiction, ...]) -> str:
         return ""
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
     return f"what is asked contradicts itself: {found[0].text}{more}"
+
+
+def least_left(found: tuple[Contradiction, ...]) -> float | None:
+    """Norm of the goals' errors that every posture leaves at least, metres; None where no search can serve."""
+    if not all(each.least for each in found):
+        return None
+    return float(np.linalg.norm([each.least for each in found]))
 
 
 def proven(status: Status, found: tuple[Contradiction, ...]) -> Status:

@@ -1,4 +1,4 @@
-"""Other postures to begin from when the first start leads to a local minimum."""
+"""Other postures to begin from when the first start leads to a local minimum, and when enough of them were tried."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 SPREADS = (0.3, 0.6, 1.0)  # share of each joint's range that a start may leave the first one by, in turn
 AT_LIMIT = 0.02  # rad: nearer to its limit than this a joint counts as at it
 BEND = 0.3  # rad: by which it is then moved off
+SAME_MINIMUM = 0.01  # share by which the values of one minimum differ at most; 0.05 takes neighbours for one
 ROOT_SPREAD = 0.2  # m and rad, for joints without limits
 
 
@@ -59,6 +60,32 @@ def restarts(
     for number in range(count):
         spread = spreads[number % len(spreads)]
         yield _moved(problem, state, start, rng.uniform(-0.5, 0.5, len(span)) * spread * span)
+
+
+class Minima:
+    """Local minima that descents from random starts ended in, and whether there are likely to be more.
+
+    With w different minima after n descents, the number of minima to expect is w (n - 1) / (n - w - 2) under a uniform
+    prior; where that is nearer to w than to w + 1, all are taken for found (C. G. E. Boender, A. H. G. Rinnooy Kan,
+    "Bayesian stopping rules for multistart global optimization methods", Mathematical Programming 37, 1987).
+    """
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._values: list[float] = []
+        self._count = 0
+
+    def add(self, value: float, converged: bool) -> None:
+        """Note where a descent ended; one that did not converge is no minimum that others may be alike."""
+        self._count += 1
+        if not any(abs(value - known) <= SAME_MINIMUM * value for known in self._values):
+            self._values.append(value if converged else np.inf)
+
+    @property
+    def complete(self) -> bool:
+        """Whether all minima are taken for found."""
+        found, count = len(self._values), self._count
+        return count > found + 2 and found * (count - 1) <= (found + 0.5) * (count - found - 2)
 
 
 def _moved(problem: Problem, state: State, start: Array, move: Array) -> Array:

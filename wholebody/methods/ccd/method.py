@@ -16,7 +16,7 @@ from wholebody.methods.ccd.overlap import SHAKES
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.remover import TOUCH, Remover
 from wholebody.methods.ccd.terms import read
-from wholebody.methods.contradictions import Contradiction, contradictions, in_words, proven
+from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, in_words, least_left, proven
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, check_problem, check_settings
 from wholebody.problem import Iterate, Problem, Solution, Status
@@ -183,11 +183,14 @@ class _Search:
             trial = self._attempt(q, free, "" if attempt == 0 else "restart")
             if best is None or trial.better(best, self._touch):
                 best = trial
+            if self._serves(best):
+                self.contradictions = ()
             if self._serves(best) or self._control.over:
                 break
             if attempt == 0:
                 self.contradictions = contradictions(self._problem, self._workspace)
-            if self.contradictions:
+            least = least_left(self.contradictions)
+            if least is None or (least and best.error <= NEAREST * least):
                 break
         assert best is not None
         return best if not self._control.over else replace(best, rested=False)

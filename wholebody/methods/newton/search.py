@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
-from wholebody.methods.contradictions import Contradiction, contradictions
+from wholebody.methods.contradictions import Contradiction, contradictions, least_left
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.polishing import polish
 from wholebody.methods.newton.reaching import Reached, reach
-from wholebody.methods.starts import bent, restarts
+from wholebody.methods.starts import Minima, bent, restarts
 
 Array = NDArray[np.float64]
 
@@ -77,19 +77,26 @@ class Search:
     def everywhere(self, q: Array) -> Found:
         """The best end of all ways, the measures brought to their least there if it serves."""
         self.contradictions = contradictions(self.course.problem, self.course.workspace)
-        best = self._go(q, "", TRIAL) if self.contradictions else self.from_here(q)
-        if not self._serves(best) and not self.contradictions:
+        hopeless = least_left(self.contradictions) is None
+        best = self._go(q, "", TRIAL) if hopeless else self.from_here(q)
+        if not self._serves(best) and not hopeless:
+            minima = Minima()
             for start, how in self._starts(q):
+                if minima.complete:
+                    break
                 found = self._go(start, how, min(TRIAL, self.settings.iterations))
                 if self._better(found, best) and not found.reached.stationary and not self._serves(found):
                     found = self._go(found.q, how, self.settings.iterations)
+                minima.add(max(_broken(found), self.settings.counted) + _missed(found), found.reached.stationary)
                 if self._better(found, best):
                     best = found
+                if self._serves(best):
+                    self.contradictions = ()
                 if self._serves(best) or self.course.control.over or self.course.control.spent > FOR_STARTS:
                     break
         if self.course.control.over:
             return best
-        if not best.judgement.holds(self.settings.counted) and not self.contradictions:
+        if not best.judgement.holds(self.settings.counted) and not hopeless:
             best = self._least_violation(best, q)
         if self._serves(best) and self.course.objective.minimised:
             best = self._polished(best)

@@ -29,7 +29,7 @@ from wholebody.methods.qp.visit import Local, Visit
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 
-NOTHING = -1e3  # m: clearance at which no pair is looked at
+ENDLESS = 1e3  # m: of relaxation, with which no pair is looked at
 WITHIN = 0.12  # m: pairs nearer than this get rows
 RADIUS = 0.5  # rad, m: of the first step
 LARGEST_RADIUS = 1.0
@@ -47,8 +47,12 @@ class CurvedReach:
     def __init__(self, problem: Problem, lineariser: Lineariser, solver: QPSolver, control: Control) -> None:
         """Take a lineariser of the problem and what may end a descent."""
         self._problem, self._lineariser, self._control = problem, lineariser, control
+        self._alone = lineariser.relaxed(ENDLESS)
         self._subproblem = Subproblem(problem, lineariser.state)
         self._solver = solver
+        model = lineariser.state.model
+        free = [joint.idx_v for joint in model.joints if joint.shortname() == "JointModelFreeFlyer"]
+        self._walk = np.array([first + k for first in free for k in range(3)], dtype=np.intp)
 
     def through_everything(self, start: Array, enough: float, most: int) -> Local:
         """Descend from a posture (nq,) within limits and constraints, as if nothing were there.
@@ -61,21 +65,15 @@ class CurvedReach:
         Returns:
             A posture that may be inside of things; converged where nothing nearer is near.
         """
-        lineariser = self._lineariser
-        goals, clearances = lineariser.goals, lineariser.clearances
-        lineariser.take(goals, np.full_like(clearances, NOTHING))
-        try:
-            return self._descend(start, enough, most, 0.0)
-        finally:
-            lineariser.take(goals, clearances)
+        return self._descend(self._alone, start, enough, most, 0.0)
 
     def among_things(self, start: Array, enough: float, most: int) -> Local:
         """Descend from a posture (nq,) and pass through nothing; arguments as of `through_everything`."""
-        return self._descend(start, enough, most, WITHIN)
+        return self._descend(self._lineariser, start, enough, most, WITHIN)
 
-    def _descend(self, q: Array, enough: float, most: int, within: float) -> Local:
+    def _descend(self, lineariser: Lineariser, q: Array, enough: float, most: int, within: float) -> Local:
         working_set = WorkingSet(self._solver)
-        here = self._visit(q, within)
+        here = self._visit(lineariser, q, within)
         push = np.zeros(len(here.rows.soft_error))
         radius, used, converged = RADIUS, 0, False
         while used < most and here.violation.worst > enough and radius > LEAST_RADIUS and not self._control.over:
@@ -84,10 +82,15 @@ class CurvedReach:
             program = self._subproblem.program(
                 here.at, rows, 0.5 * radius, None, 0.0, np.zeros(len(rows.soft_error)), False
             )
-            self._lineariser.state.update(here.at.q)
+            lineariser.state.update(here.at.q)
             bend, weight = self._curvature(rows, push)
+            lower, upper = program.lower.copy(), program.upper.copy()
+            if not within:  # where nothing is in the way, and a translation bends nothing
+                lower[self._walk], upper[self._walk] = here.at.lower[self._walk], here.at.upper[self._walk]
             program = replace(
                 program,
+                lower=lower,
+                upper=upper,
                 diagonal=np.maximum(program.diagonal, DAMPING * float(weight.max(initial=0.0))),
                 rows=np.vstack([program.rows, bend]),
                 target=np.concatenate([program.target, np.zeros(len(bend))]),
@@ -101,7 +104,7 @@ class CurvedReach:
             if gain <= FLAT * here.violation.total:
                 converged = True
                 break
-            there = self._visit(np.asarray(pin.integrate(self._lineariser.state.model, here.at.q, x)), within)
+            there = self._visit(lineariser, np.asarray(pin.integrate(lineariser.state.model, here.at.q, x)), within)
             ratio = (here.violation.total - there.violation.total) / gain
             step = float(np.abs(x).max(initial=0.0))
             blocked = ratio > WORTH and within > 0.0 and self._jumps(here, there)
@@ -114,8 +117,8 @@ class CurvedReach:
                 here = there
         return Local(here.at.q, here.violation, here.at.measure, converged, used)
 
-    def _visit(self, q: Array, within: float) -> Visit:
-        at = self._lineariser.at(q, within)
+    def _visit(self, lineariser: Lineariser, q: Array, within: float) -> Visit:
+        at = lineariser.at(q, within)
         rows = self._subproblem.rows(at)
         return Visit(at, rows, self._subproblem.violation(rows), Placed(at.contacts, within))
 

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.methods.contradictions import Contradiction, contradictions
+from wholebody.linearisation import Lineariser
+from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
 from wholebody.methods.qp.curved_reach import CurvedReach
 from wholebody.methods.qp.descent import Descent
@@ -16,7 +17,7 @@ from wholebody.methods.qp.quadratic_program import Array
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.visit import Local
-from wholebody.methods.starts import bent, restarts
+from wholebody.methods.starts import Minima, bent, restarts
 from wholebody.problem import Iterate, Problem
 from wholebody.workspace import Workspace
 
@@ -67,6 +68,8 @@ class Search:
         self._in_vain = 0  # scouts in a row that came no nearer
         self.how = "directly"
         self.contradictions: tuple[Contradiction, ...] = ()
+        self._least = 0.0  # what is known to be left of the goals at least, metres
+        self._minima = Minima()  # where scouts ended that were pushed out of things
         self._nearest: list[Local] = []  # where probes without contacts ended
         self._out_of_reach: bool | None = None
         self._best: Local | None = None
@@ -81,6 +84,8 @@ class Search:
         """Try one way after the other until the goals are met; the best that was found."""
         self._try_ways()
         self._settle()
+        if self.best.violation.worst <= self.settings.tolerance:
+            self.contradictions = ()  # by less than what is asked
         if self._out_of_reach:  # which is known, although a nearer posture may be near
             self._best = self.best._replace(converged=True)
         return self.best._replace(converged=False) if self.control.reason else self.best
@@ -91,7 +96,11 @@ class Search:
         if self._accept(first, "directly"):
             return
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
-        if self.contradictions or self._hopeless(self.best.q):
+        least = least_left(self.contradictions)
+        if least is None or (not least and self._hopeless(self.best.q)):
+            return
+        self._least = least
+        if self._proven():
             return
         rng = np.random.default_rng(self.settings.seed)
         starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, self.settings.restarts))
@@ -99,7 +108,7 @@ class Search:
             self._bent(start), self._scouted(islice(starts, FIRST)), self._staged(start), self._scouted(starts)
         )
         for local, how in ways:
-            if self._accept(local, how) or self._left <= 0 or self.control.spent > FOR_WAYS:
+            if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
 
     def _bent(self, start: Array) -> Iterator[tuple[Local, str]]:
@@ -124,7 +133,7 @@ class Search:
         a row, although nothing was in their way, came no nearer than the best posture, the goals are out of reach.
         """
         for q in starts:
-            if self._in_vain == NO_NEARER or self._left <= 0 or self.control.spent > FOR_WAYS:
+            if self._in_vain == NO_NEARER or self._minima.complete or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
             ghost = self._scout(q, GHOST)
             nearer = ghost.violation.left < (1.0 - NEARER) * self.best.violation.left
@@ -135,6 +144,8 @@ class Search:
             if not _held(scout, self.settings.tolerance) and not _held(self.best, self.settings.tolerance):
                 scout = self._scout(q, 0.0)  # nothing leads out from there; to be outside comes before the goals
             reached = scout.violation.worst <= self.settings.tolerance
+            if not reached:
+                self._minima.add(scout.violation.total, scout.converged)
             yield self._try(scout.q, "restart") if reached else scout, "from another start"
 
     def _scout(self, start: Array, depth: float) -> Local:
@@ -145,10 +156,8 @@ class Search:
             depth: by which pieces may be inside of each other, metres.
         """
         most = max(min(self._left, SCOUT), 1)
-        asked = self.lineariser.clearances
-        self.lineariser.clearances = asked - depth
-        local = self._descent(most, None, "scout", measures=False, hasty=True).run(start)
-        self.lineariser.clearances = asked
+        lineariser = self.lineariser if depth == 0.0 else self.lineariser.relaxed(depth)
+        local = self._descent(most, None, "scout", measures=False, hasty=True, lineariser=lineariser).run(start)
         self.spent += local.iterations
         self._left -= local.iterations
         return local
@@ -174,11 +183,16 @@ class Search:
             if _held(local, tolerance) and local.violation.left <= best.violation.left + tolerance:
                 self._best = local
 
+    def _proven(self) -> bool:
+        """Whether the best posture is known to be as near to the goals as any."""
+        left = self.best.violation.left
+        return bool(self._least) and _held(self.best, self.settings.tolerance) and left <= NEAREST * self._least
+
     def _hopeless(self, q: Array) -> bool:
         """Whether the goals are out of reach: from a posture (nq,) and other starts, even through everything.
 
-        Where all of several descents without contacts, from postures all over the limits, come to rest at the same
-        distance, it is the nearest that limits and constraints allow. Local minima are told by their differing.
+        Where several descents without contacts, from postures all over the limits, come to rest at the same distance
+        and none comes nearer, it is the nearest that limits and constraints allow. Local minima differ.
         """
         if self._out_of_reach is not None or not (self.problem.goals and self.problem.scene.model.nv):
             return bool(self._out_of_reach)
@@ -196,10 +210,8 @@ class Search:
                 continue  # from there the constraints alone are too far
             self._nearest.append(local)
             self._nearest.sort(key=lambda local: local.violation.total)
-            least, most = self._nearest[0].violation.total, self._nearest[-1].violation.total
-            if most > AGREE * least + tolerance:
-                return False
-            if len(self._nearest) == AGREEING:
+            most = AGREE * self._nearest[0].violation.total + tolerance
+            if sum(local.violation.total <= most for local in self._nearest) == AGREEING:
                 self._out_of_reach = True
                 break
         return self._out_of_reach
@@ -276,10 +288,11 @@ class Search:
         measures: bool = True,
         hasty: bool = False,
         eager: bool = False,
+        lineariser: Lineariser | None = None,
     ) -> Descent:
         return Descent(
-            self.subproblem, self.lineariser, self.solver, self.settings.tolerance, iterations, offset, self.trace,
-            note, measures and self.settings.measures, hasty, eager, self.control,
+            self.subproblem, lineariser or self.lineariser, self.solver, self.settings.tolerance, iterations, offset,
+            self.trace, note, measures and self.settings.measures, hasty, eager, self.control,
         )  # fmt: skip
 
     def _accept(self, local: Local, how: str) -> bool:
