@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from wholebody.cli.bench import (
+    ablation,
     attack,
     challenge,
     compare,
@@ -28,5 +29,18 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     """Add the command `bench` with its own commands."""
     parser = commands.add_parser("bench", help=HELP, description=DESCRIPTION)
     kinds = parser.add_subparsers(title="what to measure", metavar="WHAT", required=True)
-    for command in (compare, step, reaches, solve, newton, stability, challenge, detail, scaling, robots, attack):
+    for command in (
+        compare,
+        step,
+        reaches,
+        solve,
+        newton,
+        stability,
+        challenge,
+        detail,
+        scaling,
+        robots,
+        attack,
+        ablation,
+    ):
         command.add_to(kinds)

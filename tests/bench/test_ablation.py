@@ -1,0 +1,58 @@
+"""A change reaches the code that it is about, is taken back, and is counted."""
+
+from __future__ import annotations
+
+import pytest
+
+from wholebody.bench import ablation
+from wholebody.bench.ablation import Constant, Row, report
+from wholebody.bench.problem_sets.registry import SETS
+from wholebody.methods import contradictions, starts
+
+
+@pytest.fixture(scope="module")
+def given():
+    return [SETS["robot_arm"].make(number, 5).problem for number in range(2)]
+
+
+def test_constants_are_those_of_the_method_and_of_what_methods_share() -> None:
+    found, _ = ablation.constants("qp")
+    by_name = {(each.module, each.name): each.value for each in found}
+    assert by_name["wholebody.methods.starts", "SPREADS"] == starts.SPREADS
+    assert all(not each.module.startswith("wholebody.methods.newton") for each in found)
+
+
+def test_whole_numbers_stay_whole_and_at_least_one() -> None:
+    assert Constant("m", "N", 4).times(0.1) == 1
+    assert Constant("m", "N", 4).times(10.0) == 40
+    assert Constant("m", "N", (1.0, 2.0)).times(0.5) == (0.5, 1.0)
+
+
+def test_a_constant_is_changed_wherever_it_was_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    constant = Constant("wholebody.methods.contradictions", "NEAREST", contradictions.NEAREST)
+    places = ablation._places(constant)
+    assert len(places) > 1
+    with ablation._replaced(places, 7.0):
+        assert all(getattr(owner, name) == 7.0 for owner, name in places)
+    assert all(getattr(owner, name) == constant.value for owner, name in places)
+
+
+def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ablation, "constants", lambda method: ([], []))
+
+    class Nothing:
+        value = 1
+
+    told: list[str] = []
+    whole, rows = ablation.ablation("qp", given, {"nothing": (Nothing, "value", 2)}, told.append)
+    assert Nothing.value == 1
+    assert rows == [Row("nothing", "off", 0, 0, 0, 0.0)]
+    assert len(told) == 1
+    text = report("qp", len(given), whole, [*rows, Row("x.Y", "ten times", 0, 0, 0, 0.0)], ["a.kernel"])
+    assert "`x.Y`" in text
+    assert "a.kernel" in text
+
+
+def test_every_mechanism_that_is_switched_off_is_there() -> None:
+    for owner, attribute, _ in ablation.mechanisms("qp").values():
+        assert callable(getattr(owner, attribute))

@@ -1,0 +1,257 @@
+"""Which constants and mechanisms of a method matter: each changed or switched off, on problems that stay the same.
+
+Only counts are compared, none of which depends on the machine: problems solved, iterations, and whether any answer
+differs at all. A constant that changes no answer when it is ten times and a tenth of what it is decides nothing here.
+"""
+
+from __future__ import annotations
+
+import math
+import pkgutil
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.bench.problem_sets.registry import SETS
+from wholebody.bench.stability.case import Posed
+from wholebody.bench.stability.catalogue import cases
+from wholebody.methods.solve import method_named
+from wholebody.problem import Problem
+
+Array = NDArray[np.float64]
+Value = float | int | tuple[float, ...]
+
+SHARED = ("wholebody.methods.starts", "wholebody.methods.passage")
+"""Modules that methods share and that have constants of their own."""
+
+FACTORS = {"a tenth": 0.1, "ten times": 10.0}
+SEED = 5
+ASSIGNED = re.compile(r"^([A-Z][A-Z_, ]*) = ", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number, or several, that a module gives a name in capitals."""
+
+    module: str
+    name: str
+    value: Value
+
+    def times(self, factor: float) -> Value:
+        """The value times a factor; whole numbers stay whole and at least one."""
+        if isinstance(self.value, tuple):
+            return tuple(factor * each for each in self.value)
+        return max(1, round(factor * self.value)) if isinstance(self.value, int) else factor * self.value
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a method did with all problems.
+
+    Attributes:
+        solved: how many it solved.
+        iterations: of all of them together.
+        left: goal errors that are left, metres and radians, of all of them together.
+        answers: postures, one a problem.
+    """
+
+    solved: int
+    iterations: int
+    left: float
+    answers: tuple[Array, ...]
+
+    def differ(self, other: Outcome) -> int:
+        """How many answers differ, in any digit."""
+        return sum(not np.array_equal(a, b) for a, b in zip(self.answers, other.answers, strict=True))
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a change did: answers that differ, problems solved, iterations and goal errors left, all of them changes."""
+
+    what: str
+    change: str
+    differ: int
+    solved: int
+    iterations: int
+    left: float
+
+
+def constants(method: str) -> tuple[list[Constant], list[str]]:
+    """Constants of a method's modules, and modules whose constants are compiled in, so that they cannot be changed.
+
+    Args:
+        method: name of a package of `wholebody.methods`.
+    """
+    package = import_module(f"wholebody.methods.{method}")
+    names = [f"{package.__name__}.{found.name}" for found in pkgutil.walk_packages(package.__path__)]
+    found: list[Constant] = []
+    compiled: list[str] = []
+    for name in (*names, *SHARED):
+        module = import_module(name)
+        mine = [Constant(name, each, getattr(module, each)) for each in _assigned(module)]
+        mine = [each for each in mine if _is_number(each.value)]
+        if mine and any(type(value).__name__ == "CPUDispatcher" for value in vars(module).values()):
+            compiled.append(name)
+        else:
+            found += mine
+    return found, compiled
+
+
+def problems(count: int) -> list[Problem]:
+    """The first problems of every still set, and the hard cases that are solved once."""
+    made = [SETS[name].make(number, SEED).problem for name in SETS if not SETS[name].moving for number in range(count)]
+    posed = [given.problem for given in (case.question() for case in cases()) if isinstance(given, Posed)]
+    return made + posed
+
+
+def outcome(method: str, given: Sequence[Problem]) -> Outcome:
+    """Solve all problems."""
+    solver = method_named(method)
+    solutions = [solver.solve(problem) for problem in given]
+    left = sum(each.assessment.goal_error + each.assessment.goal_angle for each in solutions)
+    return Outcome(
+        sum(each.solved for each in solutions),
+        sum(each.iterations for each in solutions),
+        float(left),
+        tuple(each.q for each in solutions),
+    )
+
+
+def ablation(
+    method: str,
+    given: Sequence[Problem],
+    mechanisms: Mapping[str, tuple[Any, str, Any]],
+    tell: Callable[[str], None],
+) -> tuple[Outcome, list[Row]]:
+    """Change one thing after the other.
+
+    Args:
+        method: its name.
+        given: the problems.
+        mechanisms: names to what is switched off: an owner, its attribute, and what takes its place.
+        tell: told of every row.
+
+    Returns:
+        What the method does unchanged, and a row a change.
+    """
+    outcome(method, given[:1])  # what is compiled at first use
+    whole = outcome(method, given)
+    rows: list[Row] = []
+
+    def note(what: str, change: str) -> None:
+        now = outcome(method, given)
+        done = (now.solved - whole.solved, now.iterations - whole.iterations, now.left - whole.left)
+        rows.append(Row(what, change, now.differ(whole), *done))
+        tell(f"{what}, {change}: {rows[-1].differ} differ, {rows[-1].solved:+d} solved")
+
+    for name, (owner, attribute, instead) in mechanisms.items():
+        with _replaced([(owner, attribute)], instead):
+            note(name, "off")
+    for constant in constants(method)[0]:
+        for change, factor in FACTORS.items():
+            value = constant.times(factor)
+            if value != constant.value:
+                with _replaced(_places(constant), value):
+                    note(f"{constant.module.removeprefix('wholebody.methods.')}.{constant.name}", change)
+    return whole, rows
+
+
+def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
+    """What a method can do without, by name; empty where nothing is listed."""
+    if method != "qp":
+        return {}
+    from wholebody.methods.qp.acceleration import Anderson
+    from wholebody.methods.qp.descent import Descent
+    from wholebody.methods.qp.funnel import Funnel
+    from wholebody.methods.qp.search import Search
+
+    return {
+        "the funnel narrows": (Funnel, "narrow", lambda self, before, after: None),
+        "the watchdog": (Descent, "_promises", lambda self, here, there: False),
+        "acceleration": (Anderson, "propose", lambda self, dq: None),
+        "a start with bent joints": (Search, "_bent", lambda self, start: iter(())),
+        "homotopy": (Search, "_staged", lambda self, start: iter(())),
+        "relaxed probes": (Search, "_scouted", lambda self, starts: iter(())),
+        "descents without contacts": (Search, "_hopeless", lambda self, q: False),
+    }
+
+
+def _assigned(module: ModuleType) -> list[str]:
+    """Names in capitals that a module assigns itself."""
+    source = Path(str(module.__file__)).read_text(encoding="utf-8")
+    return [name for line in ASSIGNED.findall(source) for name in line.split(", ")]
+
+
+def _is_number(value: Any) -> bool:
+    parts = value if isinstance(value, tuple) else (value,)
+    return bool(parts) and all(
+        isinstance(part, int | float) and not isinstance(part, bool) and math.isfinite(part) for part in parts
+    )
+
+
+def _places(constant: Constant) -> list[tuple[Any, str]]:
+    """The module of a constant, and those that import it by its name."""
+    owner = sys.modules[constant.module]
+    others = [
+        module
+        for name, module in sys.modules.items()
+        if name.startswith("wholebody.") and module is not owner and constant.name in vars(module)
+        and vars(module)[constant.name] is constant.value and constant.name not in _assigned(module)
+    ]  # fmt: skip
+    return [(module, constant.name) for module in (owner, *others)]
+
+
+@contextmanager
+def _replaced(places: Sequence[tuple[Any, str]], value: Any) -> Iterator[None]:
+    """Put something in the place of attributes for a while."""
+    before = [getattr(owner, name) for owner, name in places]
+    for owner, name in places:
+        setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        for (owner, name), old in zip(places, before, strict=True):
+            setattr(owner, name, old)
+
+
+def report(method: str, given: int, whole: Outcome, rows: Sequence[Row], compiled: Sequence[str]) -> str:
+    """The counts as Markdown: mechanisms, constants that matter by what they change, and those that change nothing."""
+    lines = [
+        f"{method} on {given} problems: {whole.solved} solved, {whole.iterations} iterations, {whole.left:.4g} m and "
+        "rad left. The columns are changes of these, and how many answers differ in any digit.",
+        "",
+        "| switched off | answers that differ | solved | iterations | left [m, rad] |",
+        "| --- | ---: | ---: | ---: | ---: |",
+    ]
+    lines += [_line(row) for row in rows if row.change == "off"]
+    lines += [
+        "",
+        "| constant | answers that differ | solved | iterations | left [m, rad] |",
+        "| --- | ---: | ---: | ---: | ---: |",
+    ]
+    changed = [row for row in rows if row.change != "off"]
+    lines += [_line(row) for row in changed if row.differ]
+    names = dict.fromkeys(row.what for row in changed)
+    idle = [name for name in names if not any(row.differ for row in changed if row.what == name)]
+    lines += [
+        "",
+        f"Ten times and a tenth of these changed no answer: {', '.join(f'`{name}`' for name in idle) or 'none'}.",
+    ]
+    if compiled:
+        lines += ["", f"Compiled in, and not changed: the constants of {', '.join(f'`{name}`' for name in compiled)}."]
+    return "\n".join(lines)
+
+
+def _line(row: Row) -> str:
+    what = row.what if row.change == "off" else f"`{row.what}`, {row.change}"
+    return f"| {what} | {row.differ} | {row.solved:+d} | {row.iterations:+d} | {row.left:+.3g} |"
