@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import inf, nan
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,6 +17,14 @@ from wholebody.bench.report import TEMPLATES, formatted, groups, quantile, rende
 @pytest.mark.parametrize("path", sorted(TEMPLATES.iterdir()), ids=lambda path: path.name)
 def test_every_template_can_be_read(path: Path) -> None:
     report._environment().get_template(path.name)
+
+
+@pytest.mark.parametrize("path", sorted(TEMPLATES.glob("*.md.jinja")), ids=lambda path: path.name)
+def test_a_table_has_a_rule_for_every_column(path: Path) -> None:
+    lines = path.read_text().splitlines()
+    for head, rule in pairwise(lines):
+        if rule.startswith("| ---") and "{" not in head + rule:
+            assert head.count("|") == rule.count("|"), head
 
 
 @pytest.fixture
