@@ -154,7 +154,7 @@ def test_a_simplified_problem_and_its_scene(scene: wb.Scene) -> None:
         scene, goals=[wb.Point("right_index_tip", (0.4, -0.2, 1.1))], constraints=[wb.Hold("left_foot")],
         measures=[wb.PotentialEnergy()],
     )  # fmt: skip
-    small = scene.simplified(whole)
+    small = wb.simplify(whole)
     made = pickled(small)
     assert np.array_equal(solved(made.problem).q, solved(small.problem).q)
     assert np.array_equal(made.posture(small.problem.start), whole.start)

@@ -87,7 +87,7 @@ def test_one_joint_follows_goals_and_is_followed(load: Callable[[str], wb.Figure
         for _ in range(20):
             frame = drag.to(place)
         assert frame.error < 2e-3, name
-    assert wb.solve(scene.simplified(wb.Problem(scene, goals=[goal])).problem).solved
+    assert wb.solve(wb.simplify(wb.Problem(scene, goals=[goal])).problem).solved
     assert scene.sweep(figure.neutral, q) is None
     made = pickle.loads(pickle.dumps(scene))
     assert np.array_equal(made.contacts(q, 1.0).distance, scene.contacts(q, 1.0).distance)
@@ -126,7 +126,7 @@ def test_a_figure_without_joints_is_solved_judged_and_followed(load: Callable[[s
         assert solution.q.shape == (0,)
     for method in (wb.QP(), wb.Newton()):
         assert method.tracker(problem, 0.02).step(problem.start).q.shape == (0,)
-    assert wb.solve(scene.simplified(problem).problem).q.shape == (0,)
+    assert wb.solve(wb.simplify(problem).problem).q.shape == (0,)
 
 
 def test_a_figure_without_joints_is_drawn_and_swept(load: Callable[[str], wb.Figure], tmp_path: Path) -> None:

@@ -223,7 +223,6 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Scene.lend", Call(there.lend, {})
     yield "Scene.workspace", Call(there.workspace, {})
     yield "Scene.remove", Call(lambda **given: scene(path).remove(**given), {"name": "ball"})
-    yield "Scene.simplified", Call(ask.scene.simplified, {"problem": ask, "lock": True})
     yield "Scene.state", Call(there.state, {"q": q})
     yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4})
 
@@ -297,6 +296,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Problem.retarget", Call(retarget, {"goals": [wb.Point("link4", at)]})
     yield "solve", Call(wb.solve, {"problem": ask, "method": "qp", "progress": print})
     yield "assess", Call(wb.assess, {"problem": ask, "q": q})
+    yield "simplify", Call(wb.simplify, {"problem": ask, "lock": True})
     judged = wb.assess(ask, q)
     yield "Assessment.holds", Call(judged.holds, {"tolerance": 0.1})
     yield "Assessment.met", Call(judged.met, {"tolerance": 0.1})
@@ -315,7 +315,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "QP", Call(wb.QP, {"solver": "osqp", **settings}, used)
     yield "QP.solve", Call(wb.QP().solve, {"problem": ask, "progress": print})
     yield "QP.tracker", Call(wb.QP().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
-    yield "Tracker.step", Call(wb.QP().tracker(ask, 0.1).step, {"q": q, "measures": True})
+    yield "QPTracker.step", Call(wb.QP().tracker(ask, 0.1).step, {"q": q, "measures": True})
     yield "CCD", Call(wb.CCD, {"tolerance": 1e-4, "iterations": 5, "restarts": 1, "seed": 0, "time_limit": None}, used)
     yield "CCD.solve", Call(wb.CCD().solve, {"problem": ask, "progress": print})
     yield "CCD.pushed_out", Call(wb.CCD().pushed_out, {"problem": ask, "q": q})
@@ -457,7 +457,7 @@ ANSWERS = (
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 
-OF_METHODS = ("Tracker", "NewtonTracker")
+OF_METHODS = ("QPTracker", "NewtonTracker", "SolvingTracker")
 """What `tracker` of a method builds; and workspaces, which a run has to itself, are for methods of one's own."""
 
 DERIVATIVES = (

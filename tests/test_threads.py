@@ -147,7 +147,7 @@ def test_a_simplified_problem_is_solved_by_threads_as_by_one(scene: wb.Scene) ->
         scene, goals=[wb.Point("right_index_tip", (0.45, -0.25, 1.15))], constraints=[wb.Hold(foot) for foot in FEET],
         measures=[wb.PotentialEnergy(), wb.Displacement()],
     )  # fmt: skip
-    small, method = scene.simplified(whole).problem, wb.QP(budget=0, time_limit=None)
+    small, method = wb.simplify(whole).problem, wb.QP(budget=0, time_limit=None)
     alone = method.solve(small)
 
     def work(number: int) -> None:

@@ -37,8 +37,10 @@ if TYPE_CHECKING:
     from wholebody.methods.pull import pull
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
-    from wholebody.problem import Problem, Solution
+    from wholebody.problem import Problem
     from wholebody.scene import Scene
+    from wholebody.simplification.simplify import simplify
+    from wholebody.solution import Solution
     from wholebody.taskfile import Task, read_task
     from wholebody.tasks import (
         Axis,
@@ -119,6 +121,7 @@ __all__ = [
     "load",
     "pull",
     "read_task",
+    "simplify",
     "solve",
 ]
 
@@ -135,8 +138,10 @@ _MODULES = {
     "wholebody.methods.pull": "pull",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
-    "wholebody.problem": "Problem Solution",
+    "wholebody.problem": "Problem",
     "wholebody.scene": "Scene",
+    "wholebody.simplification.simplify": "simplify",
+    "wholebody.solution": "Solution",
     "wholebody.taskfile": "Task read_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
     "Hold Measure Orientation Plane Point Posture PotentialEnergy ReachCones Relative StepLimit",

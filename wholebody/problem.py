@@ -1,12 +1,12 @@
-"""A problem (what is asked), its solution (what a method answers) and how a posture is told apart from a good one."""
+"""A problem: what is asked, stated once and checked."""
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -22,11 +22,7 @@ from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
 from wholebody.workspace import Workspace
 
-if TYPE_CHECKING:
-    from wholebody.assessment import Assessment
-
 Array = NDArray[np.float64]
-Status = Literal["solved", "unreachable", "infeasible", "stalled"]
 
 UNIT_TOLERANCE = 1e-3  # how far a start's quaternion may be from unit length before it is taken for a mistake
 LARGEST_CLEARANCE = 0.5  # m: more is taken for a slip of units
@@ -120,6 +116,19 @@ class Problem:
                 _check_goals(doubtful, workspace.state.update(self.start))
         self.goals = resolved
 
+    def with_start(self, q: Array) -> Problem:
+        """Copy that begins at another posture; what was resolved at the start stays.
+
+        Args:
+            q: (nq,) the posture.
+
+        Raises:
+            InputError: q has the wrong shape or a value that is not finite.
+        """
+        result = copy.copy(self)
+        result.start = checks.posture(q, self.scene.model.nq, "with_start: q")
+        return result
+
     @contextmanager
     def lend(self) -> Iterator[Workspace]:
         """Room for one run on this problem's scene; see `Scene.lend`.
@@ -197,55 +206,6 @@ class Problem:
         resting = near.distance >= -1e-6
         asked[near.number[resting]] = np.minimum(asked[near.number[resting]], kept[resting])
         return asked
-
-
-@dataclass(frozen=True)
-class Iterate:
-    """One line of a solution's trace.
-
-    Attributes:
-        goal_error: largest goal error left, metres or radians.
-        violation: largest violation of anything that must hold, metres or radians.
-        measure: weighted sum of the measures.
-        step: largest entry of the displacement that led here, radians or metres.
-        note: what happened: "", "restart", "continuation", ...
-    """
-
-    goal_error: float
-    violation: float
-    measure: float
-    step: float
-    note: str = ""
-
-
-@dataclass(frozen=True)
-class Solution:
-    """What a method answers.
-
-    Attributes:
-        q: (nq,) the posture, within limits, never NaN.
-        status: "solved", "unreachable", "infeasible" or "stalled"; see the guide.
-        seconds: wall time of the call.
-        iterations: iterations of the method.
-        assessment: the independent judgement of q.
-        trace: one entry an iteration.
-        method: name of the method and of what it used.
-        message: one sentence for a reader.
-    """
-
-    q: Array
-    status: Status
-    seconds: float
-    iterations: int
-    assessment: Assessment
-    trace: tuple[Iterate, ...] = field(repr=False)
-    method: str
-    message: str
-
-    @property
-    def solved(self) -> bool:
-        """Whether the status is "solved"."""
-        return self.status == "solved"
 
 
 def _check_goals(goals: Mapping[int, Goal] | Sequence[Goal], state: State) -> None:

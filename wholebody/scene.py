@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.geometry.penetration import ObjectPenetration
     from wholebody.geometry.sweep import FirstContact
-    from wholebody.problem import Problem
-    from wholebody.simplification.simplified import Simplified
 
 Array = NDArray[np.float64]
 
@@ -271,8 +269,8 @@ class Scene:
         from wholebody.geometry.penetration import object_penetrations
 
         with self.lend() as workspace:
-            pairs = workspace.near(q, 0.0).nearest_first().pair
-            return object_penetrations(workspace.geometry, workspace.proximity.results, workspace.owners, pairs)
+            near = workspace.near(q, 0.0).nearest_first()
+            return object_penetrations(workspace.geometry, near.placements, workspace.owners, near.pair)
 
     def sweep(self, q0: Array, q1: Array, tolerance: float = 1e-4) -> FirstContact | None:
         """First contact on the way from q0 to q1, both (nq,), along pin.interpolate; None where there is none.
@@ -293,26 +291,6 @@ class Scene:
         tolerance = checks.number(tolerance, "tolerance", 1e-5, FARTHEST, "m")
         with self.lend() as workspace:
             return workspace.sweep.first_contact(begin, end, tolerance=tolerance)
-
-    def simplified(self, problem: Problem, *, lock: bool = True) -> Simplified:
-        """A smaller problem whose answers are answers of this one: the joints, pairs and corners that matter.
-
-        Args:
-            problem: about this scene.
-            lock: whether joints that take no part stay as they start; False keeps all that are not frozen.
-
-        Returns:
-            The smaller problem, the way back to the whole figure, and what was left out with what that can change.
-
-        Raises:
-            InputError: the problem is about another scene, or objects came or left after it was stated.
-        """
-        from wholebody.simplification.simplify import Parts, simplify
-
-        checks.flag(lock, "lock")
-        if getattr(problem, "scene", None) is self:
-            return simplify(problem, Parts(lock=lock))
-        raise InputError("the problem is about another scene; call problem.scene.simplified(problem)")
 
     def _build(self) -> SceneGeometry:
         built = self._built

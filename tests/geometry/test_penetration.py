@@ -195,7 +195,8 @@ def test_owners_of_a_geometry_model() -> None:
         geometry.addCollisionPair(pin.CollisionPair(i, j))
     model, results = pin.Model(), pin.GeometryData(geometry)
     pin.updateGeometryPlacements(model, model.createData(), geometry, results, np.zeros(0))
-    found = object_penetrations(geometry, results, owners, np.array([[2, 0], [0, 3]]))
+    placements = np.array([[*at.rotation.T, at.translation] for at in results.oMg])
+    found = object_penetrations(geometry, placements, owners, np.array([[2, 0], [0, 3]]))
     assert [(one.a, one.b) for one in found] == [("table", "ball"), ("table", "box")]
     assert np.allclose(found[0].separation, [0, 0, -0.1], atol=1e-5)
     assert np.allclose(found[1].separation, [0, 0, -0.03], atol=1e-5)

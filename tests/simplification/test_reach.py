@@ -12,7 +12,7 @@ import wholebody as wb
 from wholebody.figures.figure import Figure
 from wholebody.figures.self_pairs import random_postures
 from wholebody.simplification.reach import Balls, Reach
-from wholebody.simplification.simplify import Parts, simplify
+from wholebody.simplification.simplify import Parts, leave_out
 
 POSTURES = 10_000
 
@@ -101,7 +101,7 @@ def least_distances(scene: wb.Scene, numbers: np.ndarray, all_of_them: np.ndarra
 
 def left_out(problem: wb.Problem) -> np.ndarray:
     """Numbers of the pairs that are left out because they cannot come near."""
-    small = simplify(problem, Parts(joints=False, growth=0.0)).problem.scene
+    small = leave_out(problem, Parts(joints=False, growth=0.0)).problem.scene
     names, kept = problem.scene.piece_names, set()
     for a, b in small.pair_table.pairs:
         kept.add((small.piece_names[a], small.piece_names[b]))

@@ -17,7 +17,7 @@ from wholebody.bench.problem_sets import balance, clutter
 from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
 from wholebody.problem import Array, Problem
-from wholebody.simplification.simplify import GROWTH, Parts, simplify
+from wholebody.simplification.simplify import GROWTH, Parts, leave_out
 
 DETAILS = ("spheres", "capsules", "hulls")
 FINEST = "hulls"
@@ -116,7 +116,7 @@ def _levels(name: str, number: int, models: dict[str, Problem], finest: str) -> 
     for detail in (finest, *(other for other in models if other != finest)):
         for level, parts in LEVELS.items():
             began = time.process_time()
-            part = simplify(models[detail], parts)
+            part = leave_out(models[detail], parts)
             prepare_ms = 1e3 * (time.process_time() - began) if level != "all" else 0.0
             problem = models[detail] if level == "all" else part.problem
             wb.solve(problem)  # what a problem makes once is made
@@ -238,7 +238,7 @@ def report(rows: Sequence[DetailRow], refused: Sequence[str], facts: Mapping[str
     """Table of all models of all tasks."""
     return render(
         "detail.md", rows=summaries(rows), refused=dict.fromkeys(refused), facts=facts, finest=FINEST, inside=INSIDE,
-        growth=GROWTH, simplify="scene.simplified",
+        growth=GROWTH, simplify="wb.simplify",
     )  # fmt: skip
 
 

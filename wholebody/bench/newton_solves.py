@@ -97,7 +97,7 @@ def nearest_row(repeats: int) -> SolveRow:
     start = made.variables()
 
     def solve() -> Any:
-        made._places = list(start.reshape(-1, 7))
+        made.place(start)
         return made.solve(tolerance=1e-9, nearest=True)
 
     found, us = solve(), median_us(solve, max(3, repeats // 10))

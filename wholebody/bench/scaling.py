@@ -19,6 +19,7 @@ from wholebody.bench.newton_solves import PAPER_WAY, assembly_row
 from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
 from wholebody.methods.drag import Drag
+from wholebody.simplification.simplify import simplify
 
 SERIES = ("joints", "pieces", "things")
 SIZES: dict[str, tuple[int, ...]] = {
@@ -48,7 +49,7 @@ class ScalingRow:
     Attributes:
         series: what grows: "joints", "pieces" of each segment, or "things" around.
         size: how many.
-        method: its name; "qp, simplified" solves what `scene.simplified` leaves.
+        method: its name; "qp, simplified" solves what `wb.simplify` leaves.
         joints, pieces, pairs: of the scene.
         build_ms: to build the scene's geometry [ms]; nan where nothing is built.
         problem_ms: to state the problem; where simplified, to simplify it [ms].
@@ -147,7 +148,7 @@ def _row(
     problem_ms, problem = cpu_ms(lambda: wb.Problem(scene, goals=[wb.Point(TIP, target)], clearance=CLEARANCE))
     asked, way = problem, method
     if method == SIMPLIFIED:
-        problem_ms, part = cpu_ms(lambda: scene.simplified(problem))
+        problem_ms, part = cpu_ms(lambda: simplify(problem))
         asked, way = part.problem, "qp"
     wb.solve(asked, way)
     solves = [wb.solve(asked, way) for _ in range(repeats)]

@@ -16,7 +16,8 @@ from wholebody.errors import FileFormatError, one_line
 from wholebody.figures.state import State
 from wholebody.files import read_text
 from wholebody.geometry.placement import FARTHEST
-from wholebody.problem import Problem, Solution
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 from wholebody.taskfile import Task, read_task
 from wholebody.version import __version__
 

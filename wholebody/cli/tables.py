@@ -14,7 +14,8 @@ from wholebody.figures.state import State
 
 if TYPE_CHECKING:
     from wholebody.figures import Figure
-    from wholebody.problem import Problem, Solution
+    from wholebody.problem import Problem
+    from wholebody.solution import Solution
     from wholebody.taskfile import Task
 
 CONTACTS = 10

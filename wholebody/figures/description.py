@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from wholebody.figures.reach_cones import ReachCone
 
-if TYPE_CHECKING:
-    from wholebody.figures.figure import Figure
-
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+
+ROOT_JOINT = "root_joint"
+"""Name of a free root in the model."""
 
 
 class Chain(NamedTuple):
@@ -90,6 +90,48 @@ class Follower(NamedTuple):
         return (value - self.offset) / self.slope
 
 
+class Articulated(Protocol):
+    """What a posture, or a smaller figure, is made from: a `Figure`; see there."""
+
+    @property
+    def model(self) -> Any:
+        """Pinocchio's model."""
+
+    @property
+    def geometry(self) -> Any:
+        """The convex pieces and their pairs."""
+
+    @property
+    def visual(self) -> Any:
+        """What is drawn."""
+
+    @property
+    def root(self) -> str:
+        """Whether the root is "free" or "fixed"."""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints, without the free root."""
+
+    def joint_id(self, name: str) -> int:
+        """Index of a joint in the model."""
+
+    def posture(self, name: str) -> Array:
+        """A copy of a named posture."""
+
+    def joint_values(self, q: Array) -> dict[str, float]:
+        """The value of each one-degree joint by name."""
+
+    def with_joints(self, q: Array, values: Mapping[str, float]) -> Array:
+        """A copy of a posture with some joints at other values."""
+
+    def clamp(self, q: Array) -> Array:
+        """A copy of a posture with every joint within its limits."""
+
+    def describe(self) -> Description:
+        """What it knows beyond model and geometry."""
+
+
 class Description(NamedTuple):
     """What a figure knows beyond its model and geometry; all of it by name.
 
@@ -110,7 +152,7 @@ class Description(NamedTuple):
     chains: Mapping[str, Chain]
     frames: tuple[str, ...]
     segments: tuple[str, ...]
-    postures: Mapping[str, Callable[[Figure], Array]]
+    postures: Mapping[str, Callable[[Articulated], Array]]
     cones: Mapping[str, JointCone] = MappingProxyType({})
     collision_groups: Mapping[str, str] = MappingProxyType({})
     effort: Mapping[str, float] = MappingProxyType({})

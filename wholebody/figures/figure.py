@@ -11,21 +11,14 @@ import pinocchio as pin
 
 from wholebody import checks
 from wholebody.errors import InputError, UnknownNameError
-from wholebody.figures.description import (
-    Array,
-    Description,
-    Indices,
-    followers_of,
-    limits_of,
-)
+from wholebody.figures.description import ROOT_JOINT, Array, Description, Indices, followers_of, limits_of
+from wholebody.figures.reduction import reduced_parts
 
 LARGEST = 1e6
 """Largest value of a joint, radians or metres, and largest tolerance: what is beyond is a slip."""
 
 HEAVIEST = 1e12
 """Kilograms: greatest mass of what one joint carries."""
-
-ROOT_JOINT = "root_joint"
 
 
 def check_model(model: pin.Model, name: str) -> None:
@@ -304,10 +297,9 @@ class Figure:
             UnknownNameError: neither a joint nor a group, or an unknown posture.
             InputError: no joint is left.
         """
-        from wholebody.figures.reduction import reduce_figure
-
         q = self.neutral if posture is None else self.posture(posture) if isinstance(posture, str) else posture
-        return reduce_figure(self, self.joint_names(joints), self._checked(q))
+        parts = reduced_parts(self, self.joint_names(joints), self._checked(q))
+        return Figure(self.name, parts.model, parts.geometry, self.detail, parts.description, parts.visual)
 
     def describe(self) -> Description:
         """Return what the figure knows beyond model and geometry, to build another one from it."""

@@ -19,7 +19,7 @@ from wholebody.figures import hulls
 from wholebody.figures.anthropometry import Body, body, describe
 from wholebody.figures.assembly import geometry_of, model_of
 from wholebody.figures.blueprint import Array, Blueprint, Joint, Landmark, Link, Solid, place
-from wholebody.figures.description import Chain, Description, ExcludedPair
+from wholebody.figures.description import Articulated, Chain, Description, ExcludedPair
 from wholebody.figures.figure import Figure
 from wholebody.figures.measures import FINGER_BASES, Measures, keyed_hand
 from wholebody.figures.tables import keyed
@@ -201,7 +201,7 @@ def _pairs(solids: tuple[Solid, ...]) -> tuple[tuple[tuple[str, str], ...], tupl
     return tuple(tested), tuple(excluded)
 
 
-def _posture(figure: Figure, side: str, degrees: dict[str, float]) -> Array:
+def _posture(figure: Articulated, side: str, degrees: dict[str, float]) -> Array:
     """Wrist above the origin, palm down, fingers forward, lowest part on z = 0."""
     from wholebody.figures.postures import lowest
 

@@ -13,7 +13,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.errors import FileFormatError, InputError
-from wholebody.figures.figure import ROOT_JOINT, Figure
+from wholebody.figures.description import ROOT_JOINT
+from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, check_concavity
 from wholebody.figures.robot_figure import check_size, geometry_of_links, robot_figure
 from wholebody.figures.urdf_figure import SAMPLES, urdf_figure

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from wholebody.figures.figure import Figure
+from wholebody.figures.description import Articulated
 
 Array = NDArray[np.float64]
 
@@ -67,7 +66,7 @@ HUMAN: dict[str, Attitude] = {
 }
 
 
-def stand(figure: Figure, attitude: Attitude) -> Array:
+def stand(figure: Articulated, attitude: Attitude) -> Array:
     """Return the posture (nq,) of an attitude: pelvis above the origin, lowest piece on z = 0, no piece in another.
 
     Very stout builds (body mass index above about 45) cannot squat: there the thighs, spread to their limit,
@@ -107,7 +106,7 @@ def _moves(abduction: str, segment: str) -> bool:
     return segment.startswith(side) and segment.endswith(arm if part == "shoulder" else leg)
 
 
-def _close_segments(figure: Figure, q: Array) -> set[str]:
+def _close_segments(figure: Articulated, q: Array) -> set[str]:
     data, geometry = figure.model.createData(), figure.geometry
     geometry_data = pin.GeometryData(geometry)
     pin.updateGeometryPlacements(figure.model, data, geometry, geometry_data, q)
@@ -119,7 +118,7 @@ def _close_segments(figure: Figure, q: Array) -> set[str]:
     return close
 
 
-def lowest(figure: Figure, q: Array) -> float:
+def lowest(figure: Articulated, q: Array) -> float:
     """Height of the lowest point of all pieces, metres."""
     data = figure.model.createData()
     geometry_data = pin.GeometryData(figure.geometry)

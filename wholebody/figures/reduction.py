@@ -4,19 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.errors import InputError
-from wholebody.figures.description import Array, Chain, Description, ExcludedPair
-from wholebody.figures.figure import ROOT_JOINT, Figure
+from wholebody.figures.description import ROOT_JOINT, Array, Articulated, Chain, Description, ExcludedPair
 
 _LOCKED = "locked together"
 
 
-def reduce_figure(figure: Figure, keep: tuple[str, ...], q: Array) -> Figure:
-    """Return a figure of which only the joints in `keep` move; see `Figure.reduced`.
+class ReducedParts(NamedTuple):
+    """What a smaller figure is assembled from."""
+
+    model: pin.Model
+    geometry: pin.GeometryModel
+    visual: pin.GeometryModel
+    description: Description
+
+
+def reduced_parts(figure: Articulated, keep: tuple[str, ...], q: Array) -> ReducedParts:
+    """Return the parts of a figure of which only the joints in `keep` move; see `Figure.reduced`.
 
     Raises:
         InputError: `keep` is empty.
@@ -55,7 +64,7 @@ def reduce_figure(figure: Figure, keep: tuple[str, ...], q: Array) -> Figure:
         excluded=(*old.excluded, *fixed),
         notes=old.notes,
     )
-    return Figure(figure.name, small, geometry, figure.detail, description, visual)
+    return ReducedParts(small, geometry, visual, description)
 
 
 def drop_rigid_pairs(geometry: pin.GeometryModel) -> list[ExcludedPair]:
@@ -79,7 +88,7 @@ def _filtered(groups: Mapping[str, tuple[str, ...]], names: set[str]) -> dict[st
     return {name: members for name, members in kept.items() if members}
 
 
-def _restricted(whole: Figure, name: str, part: Figure) -> Array:
+def _restricted(whole: Articulated, name: str, part: Articulated) -> Array:
     """Posture of the reduced figure: the whole one's values of the joints that are left."""
     q, values = whole.posture(name), pin.neutral(part.model)
     for joint in range(1, part.model.njoints):

@@ -12,8 +12,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.errors import FileFormatError, InputError, WholebodyError
-from wholebody.figures.description import Chain, Description
-from wholebody.figures.figure import ROOT_JOINT, Figure
+from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description
+from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces
 from wholebody.figures.rest_posture import RestPosture, rest_posture
 from wholebody.figures.self_pairs import choose_pairs
@@ -65,7 +65,7 @@ def robot_figure(
     return Figure(name, model, geometry, "own", description)
 
 
-def _copied(figure: Figure, q: Array) -> Array:
+def _copied(figure: Articulated, q: Array) -> Array:
     return np.array(q)
 
 

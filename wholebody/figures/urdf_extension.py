@@ -34,8 +34,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.errors import FileFormatError, UnknownNameError, WholebodyError
-from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone
-from wholebody.figures.figure import ROOT_JOINT, Figure
+from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, JointCone
+from wholebody.figures.figure import Figure
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.figures.xml_reading import numbers
@@ -157,7 +157,7 @@ class _Reader:
                     self.geometry.addCollisionPair(pin.CollisionPair(first, second))
         return (*excluded.values(), *drop_rigid_pairs(self.geometry))
 
-    def _posture(self, item: Element) -> Callable[[Figure], Array]:
+    def _posture(self, item: Element) -> Callable[[Articulated], Array]:
         joints = self._names(item, "joints", "joint", self.joints)
         values = numbers(item, "values", self._place(item), len(joints), "") if joints else ()
         root = None
@@ -210,7 +210,7 @@ class _Reader:
         raise FileFormatError(f"{self.path}: <wholebody>: {what}")
 
 
-def _placed(figure: Figure, root: Array | None, values: dict[str, float]) -> Array:
+def _placed(figure: Articulated, root: Array | None, values: dict[str, float]) -> Array:
     q = pin.neutral(figure.model)
     if root is not None and figure.root == "free":
         q[:7] = root

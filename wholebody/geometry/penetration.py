@@ -94,13 +94,13 @@ def object_penetration(
 
 
 def object_penetrations(
-    geometry: pin.GeometryModel, placed: pin.GeometryData, owners: Sequence[str], pairs: NDArray[np.intp]
+    geometry: pin.GeometryModel, placements: Array, owners: Sequence[str], pairs: NDArray[np.intp]
 ) -> list[ObjectPenetration]:
     """Every two owners of pieces that overlap, those that need the longest way out first.
 
     Args:
         geometry: all pieces; its collision pairs say which of them can touch.
-        placed: where they are, ``placed.oMg``.
+        placements: (n, 4, 3) where they are, as `Contacts.placements` says it.
         owners: the owner of each piece; the one that comes first in this list is the A of its pair.
         pairs: (k, 2) pieces that overlap.
     """
@@ -118,7 +118,8 @@ def object_penetrations(
         for i, j in allowed:
             mask[of_a.index(i), of_b.index(j)] = True
         pieces_a, pieces_b = (
-            [(geometry.geometryObjects[k].geometry, placed.oMg[k]) for k in of] for of in (of_a, of_b)
+            [(geometry.geometryObjects[k].geometry, pin.SE3(placements[k, :3].T, placements[k, 3])) for k in of]
+            for of in (of_a, of_b)
         )
         one = object_penetration(a, b, pieces_a, pieces_b, mask)
         if one is not None:

@@ -18,11 +18,12 @@ from wholebody.assessment import assess
 from wholebody.checks import array, function, instance, numbers
 from wholebody.errors import InputError
 from wholebody.interaction.scripts import FRAME
+from wholebody.methods.base import Method
 from wholebody.methods.drag import Drag
 from wholebody.methods.moving_goals import moving_goal, own_copy, retarget
-from wholebody.methods.solve import Method
 from wholebody.motion_assessment import deepened, jerk
-from wholebody.problem import Problem, Solution
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 from wholebody.tasks import Point
 
 Array = NDArray[np.float64]
@@ -97,7 +98,7 @@ def present_place(problem: Problem, goal: int = 0) -> Array:
 def goal_place(problem: Problem, goal: int = 0) -> Array:
     """Where a goal is, (3,) metres; raises like `present_place`."""
     term = moving_goal(problem, goal)
-    return np.array(term._target if isinstance(term, Point) else term._target.translation, dtype=float)
+    return np.array(term.resolved_target if isinstance(term, Point) else term.resolved_target.translation, dtype=float)
 
 
 def drag_along(
@@ -189,4 +190,4 @@ def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudg
 def _aim(problem: Problem, goal: int, place: Array) -> Array | pin.SE3:
     """The target of a moving goal at a place (3,)."""
     term = moving_goal(problem, goal)
-    return place if isinstance(term, Point) else pin.SE3(term._target.rotation, place)
+    return place if isinstance(term, Point) else pin.SE3(term.resolved_target.rotation, place)

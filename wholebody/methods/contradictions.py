@@ -18,7 +18,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.geometry.placement import placement
-from wholebody.problem import Problem, Status
+from wholebody.problem import Problem
+from wholebody.solution import Status
 from wholebody.tasks.frame import Frame, Orientation
 from wholebody.tasks.hold import Hold
 from wholebody.tasks.inputs import find_place

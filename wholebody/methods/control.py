@@ -15,7 +15,7 @@ from wholebody.assessment import Assessment
 from wholebody.checks import a, number
 from wholebody.compiled import compile_seconds
 from wholebody.errors import InputError
-from wholebody.problem import Iterate
+from wholebody.solution import Iterate
 
 LONGEST = 4.0
 """Seconds of processor time that a solve may take where no time limit is given. Few come near it, and how loaded the

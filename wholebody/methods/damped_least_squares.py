@@ -23,13 +23,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.assessment import Assessment, assess
-from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
-from wholebody.methods.contradictions import explanation
+from wholebody.methods.base import SolvingTracker, UnsupportedTermError, refusal
+from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_problem, check_settings
-from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.problem import Problem
+from wholebody.solution import Iterate, Solution
 from wholebody.tasks.base import Constraint, Goal
 
 Array = NDArray[np.float64]
@@ -76,6 +76,10 @@ class DampedLeastSquares:
         """Name for tables."""
         return "dls"
 
+    def accepts(self, problem: Problem) -> str | None:
+        """None where all constraints are equalities; else the sentence that names the others."""
+        return refusal(self.name, _unsupported(check_problem(problem, "DampedLeastSquares.accepts: problem")))
+
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture. Goals out of reach are answers, not errors; contacts are not seen.
 
@@ -91,32 +95,33 @@ class DampedLeastSquares:
         with problem.lend() as workspace, Control(self.time_limit, progress) as control:
             descent = _Descent(problem, self, workspace.state, control)
             rested = descent.run()
-        judgement = assess(problem, descent.best)
-        status = _status(judgement, rested, 1.05 * self.tolerance + 1e-6)
-        why = "" if status == "solved" else explanation(problem)
-        said = why or control.message(judgement) or _message(status, judgement, descent.steps)
-        return Solution(
-            q=descent.best,
-            status=status,
-            seconds=time.perf_counter() - began,
-            iterations=descent.steps,
-            assessment=judgement,
-            trace=tuple(descent.trace),
-            method=self.name,
-            message=said + judgement.in_the_way,
+        ending = Ending(
+            descent.best,
+            rested,
+            descent.steps,
+            tuple(descent.trace),
+            f"in {descent.steps} steps",
+            unit="steps",
+            caveat="contacts are not seen by this method",
         )
+        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+
+    def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
+        """What follows the goals of a problem by solving every step anew; contacts are not seen.
+
+        Raises:
+            InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
+        """
+        return SolvingTracker(self, problem, dt)
 
 
 class _Descent:
     """One descent: the best posture so far, and the way there."""
 
     def __init__(self, problem: Problem, method: DampedLeastSquares, state: State, control: Control) -> None:
-        for number, term in enumerate(problem.constraints):
-            if not np.array_equal(term.lower, term.upper):
-                raise InputError(
-                    f"method 'dls' cannot take constraints[{number}], {type(term).__name__}: it is no equality; leave "
-                    "it out or use method='qp'"
-                )
+        refused = _unsupported(problem)
+        if refused:
+            raise UnsupportedTermError("dls", refused)
         self._problem, self._method = problem, method
         self._state, self._control = state, control
         self.best: Array = problem.scene.figure.clamp(problem.start)
@@ -234,23 +239,10 @@ def _joined(parts: list[Array]) -> Array:
     return np.concatenate(parts) if parts else np.zeros(0)
 
 
-def _status(judgement: Assessment, rested: bool, slack: float) -> Status:
-    if not judgement.holds(slack):
-        return "infeasible" if rested else "stalled"
-    if judgement.met(slack):
-        return "solved"
-    return "unreachable" if rested else "stalled"
-
-
-def _message(status: Status, judgement: Assessment, steps: int) -> str:
-    left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
-    inside = f"; it knows no contacts, and is {1e3 * judgement.penetration:.3g} mm inside"
-    if status == "solved":
-        return f"solved in {steps} steps"
-    if status == "unreachable":
-        return f"came to rest: nothing is violated, {left}"
-    if status == "stalled":
-        return f"ran out of steps: {left}" + (inside if judgement.penetration > 0.0 else "")
-    if judgement.clearance_lack >= max(judgement.constraint_violation, judgement.limit_violation):
-        return f"contacts are not seen by this method: a pair is {1e3 * judgement.clearance_lack:.3g} mm too near"
-    return f"what must hold cannot all hold: missed by {judgement.constraint_violation:.3g} m or rad"
+def _unsupported(problem: Problem) -> list[str]:
+    """Constraints that are no equalities."""
+    return [
+        f"constraints[{number}], {type(term).__name__} (it is no equality)"
+        for number, term in enumerate(problem.constraints)
+        if not np.array_equal(term.lower, term.upper)
+    ]

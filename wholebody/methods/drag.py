@@ -7,7 +7,6 @@ high.
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,29 +14,21 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.checks import time_step
-from wholebody.methods.ccd.method import CCD
-from wholebody.methods.moving_goals import begun_at, moving_goal, own_copy, part_way, refuse_assembly, retarget
-from wholebody.methods.nearby import Nearby, for_motions
-from wholebody.methods.newton.method import Newton
-from wholebody.methods.newton.tracking import NewtonTracker
-from wholebody.methods.qp.method import QP
-from wholebody.methods.qp.tracking import Tracker
-from wholebody.methods.solve import Method
+from wholebody.methods.base import Method, goal_error
+from wholebody.methods.moving_goals import moving_goal, own_copy, part_way, refuse_assembly, retarget
+from wholebody.methods.nearby import solve_nearby
+from wholebody.methods.passage import GRAZE, is_free
+from wholebody.methods.solve import method_for_motions
 from wholebody.pool import OneAtATime
-from wholebody.problem import Problem, Solution
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 from wholebody.tasks import Frame, Point, StepLimit
 from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
 FRAME = 1.0 / 60.0  # s: a frame of a screen
-ON_THE_WAY = 1e-3  # m, rad: to which a method that solves anew in every frame meets the goal before the end
-OF_A_FRAME = 1e-4  # m, rad: to which "qp" meets the goal in a frame
-PROGRAMS = 3  # most of a frame; more = nearer to a goal that turns quickly, dearer frames where it cannot be met
-WORTH = 0.5  # share of the error that another program must leave at most for one more to follow
 LEGS = (np.inf, 0.01, 0.002)  # m, rad: how far the goal is followed in a frame, in turn where a longer way is not free
-GRAZE = 5e-4  # m: deeper than this a way goes into something; soles that are held dip in between two postures
-SHORT = 0.03  # rad, m: a shorter way of joints whose every step was looked after dips in by less than GRAZE
 
 
 class DragFrame(NamedTuple):
@@ -67,7 +58,7 @@ class Drag:
     Attributes:
         problem: what is asked; its goals are replaced as they move.
         q: (nq,) the present posture.
-        tracker: the method's own for these goals, where it has one.
+        tracker: the method's own for these goals.
     """
 
     def __init__(self, problem: Problem, method: str | Method = "qp", *, goal: int = 0, dt: float = FRAME) -> None:
@@ -86,12 +77,10 @@ class Drag:
         """
         refuse_assembly(problem, "Drag")
         self.problem, self.dt = own_copy(problem), time_step(dt, "dt")
-        self.method = for_motions(method)
-        own = self.method
-        self.tracker = own.tracker(self.problem, self.dt) if isinstance(own, (QP, Newton)) else None
-        self._workspace = self.tracker.workspace if self.tracker is not None else self.problem.workspace()
+        self.method = method_for_motions(method)
+        self.tracker = self.method.tracker(self.problem, self.dt)
+        self._workspace = self.tracker.workspace
         self._alone = OneAtATime("drag")
-        self._rough = replace(self.method, tolerance=ON_THE_WAY) if isinstance(self.method, CCD) else self.method
         moving_goal(problem, goal)
         self._number = goal
         self.q: Array = problem.scene.figure.clamp(problem.start)
@@ -106,19 +95,18 @@ class Drag:
         with self._alone:
             retarget(self.problem, self._number, target)
             self._workspace.refresh()
-            if isinstance(self.tracker, Tracker):
-                self.q, iterations = qp_frame(self.tracker, self.q, OF_A_FRAME)
+            if np.isinf(self.tracker.unswept):
+                step = self.tracker.frame(self.q)
+                self.q, iterations = step.q, step.iterations
             else:
                 iterations = self._followed()
-            return DragFrame(
-                self.q, _error(self.problem, self._workspace, self.q), iterations, time.perf_counter() - began
-            )
+            error = goal_error(self.problem, self._workspace, self.q)
+            return DragFrame(self.q, error, iterations, time.perf_counter() - began)
 
     def finish(self) -> Solution:
         """Meet the goal where it is now with the method's full accuracy, and judge the posture."""
         with self._alone:
-            tracker = self.tracker if isinstance(self.tracker, NewtonTracker) else None
-            solution = Nearby(self.problem, self.method, tracker).solve(self.q)
+            solution = solve_nearby(self.problem, self.tracker, self.q)
             self.q = solution.q
             return solution
 
@@ -142,9 +130,11 @@ class Drag:
                 retarget(self.problem, self._number, part_way(goal, left, leg / error))
             elif np.isfinite(leg):
                 continue  # the goal is no farther than that, and was asked for already
-            q, iterations, short = self._attempt()
-            spent, q = spent + iterations, self._bounded(q)
-            if _free(self._workspace, self.q, q, short) and (not deep or _depth(self._workspace, q) <= GRAZE):
+            step = self.tracker.frame(self.q)
+            spent, q = spent + step.iterations, self._bounded(step.q)
+            if is_free(self._workspace, self.q, q, self.tracker.unswept) and (
+                not deep or _depth(self._workspace, q) <= GRAZE
+            ):
                 self.q = q
                 break
             tried.append(q)
@@ -152,14 +142,6 @@ class Drag:
             if deep:
                 self._leave(tried, deep)
         return spent
-
-    def _attempt(self) -> tuple[Array, int, float]:
-        """A posture for the present goals, the iterations, and how long a way the method itself looks after."""
-        if isinstance(self.tracker, NewtonTracker):
-            step = self.tracker.step(self.q)
-            return step.q, step.iterations, SHORT
-        solution = self._rough.solve(begun_at(self.problem, self.q))
-        return solution.q, solution.iterations, 0.0
 
     def _bounded(self, q: Array) -> Array:
         """As far towards the posture q (nq,) as bounds on speeds let a frame go."""
@@ -175,62 +157,27 @@ class Drag:
         return q if share >= 1.0 else np.asarray(pin.integrate(model, self.q, share * way))
 
     def _came_in(self) -> float:
-        """How deep something is in the figure, metres; 0 for little, and for newton, which sees to that by itself."""
-        deep = 0.0 if isinstance(self.method, Newton) else _depth(self._workspace, self.q)
+        """How deep something is in the figure, metres; 0 for little, and where the tracker sees to that by itself."""
+        deep = 0.0 if self.tracker.leaves_overlap else _depth(self._workspace, self.q)
         return deep if deep > GRAZE else 0.0
 
     def _leave(self, tried: list[Array], deep: float) -> None:
         """Out of what came in by `deep` metres, where no way that was tried is free and leads out.
 
-        "ccd" pushes the present posture out. Of this and the postures (nq,) that were tried, a free way is better than
-        one that gets deeper first, and then the less deep end.
+        Of the method's own ways out and the postures (nq,) that were tried, a free way is better than one that gets
+        deeper first, and then the less deep end.
         """
-        pushed = [self._bounded(self.method.pushed_out(self.problem, self.q))] if isinstance(self.method, CCD) else []
-        ends = ((_depth(self._workspace, q), q) for q in (*pushed, *tried))
+        ends = [*(self._bounded(q) for q in self.tracker.ways_out(self.q)), *tried]
+        depths = [_depth(self._workspace, q) for q in ends]
         out = [
-            (not _free(self._workspace, self.q, q, 0.0), depth, k) for k, (depth, q) in enumerate(ends) if depth < deep
+            (not is_free(self._workspace, self.q, q, 0.0), depth, number)
+            for number, (depth, q) in enumerate(zip(depths, ends, strict=True))
+            if depth < deep
         ]
         if out:
-            self.q = [*pushed, *tried][min(out)[2]]
-
-
-def qp_frame(tracker: Tracker, q: Array, tolerance: float) -> tuple[Array, int]:
-    """One frame of dragging by quadratic programs: until the goals are met as a frame should, or another brings little.
-
-    Args:
-        tracker: of the problem with the goals of this frame.
-        q: (nq,) posture of the frame before.
-        tolerance: to which the goals of a frame are met, metres and radians.
-
-    Returns:
-        The posture (nq,), and how many programs it took.
-    """
-    problem, workspace = tracker.problem, tracker.workspace
-    bounded = any(isinstance(bound, StepLimit) for bound in problem.bounds)  # of the way of a whole frame
-    here, error = tracker.step(q).q, np.inf
-    for spent in range(1, 1 if bounded else PROGRAMS):
-        before, error = error, _error(problem, workspace, here)
-        if error <= tolerance or error > WORTH * before:
-            return here, spent
-        there = tracker.step(here, measures=False).q
-        if not _free(workspace, q, there, SHORT):
-            return here, spent + 1
-        here = there
-    return here, 1 if bounded else PROGRAMS
-
-
-def _free(workspace: Workspace, before: Array, after: Array, short: float) -> bool:
-    """Whether the way between postures (nq,) goes into nothing; ways up to `short` are taken as they are."""
-    if np.abs(pin.difference(workspace.model, before, after)).max(initial=0.0) <= short:
-        return True
-    return workspace.sweep.first_contact(before, after, tolerance=GRAZE) is None
+            self.q = ends[min(out)[2]]
 
 
 def _depth(workspace: Workspace, q: Array) -> float:
     """Depth of the deepest overlap at a posture (nq,), metres."""
     return float(-workspace.near(q, 0.0).distance.min(initial=0.0))
-
-
-def _error(problem: Problem, workspace: Workspace, q: Array) -> float:
-    state = workspace.state.update(q)
-    return max((float(np.linalg.norm(goal.error(state))) for goal in problem.goals), default=0.0)

@@ -45,21 +45,6 @@ def refuse_assembly(problem: object, what: str) -> None:
         )
 
 
-def begun_at(problem: Problem, q: Array, *, nearest: bool = False) -> Problem:
-    """The same problem, begun at another posture q (nq,).
-
-    Args:
-        problem: what is asked; what was resolved at its start stays.
-        q: the posture.
-        nearest: whether measures count from q too, such as effort, so that the nearest answer is sought.
-    """
-    result = copy.copy(problem)
-    result.start = q
-    if nearest:
-        result.measures = tuple(term.resolve(problem.scene, q) for term in problem.measures)
-    return result
-
-
 def moving_goal(problem: Problem, number: int) -> Point | Frame:
     """The goal of this number, which can be moved.
 
@@ -89,8 +74,8 @@ def retarget(problem: Problem, number: int, target: Any) -> None:
 def part_way(goal: Point | Frame, error: Array, share: float) -> Any:
     """A target on the way of a goal's frame from where it has this error: a share of what is left."""
     if isinstance(goal, Point):
-        return goal._target + (1.0 - share) * error
-    target = goal._target
+        return goal.resolved_target + (1.0 - share) * error
+    target = goal.resolved_target
     here = pin.SE3(pin.exp3(error[3:]) @ target.rotation, target.translation + error[:3])
     turned = here.rotation @ pin.exp3(share * pin.log3(here.rotation.T @ target.rotation))
     return pin.SE3(turned, here.translation + share * (target.translation - here.translation))

@@ -20,7 +20,23 @@ Array = NDArray[np.float64]
 
 DIP = 5e-4  # m: between two postures a piece may dip in by this much; half of the thinnest plate that counts
 OVERLAP = 2e-4  # m: overlap on the way that does not count; finer than any piece is thick
+GRAZE = 5e-4  # m: deeper than this a way goes into something; soles that are held dip in between two postures
+SHORT = 0.03  # rad, m: a shorter way of joints whose every step was looked after dips in by less than GRAZE
 HALVINGS = 3  # of a way before what is still in doubt is swept
+
+
+def is_free(workspace: Workspace, before: Array, after: Array, unswept: float) -> bool:
+    """Whether the way between two postures (nq,) goes into nothing.
+
+    Args:
+        workspace: of the run.
+        before: where the way begins.
+        after: where it ends.
+        unswept: radians and metres: ways up to this are taken as they are.
+    """
+    if np.isinf(unswept) or np.abs(pin.difference(workspace.model, before, after)).max(initial=0.0) <= unswept:
+        return True
+    return workspace.sweep.first_contact(before, after, tolerance=GRAZE) is None
 
 
 def jumps(workspace: Workspace, before: Placed, after: Placed, q0: Array, q1: Array) -> bool:

@@ -13,11 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from wholebody import checks
 from wholebody.errors import InputError
+from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.moving_goals import moving_goal, own_copy, refuse_assembly, retarget
-from wholebody.methods.nearby import Nearby, for_motions
-from wholebody.methods.solve import Method
-from wholebody.problem import Problem, Solution
+from wholebody.methods.nearby import solve_nearby
+from wholebody.methods.solve import method_for_motions
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 from wholebody.tasks import Point
 from wholebody.tasks.inputs import FARTHEST, point
 
@@ -26,6 +28,7 @@ Array = NDArray[np.float64]
 SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from nearer
 CLOSEST = 1e-6  # m: least spacing
 MOST_GOALS = 10_000
+FRAME = 1.0 / 60.0  # s: of the tracker, of which only whole solves are asked here
 
 
 def pull(
@@ -57,10 +60,10 @@ def pull(
     if not isinstance(term, Point):
         raise InputError(f"pull moves a Point along a path, and goals[{goal}] is a {type(term).__name__}; use Drag")
     own, q, found = own_copy(problem), problem.scene.figure.clamp(problem.start), []
-    near = Nearby(own, for_motions(method))
+    tracker = method_for_motions(method).tracker(own, FRAME)
     for number, place in enumerate(places):
         retarget(own, goal, place)
-        found.append(near.solve(q) if number else near.solve_freely(q))
+        found.append(solve_nearby(own, tracker, q) if number else tracker.solve(q))
         if not found[-1].solved:
             break
         q = found[-1].q

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from wholebody.checks import function, shown
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.methods import METHODS
+from wholebody.methods.base import Method
 from wholebody.methods.control import Progress
 from wholebody.methods.inputs import check_problem
-from wholebody.problem import Problem, Solution
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 
-
-class Method(Protocol):
-    """A way to solve a problem."""
-
-    @property
-    def name(self) -> str:
-        """Name for tables."""
-
-    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture."""
+AT_THE_END = 1e-5  # m, rad: to which a motion meets its goals at its end
 
 
 def method_named(name: str) -> Method:
@@ -52,18 +43,37 @@ def method_named(name: str) -> Method:
     raise UnknownNameError("method", name, METHODS)
 
 
-def as_method(method: object) -> Method:
+def as_method(given: object) -> Method:
     """A method from its name, or a configured one as it is.
 
     Raises:
         UnknownNameError: there is none of this name.
         InputError: it is neither.
     """
-    if isinstance(method, str):
-        return method_named(method)
-    if isinstance(method, type) or not callable(getattr(method, "solve", None)) or not hasattr(method, "name"):
-        raise InputError(f"method is {shown(method)}; give a name such as 'qp', or a method such as wb.QP()")
-    return method  # type: ignore[return-value]
+    if isinstance(given, str):
+        return method_named(given)
+    parts = (getattr(given, name, None) for name in ("solve", "tracker", "accepts"))
+    if isinstance(given, type) or not all(map(callable, parts)) or not hasattr(given, "name"):
+        raise InputError(f"method is {shown(given)}; give a name such as 'qp', or a method such as wb.QP()")
+    return given  # type: ignore[return-value]
+
+
+def method_for_motions(method: object) -> Method:
+    """A method for motions: given by name, it is set for 1e-5 and not to restart; a configured one is taken as it is.
+
+    Raises:
+        UnknownNameError: there is no such method.
+        InputError: it is neither a name nor a method.
+    """
+    if method == "qp":
+        from wholebody.methods.qp.method import QP
+
+        return QP(restarts=0)
+    if method == "ccd":
+        from wholebody.methods.ccd.method import CCD
+
+        return CCD(tolerance=AT_THE_END, restarts=0)
+    return as_method(method)
 
 
 def solve(problem: Problem, method: str | Method = "qp", progress: Progress | None = None) -> Solution:

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from wholebody.assessment import assess
-from wholebody.problem import Array, Problem, Solution
+from wholebody.problem import Array, Problem
 from wholebody.simplification.lifting import Embedding
+from wholebody.solution import Solution
 
 HOLDS = 1e-4  # m, rad: to this limits, constraints and clearances of the whole problem must hold for "solved"
 

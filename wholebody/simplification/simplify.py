@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wholebody.figures.figure import ROOT_JOINT, Figure
+from wholebody import checks
+from wholebody.figures.description import ROOT_JOINT
+from wholebody.figures.figure import Figure
 from wholebody.geometry.large_models import geometry_model
 from wholebody.problem import Array, Problem
 from wholebody.scene import Scene
@@ -54,18 +56,31 @@ class _Smaller:
         return self.figure.model
 
 
-def simplify(problem: Problem, parts: Parts | None = None) -> Simplified:
-    """Leave out of a problem what it does not need.
+def simplify(problem: Problem, *, lock: bool = True) -> Simplified:
+    """A smaller problem whose answers are answers of this one: the joints, pairs and corners that matter.
 
     Args:
         problem: any problem; it is not changed.
-        parts: which kinds of things to leave out; all where None.
+        lock: whether joints that take no part stay as they start; False keeps all that are not frozen.
+
+    Returns:
+        The smaller problem, the way back to the whole figure, and what was left out with what that can change.
+
+    Raises:
+        InputError: it is no problem, or objects came to or left its scene after it was stated.
+    """
+    checks.instance(problem, Problem, "simplify: problem", "state one with wb.Problem(scene, goals=[...])")
+    checks.flag(lock, "lock")
+    return leave_out(problem, Parts(lock=lock))
+
+
+def leave_out(problem: Problem, parts: Parts) -> Simplified:
+    """Leave some kinds of things out of a problem.
 
     Raises:
         InputError: objects came to or left the scene after the problem was stated.
     """
     problem.check_fresh()
-    parts = parts or Parts()
     whole = problem.scene
     part = participation(problem, parts.lock) if parts.joints else None
     figure, geometry = _smaller_figure(problem, part)

@@ -18,7 +18,8 @@ from wholebody.figures import Figure, load
 from wholebody.files import is_file, is_folder
 from wholebody.geometry.placement import placement
 from wholebody.geometry.shapes import Mesh, Shape
-from wholebody.methods.solve import Method, method_named
+from wholebody.methods.base import Method
+from wholebody.methods.solve import method_named
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.taskfile.reading import Contents, Entry, read_contents

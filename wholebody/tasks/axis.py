@@ -50,6 +50,9 @@ class Axis(Goal):
         direction: (3,) where it should point in the world; any length.
         toward: (3,) the place in the world it should point to, seen from the frame's origin [m].
         weight: factor on the squared error [1/rad^2].
+        place: the frame and the joint that carries it, once resolved.
+        basis: (3, 3) rows in the frame: two directions at right angles to the axis, and the axis, each of length 1.
+        resolved_target: (3,) `direction` as a unit vector, or `toward` [m].
 
     Raises:
         InputError: neither or both of `direction` and `toward` are given, or a vector has no direction.
@@ -61,26 +64,26 @@ class Axis(Goal):
     direction: ArrayLike | None = None
     toward: ArrayLike | None = None
     weight: float = 1.0
-    _basis: Array = field(init=False, repr=False)
-    _wanted: Array = field(init=False, repr=False)
-    _place: inputs.Place = field(init=False, repr=False)
+    basis: Array = field(init=False, repr=False)
+    resolved_target: Array = field(init=False, repr=False)
+    place: inputs.Place = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
         where = f"Axis({shown(self.frame)})"
         if (self.direction is None) == (self.toward is None):
             raise InputError(f"{where} takes either a direction or a place to point toward; give one of the two")
-        object.__setattr__(self, "_basis", _frame_about(inputs.direction(self.axis, f"{where}: axis")))
+        object.__setattr__(self, "basis", _frame_about(inputs.direction(self.axis, f"{where}: axis")))
         if self.direction is None:
             wanted = inputs.point(self.toward, f"{where}: toward")
         else:
             wanted = inputs.direction(self.direction, f"{where}: direction")
-        object.__setattr__(self, "_wanted", wanted)
+        object.__setattr__(self, "resolved_target", wanted)
         object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Axis:
         """Find the frame."""
-        return filled(self, _place=inputs.find_place(scene, self.frame, "Axis"))
+        return filled(self, place=inputs.find_place(scene, self.frame, "Axis"))
 
     @property
     def angular(self) -> Mask:
@@ -89,11 +92,11 @@ class Axis(Goal):
 
     def error(self, state: State) -> Array:
         """(2,) the angle along the two directions at right angles to the axis [rad]."""
-        frame = state.frame(self._place.frame)
+        frame = state.frame(self.place.frame)
         direction, distance = self._way(frame)
         if distance < TOUCHING:
             return np.zeros(2)
-        across = self._basis @ (direction @ frame.rotation)
+        across = self.basis @ (direction @ frame.rotation)
         x, y, along = across.tolist()
         sine = hypot(x, y)
         angle = atan2(sine, along)
@@ -103,11 +106,11 @@ class Axis(Goal):
 
     def jacobian(self, state: State) -> Wrench:
         """Two rows: moments, and forces where the direction depends on where the frame is."""
-        frame = state.frame(self._place.frame)
+        frame = state.frame(self.place.frame)
         direction, distance = self._way(frame)
         if distance < TOUCHING:
-            return Wrench(np.zeros((2, 6)), self._place.joint)
-        axes = self._basis @ frame.rotation.T
+            return Wrench(np.zeros((2, 6)), self.place.joint)
+        axes = self.basis @ frame.rotation.T
         x, y, along = (axes @ direction).tolist()
         sine = hypot(x, y)
         gain = self._gain(sine, along)
@@ -123,13 +126,13 @@ class Axis(Goal):
             move = (np.outer(on_direction @ direction, direction) - on_direction) / distance
             rows[:, :3] = move
             rows[:, 3:] -= move @ pin.skew(frame.translation)
-        return Wrench(rows, self._place.joint)
+        return Wrench(rows, self.place.joint)
 
     def _way(self, frame: Any) -> tuple[Array, float]:
         """Unit vector asked for, and how far away the place is that it points to; inf for a direction."""
         if self.toward is None:
-            return self._wanted, np.inf
-        way = self._wanted - frame.translation
+            return self.resolved_target, np.inf
+        way = self.resolved_target - frame.translation
         distance = float(np.sqrt(way @ way))
         return way / max(distance, TOUCHING), distance
 

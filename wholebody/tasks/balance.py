@@ -25,6 +25,8 @@ class Balance(Constraint):
     Attributes:
         feet: names of the segments that carry the figure, with what hangs on them, such as toes.
         margin: least distance from the edges [m].
+        normals: (m, 2) unit normals of the edges of the support polygon, inward; once resolved.
+        offsets: (m,) of the edges: inside, normals @ x >= offsets [m]; once resolved.
 
     Raises:
         InputError: no feet are named, or the margin is negative.
@@ -33,8 +35,8 @@ class Balance(Constraint):
     feet: Sequence[str] = ("left_foot", "right_foot")
     _: KW_ONLY
     margin: float = 0.0
-    _normals: Array = field(init=False, repr=False)
-    _offsets: Array = field(init=False, repr=False)
+    normals: Array = field(init=False, repr=False)
+    offsets: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -59,27 +61,27 @@ class Balance(Constraint):
                 f"Balance: a margin of {self.margin:g} m leaves nothing of the support polygon; make it smaller"
             )
         normals, offsets = edges(corners)
-        return filled(self, _normals=normals, _offsets=offsets)
+        return filled(self, normals=normals, offsets=offsets)
 
     @property
     def lower(self) -> Array:
         """(m,) the margin."""
-        return np.full(len(self._offsets), self.margin)
+        return np.full(len(self.offsets), self.margin)
 
     @property
     def upper(self) -> Array:
         """(m,) inf."""
-        return np.full(len(self._offsets), np.inf)
+        return np.full(len(self.offsets), np.inf)
 
     @property
     def angular(self) -> Mask:
         """(m,) no row is in radians."""
-        return np.zeros(len(self._offsets), dtype=bool)
+        return np.zeros(len(self.offsets), dtype=bool)
 
     def value(self, state: State) -> Array:
         """(m,) distance inside each edge [m]."""
-        return np.asarray(self._normals @ state.center_of_mass()[:2] - self._offsets)
+        return np.asarray(self.normals @ state.center_of_mass()[:2] - self.offsets)
 
     def jacobian(self, state: State) -> Array:
         """(m, nv)."""
-        return np.asarray(self._normals @ state.center_of_mass_jacobian()[:2])
+        return np.asarray(self.normals @ state.center_of_mass_jacobian()[:2])

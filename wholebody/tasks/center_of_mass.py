@@ -24,6 +24,7 @@ class CenterOfMass(Goal):
         target: (3,) place in the world [m].
         axes: "xyz", or "xy" to leave the height free.
         weight: factor on the squared error [1/m^2].
+        resolved_target: (2,) or (3,) the part of `target` that counts [m].
 
     Raises:
         InputError: the target is not in metres, or the axes are others.
@@ -33,13 +34,13 @@ class CenterOfMass(Goal):
     _: KW_ONLY
     axes: Literal["xy", "xyz"] = "xyz"
     weight: float = 1.0
-    _target: Array = field(init=False, repr=False)
+    resolved_target: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
         choice(self.axes, ("xyz", "xy"), "CenterOfMass: axes")
         target = inputs.point(self.target, "CenterOfMass: target")
-        object.__setattr__(self, "_target", target[: len(self.axes)])
+        object.__setattr__(self, "resolved_target", target[: len(self.axes)])
         object.__setattr__(self, "weight", inputs.weight(self.weight, "CenterOfMass: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> CenterOfMass:
@@ -58,7 +59,7 @@ class CenterOfMass(Goal):
 
     def error(self, state: State) -> Array:
         """(2,) or (3,) from the target to the centre of mass [m]."""
-        return np.asarray(state.center_of_mass()[: len(self.axes)] - self._target)
+        return np.asarray(state.center_of_mass()[: len(self.axes)] - self.resolved_target)
 
     def jacobian(self, state: State) -> Array:
         """(2, nv) or (3, nv)."""

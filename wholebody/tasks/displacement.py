@@ -19,10 +19,11 @@ class Displacement(Measure):
 
     Attributes:
         weight: factor on the measure [1/rad^2].
+        distance: the neutral posture, and the weight of every degree of freedom; once resolved.
     """
 
     weight: float = 1.0
-    _distance: SquaredDistance = field(init=False, repr=False)
+    distance: SquaredDistance = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the value."""
@@ -31,16 +32,16 @@ class Displacement(Measure):
     def resolve(self, scene: Surroundings, start: Array) -> Displacement:
         """Take the neutral posture and the weights of the figure."""
         figure = scene.figure
-        return filled(self, _distance=SquaredDistance.build(scene.model, figure.neutral, figure.neutral_weights))
+        return filled(self, distance=SquaredDistance.build(scene.model, figure.neutral, figure.neutral_weights))
 
     def value(self, state: State) -> float:
         """The displacement [rad^2]."""
-        return self._distance.value(state)
+        return self.distance.value(state)
 
     def gradient(self, state: State) -> Array:
         """(nv,) derivative [rad]."""
-        return self._distance.gradient(state)
+        return self.distance.gradient(state)
 
     def curvature(self, state: State) -> Array:
         """(nv,) second derivative; exact for joints of one degree of freedom."""
-        return self._distance.curvature
+        return self.distance.curvature

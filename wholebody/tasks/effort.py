@@ -19,10 +19,11 @@ class Effort(Measure):
 
     Attributes:
         weight: factor on the measure [1/rad^2].
+        distance: the start, and the weight of every degree of freedom; once resolved.
     """
 
     weight: float = 1.0
-    _distance: SquaredDistance = field(init=False, repr=False)
+    distance: SquaredDistance = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the value."""
@@ -30,16 +31,16 @@ class Effort(Measure):
 
     def resolve(self, scene: Surroundings, start: Array) -> Effort:
         """Remember the start."""
-        return filled(self, _distance=SquaredDistance.build(scene.model, start, scene.figure.effort_weights))
+        return filled(self, distance=SquaredDistance.build(scene.model, start, scene.figure.effort_weights))
 
     def value(self, state: State) -> float:
         """The effort [rad^2]."""
-        return self._distance.value(state)
+        return self.distance.value(state)
 
     def gradient(self, state: State) -> Array:
         """(nv,) derivative [rad]."""
-        return self._distance.gradient(state)
+        return self.distance.gradient(state)
 
     def curvature(self, state: State) -> Array:
         """(nv,) second derivative; exact for joints of one degree of freedom."""
-        return self._distance.curvature
+        return self.distance.curvature

@@ -28,6 +28,8 @@ class Frame(Goal):
         target: where it should be: (x, y, z) with the axes of the world, (x, y, z, qx, qy, qz, qw), a matrix (4, 4) or
             a pin.SE3; metres.
         weight: factor on the squared error [1/m^2 and 1/rad^2: a metre counts as much as a radian].
+        resolved_target: `target` as a pin.SE3.
+        residual: what the error is computed by, with frame, joint and target; once resolved.
 
     Raises:
         InputError: the target is none of these, or not in metres.
@@ -37,32 +39,32 @@ class Frame(Goal):
     target: PlacementLike
     _: KW_ONLY
     weight: float = 1.0
-    _target: Any = field(init=False, repr=False)
-    _residual: PlacementResidual = field(init=False, repr=False)
+    resolved_target: Any = field(init=False, repr=False)
+    residual: PlacementResidual = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
         where = f"Frame({shown(self.frame)})"
-        object.__setattr__(self, "_target", inputs.target_placement(self.target, f"{where}: target"))
+        object.__setattr__(self, "resolved_target", inputs.target_placement(self.target, f"{where}: target"))
         object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Frame:
         """Find the frame."""
         place = inputs.find_place(scene, self.frame, "Frame")
-        return filled(self, _residual=PlacementResidual.build(place, self._target))
+        return filled(self, residual=PlacementResidual.build(place, self.resolved_target))
 
     @property
     def angular(self) -> Mask:
         """(6,) the last three rows are in radians."""
-        return self._residual.angular
+        return self.residual.angular
 
     def error(self, state: State) -> Array:
         """(6,) difference in place [m] and orientation [rad]."""
-        return self._residual.value(state)
+        return self.residual.value(state)
 
     def jacobian(self, state: State) -> Wrench:
         """Six rows on the frame's joint."""
-        return self._residual.wrench(state)
+        return self.residual.wrench(state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +77,8 @@ class Orientation(Goal):
         frame: name of the frame, segment or joint.
         target: quaternion (x, y, z, w) or rotation matrix (3, 3) of the frame in the world.
         weight: factor on the squared error [1/rad^2].
+        resolved_target: `target` as a pin.SE3 without translation.
+        residual: what the error is computed by, with frame, joint and target; once resolved.
 
     Raises:
         InputError: the target is not a rotation.
@@ -84,29 +88,29 @@ class Orientation(Goal):
     target: ArrayLike
     _: KW_ONLY
     weight: float = 1.0
-    _target: Any = field(init=False, repr=False)
-    _residual: PlacementResidual = field(init=False, repr=False)
+    resolved_target: Any = field(init=False, repr=False)
+    residual: PlacementResidual = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
         where = f"Orientation({shown(self.frame)})"
-        object.__setattr__(self, "_target", inputs.target_rotation(self.target, f"{where}: target"))
+        object.__setattr__(self, "resolved_target", inputs.target_rotation(self.target, f"{where}: target"))
         object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Orientation:
         """Find the frame."""
         place = inputs.find_place(scene, self.frame, "Orientation")
-        return filled(self, _residual=PlacementResidual.build(place, self._target, position=False))
+        return filled(self, residual=PlacementResidual.build(place, self.resolved_target, position=False))
 
     @property
     def angular(self) -> Mask:
         """(3,) all rows are in radians."""
-        return self._residual.angular
+        return self.residual.angular
 
     def error(self, state: State) -> Array:
         """(3,) difference in orientation [rad]."""
-        return self._residual.value(state)
+        return self.residual.value(state)
 
     def jacobian(self, state: State) -> Wrench:
         """Three rows on the frame's joint."""
-        return self._residual.wrench(state)
+        return self.residual.wrench(state)

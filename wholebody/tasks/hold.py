@@ -28,6 +28,7 @@ class Hold(Constraint):
             matrix (4, 4) or a pin.SE3; metres. None keeps it where it is at the start.
         orientation: False holds only the frame's origin and leaves it free to turn.
         relative_to: name of the frame it must keep its place to; None for the world.
+        residual: what the value is computed by, with frames, joints and target; once resolved.
 
     Raises:
         InputError: `at` is none of these, or not in metres.
@@ -39,7 +40,7 @@ class Hold(Constraint):
     orientation: bool = True
     relative_to: str | None = None
     _at: Any = field(init=False, repr=False, default=None)
-    _residual: PlacementResidual = field(init=False, repr=False)
+    residual: PlacementResidual = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -52,12 +53,12 @@ class Hold(Constraint):
         place = inputs.find_place(scene, self.frame, "Hold")
         base = inputs.find_base(scene, self.relative_to, self.frame, "Hold")
         at = self._at if self._at is not None else placement_between(scene, start, place, base)
-        return filled(self, _residual=PlacementResidual.build(place, at, base, orientation=self.orientation))
+        return filled(self, residual=PlacementResidual.build(place, at, base, orientation=self.orientation))
 
     @property
     def kept_at(self) -> pin.SE3:
         """Where the frame is kept, in the world or in the other frame, once resolved."""
-        return pin.SE3(self._residual.undo.rotation.T, self._residual.target)
+        return self.residual.placement
 
     @property
     def lower(self) -> Array:
@@ -72,12 +73,12 @@ class Hold(Constraint):
     @property
     def angular(self) -> Mask:
         """(m,) the last three of six rows are in radians."""
-        return self._residual.angular
+        return self.residual.angular
 
     def value(self, state: State) -> Array:
         """(m,) difference in place [m] and orientation [rad]."""
-        return self._residual.value(state)
+        return self.residual.value(state)
 
     def jacobian(self, state: State) -> Wrench:
         """Rows between the joint of the frame and that of the other."""
-        return self._residual.wrench(state)
+        return self.residual.wrench(state)

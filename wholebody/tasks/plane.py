@@ -27,6 +27,9 @@ class Plane(Constraint):
         normal: (3,) direction at right angles to the plane, in the world; any length.
         point: (3,) a place in the plane [m]; None for where the frame is at the start.
         side: "on" keeps it in the plane, "above" lets it leave to the side that the normal points to.
+        resolved_normal: (3,) `normal` as a unit vector.
+        place: the frame and the joint that carries it, once resolved.
+        height: n . p of the plane, its distance from the world's origin along the normal [m]; once resolved.
 
     Raises:
         InputError: the normal has no direction, the point is not in metres, or the side is another word.
@@ -37,16 +40,16 @@ class Plane(Constraint):
     _: KW_ONLY
     point: ArrayLike | None = None
     side: Literal["on", "above"] = "on"
-    _normal: Array = field(init=False, repr=False)
+    resolved_normal: Array = field(init=False, repr=False)
     _point: Array | None = field(init=False, repr=False, default=None)
-    _place: inputs.Place = field(init=False, repr=False)
-    _height: float = field(init=False, repr=False)
+    place: inputs.Place = field(init=False, repr=False)
+    height: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
         where = f"Plane({shown(self.frame)})"
         choice(self.side, ("on", "above"), f"{where}: side")
-        object.__setattr__(self, "_normal", inputs.direction(self.normal, f"{where}: normal"))
+        object.__setattr__(self, "resolved_normal", inputs.direction(self.normal, f"{where}: normal"))
         if self.point is not None:
             object.__setattr__(self, "_point", inputs.point(self.point, f"{where}: point"))
 
@@ -56,7 +59,7 @@ class Plane(Constraint):
         point = self._point
         if point is None:
             point = State(scene.model).update(start).frame(place.frame).translation
-        return filled(self, _place=place, _height=float(self._normal @ point))
+        return filled(self, place=place, height=float(self.resolved_normal @ point))
 
     @property
     def lower(self) -> Array:
@@ -75,10 +78,10 @@ class Plane(Constraint):
 
     def value(self, state: State) -> Array:
         """(1,) distance from the plane [m]."""
-        return np.array((self._normal @ state.frame(self._place.frame).translation - self._height,))
+        return np.array((self.resolved_normal @ state.frame(self.place.frame).translation - self.height,))
 
     def jacobian(self, state: State) -> Wrench:
         """One force along the normal."""
-        x, y, z = state.frame(self._place.frame).translation.tolist()
-        a, b, c = self._normal.tolist()
-        return Wrench(np.array(((a, b, c, y * c - z * b, z * a - x * c, x * b - y * a),)), self._place.joint)
+        x, y, z = state.frame(self.place.frame).translation.tolist()
+        a, b, c = self.resolved_normal.tolist()
+        return Wrench(np.array(((a, b, c, y * c - z * b, z * a - x * c, x * b - y * a),)), self.place.joint)

@@ -25,6 +25,9 @@ class Point(Goal):
         target: (3,) place in the world [m].
         offset: (3,) the point in the frame's own axes [m].
         weight: factor on the squared error [1/m^2].
+        place: the frame and the joint that carries it, once resolved.
+        resolved_target: (3,) `target` as an array [m].
+        resolved_offset: (3,) `offset` as an array [m].
 
     Raises:
         InputError: a value is not finite, of the wrong shape or not in metres.
@@ -35,20 +38,20 @@ class Point(Goal):
     _: KW_ONLY
     offset: ArrayLike = (0.0, 0.0, 0.0)
     weight: float = 1.0
-    _place: inputs.Place = field(init=False, repr=False)
-    _target: Array = field(init=False, repr=False)
-    _offset: Array = field(init=False, repr=False)
+    place: inputs.Place = field(init=False, repr=False)
+    resolved_target: Array = field(init=False, repr=False)
+    resolved_offset: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
         where = f"Point({shown(self.frame)})"
-        object.__setattr__(self, "_target", inputs.point(self.target, f"{where}: target"))
-        object.__setattr__(self, "_offset", inputs.point(self.offset, f"{where}: offset"))
+        object.__setattr__(self, "resolved_target", inputs.point(self.target, f"{where}: target"))
+        object.__setattr__(self, "resolved_offset", inputs.point(self.offset, f"{where}: offset"))
         object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Point:
         """Find the frame."""
-        return filled(self, _place=inputs.find_place(scene, self.frame, "Point"))
+        return filled(self, place=inputs.find_place(scene, self.frame, "Point"))
 
     @property
     def angular(self) -> Mask:
@@ -57,8 +60,8 @@ class Point(Goal):
 
     def error(self, state: State) -> Array:
         """(3,) from the target to the point [m]."""
-        return np.asarray(state.frame(self._place.frame).act(self._offset) - self._target)
+        return np.asarray(state.frame(self.place.frame).act(self.resolved_offset) - self.resolved_target)
 
     def jacobian(self, state: State) -> Wrench:
         """Three forces along the world's axes, through the point."""
-        return Wrench(point_rows(state.frame(self._place.frame).act(self._offset)), self._place.joint)
+        return Wrench(point_rows(state.frame(self.place.frame).act(self.resolved_offset)), self.place.joint)

@@ -28,6 +28,8 @@ class Posture(Goal):
         target: name of one of the figure's postures, or a posture (nq,).
         joints: names of joints and groups that take part; None for all, the root included.
         weight: factor on the squared error [1/rad^2 and 1/m^2].
+        resolved_target: (nq,) the posture, once resolved.
+        dofs: (m,) places in the tangent of the joints that take part, once resolved.
 
     Raises:
         InputError: the posture has the wrong shape, is not finite, or has a quaternion that is not of unit length.
@@ -37,8 +39,8 @@ class Posture(Goal):
     _: KW_ONLY
     joints: Sequence[str] | None = None
     weight: float = 1.0
-    _q: Array = field(init=False, repr=False)
-    _dofs: Array = field(init=False, repr=False)
+    resolved_target: Array = field(init=False, repr=False)
+    dofs: Array = field(init=False, repr=False)
     _angular: Mask = field(init=False, repr=False)
     _constant: Array | None = field(init=False, repr=False, default=None)
 
@@ -58,7 +60,11 @@ class Posture(Goal):
         bent = {index for joint in curved for index in range(joint.idx_v, joint.idx_v + joint.nv)}
         constant = None if bent.intersection(dofs.tolist()) else np.eye(model.nv)[dofs]
         return filled(
-            self, _q=self._find(scene), _dofs=dofs, _angular=inputs.angular_dofs(model)[dofs], _constant=constant
+            self,
+            resolved_target=self._find(scene),
+            dofs=dofs,
+            _angular=inputs.angular_dofs(model)[dofs],
+            _constant=constant,
         )
 
     @property
@@ -68,13 +74,13 @@ class Posture(Goal):
 
     def error(self, state: State) -> Array:
         """(m,) from the posture to the present one."""
-        return np.asarray(pin.difference(state.model, self._q, state.q)[self._dofs])
+        return np.asarray(pin.difference(state.model, self.resolved_target, state.q)[self.dofs])
 
     def jacobian(self, state: State) -> Array:
         """(m, nv)."""
         if self._constant is not None:
             return self._constant
-        return np.asarray(pin.dDifference(state.model, self._q, state.q, pin.ARG1)[self._dofs])
+        return np.asarray(pin.dDifference(state.model, self.resolved_target, state.q, pin.ARG1)[self.dofs])
 
     def _find(self, scene: Surroundings) -> Array:
         if isinstance(self.target, str):

@@ -16,7 +16,16 @@ from wholebody.tasks import inputs
 from wholebody.tasks.base import Array, Constraint, Mask, Surroundings, filled
 
 
-class _Limb(NamedTuple):
+class Limb(NamedTuple):
+    """One reach cone on a figure.
+
+    Attributes:
+        cone: the spherical polygon.
+        reference: the frame that the cone is fixed to.
+        limb: the frame that turns within it.
+        axis: (3,) the limb's direction in its frame, a unit vector.
+    """
+
     cone: Any
     reference: inputs.Place
     limb: inputs.Place
@@ -33,10 +42,11 @@ class ReachCones(Constraint):
 
     Attributes:
         names: names of the figure's cones; None for all of them.
+        limbs: each cone with its frames and joints, once resolved.
     """
 
     names: Sequence[str] | None = None
-    _limbs: tuple[_Limb, ...] = field(init=False, repr=False)
+    limbs: tuple[Limb, ...] = field(init=False, repr=False)
     _joints: NDArray[np.intp] = field(init=False, repr=False)
     _against: NDArray[np.intp] = field(init=False, repr=False)
 
@@ -60,10 +70,10 @@ class ReachCones(Constraint):
             cone = cones[known(name, cones, "reach cone", "ReachCones")]
             reference = inputs.find_place(scene, cone.reference, "ReachCones")
             limb = inputs.find_place(scene, cone.limb, "ReachCones")
-            limbs.append(_Limb(cone.cone, reference, limb, inputs.direction(cone.axis, f"ReachCones: axis of {name}")))
+            limbs.append(Limb(cone.cone, reference, limb, inputs.direction(cone.axis, f"ReachCones: axis of {name}")))
         return filled(
             self,
-            _limbs=tuple(limbs),
+            limbs=tuple(limbs),
             _joints=np.array([limb.limb.joint for limb in limbs], dtype=np.intp),
             _against=np.array([limb.reference.joint for limb in limbs], dtype=np.intp),
         )
@@ -71,30 +81,30 @@ class ReachCones(Constraint):
     @property
     def lower(self) -> Array:
         """(m,) zeros."""
-        return np.zeros(len(self._limbs))
+        return np.zeros(len(self.limbs))
 
     @property
     def upper(self) -> Array:
         """(m,) inf."""
-        return np.full(len(self._limbs), np.inf)
+        return np.full(len(self.limbs), np.inf)
 
     @property
     def angular(self) -> Mask:
         """(m,) all rows are in radians."""
-        return np.ones(len(self._limbs), dtype=bool)
+        return np.ones(len(self.limbs), dtype=bool)
 
     def value(self, state: State) -> Array:
         """(m,) signed angle to the edge of each cone, positive inside [rad]."""
-        result = np.empty(len(self._limbs))
-        for row, limb in enumerate(self._limbs):
+        result = np.empty(len(self.limbs))
+        for row, limb in enumerate(self.limbs):
             turn = state.frame(limb.reference.frame).rotation
             result[row] = limb.cone.signed_angle((state.frame(limb.limb.frame).rotation @ limb.axis) @ turn)[0]
         return result
 
     def jacobian(self, state: State) -> Array:
         """(m, nv)."""
-        wrenches = np.zeros((len(self._limbs), 6))
-        for row, limb in enumerate(self._limbs):
+        wrenches = np.zeros((len(self.limbs), 6))
+        for row, limb in enumerate(self.limbs):
             turn = state.frame(limb.reference.frame).rotation
             direction = state.frame(limb.limb.frame).rotation @ limb.axis
             # The direction turns as w x d, so the angle changes by g . (w x d) = w . (d x g).

@@ -28,6 +28,7 @@ class Relative(Goal):
             pin.SE3; metres. None keeps it as at the start.
         orientation: False leaves the frame free to turn about its origin.
         weight: factor on the squared error [1/m^2 and 1/rad^2].
+        residual: what the error is computed by, with frames, joints and target; once resolved.
 
     Raises:
         InputError: the placement is none of these, or not in metres.
@@ -40,7 +41,7 @@ class Relative(Goal):
     orientation: bool = True
     weight: float = 1.0
     _placement: Any = field(init=False, repr=False, default=None)
-    _residual: PlacementResidual = field(init=False, repr=False)
+    residual: PlacementResidual = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -55,17 +56,17 @@ class Relative(Goal):
         place = inputs.find_place(scene, self.frame, "Relative")
         base = inputs.find_base(scene, self.to, self.frame, "Relative")
         target = self._placement if self._placement is not None else placement_between(scene, start, place, base)
-        return filled(self, _residual=PlacementResidual.build(place, target, base, orientation=self.orientation))
+        return filled(self, residual=PlacementResidual.build(place, target, base, orientation=self.orientation))
 
     @property
     def angular(self) -> Mask:
         """(m,) the last three of six rows are in radians."""
-        return self._residual.angular
+        return self.residual.angular
 
     def error(self, state: State) -> Array:
         """(m,) difference in place [m] and orientation [rad]."""
-        return self._residual.value(state)
+        return self.residual.value(state)
 
     def jacobian(self, state: State) -> Wrench:
         """Rows between the two joints."""
-        return self._residual.wrench(state)
+        return self.residual.wrench(state)

@@ -71,6 +71,11 @@ class PlacementResidual(NamedTuple):
         return cls(place, base, target.translation.copy(), undo, position, orientation)
 
     @property
+    def placement(self) -> pin.SE3:
+        """The target: where the frame should be in the base."""
+        return pin.SE3(self.undo.rotation.T, self.target)
+
+    @property
     def angular(self) -> Mask:
         """(m,) which rows are radians."""
         return np.array([False] * 3 * self.position + [True] * 3 * self.orientation)

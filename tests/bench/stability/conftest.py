@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from wholebody.assessment import assess
 from wholebody.bench.adapters.base import Adapter
-from wholebody.problem import Problem, Solution, Status
+from wholebody.problem import Problem
+from wholebody.solution import Solution, Status
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.ccd.terms import UnsupportedTermError
+from wholebody.methods.base import UnsupportedTermError
 
 
 def _target(figure: wb.Figure, frame: str, q: Any) -> Any:

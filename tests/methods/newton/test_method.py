@@ -14,7 +14,7 @@ import wholebody as wb
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.reaching import reach
-from wholebody.tasks.base import Goal
+from wholebody.tasks.base import Bound
 
 
 @pytest.fixture(scope="module")
@@ -123,19 +123,18 @@ def test_frozen_joints_stay(human: wb.Figure) -> None:
     assert np.abs(pin.difference(human.model, problem.start, solution.q)[still]).max() < 1e-5
 
 
-class _Height(Goal):
-    """A goal of somebody's own."""
+class _Leash(Bound):
+    """A bound of somebody's own."""
 
-    def error(self, state: Any) -> np.ndarray:
-        return state.frame(1).translation[2:]
-
-    def jacobian(self, state: Any) -> np.ndarray:
-        return np.zeros((1, state.model.nv))
+    def bounds(self, state: Any, dt: float | None) -> tuple[np.ndarray, np.ndarray]:
+        return np.full(state.model.nv, -1.0), np.full(state.model.nv, 1.0)
 
 
 def test_what_it_has_no_equations_for_is_refused_by_name(human: wb.Figure) -> None:
-    with pytest.raises(wb.InputError, match=r"goals\[0\], _Height"):
-        wb.Newton().solve(_standing(wb.Scene(human), _Height()))
+    bounded = wb.Problem(wb.Scene(human), "standing", constraints=[_Leash()])
+    with pytest.raises(wb.InputError, match=r"bounds\[0\], _Leash"):
+        wb.Newton().solve(bounded)
+    assert "_Leash" in str(wb.Newton().accepts(bounded))
     with pytest.raises(wb.InputError, match="tolerance"):
         wb.Newton(tolerance=0.0)
     with pytest.raises(wb.InputError, match="restarts"):

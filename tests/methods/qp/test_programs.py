@@ -17,7 +17,7 @@ from wholebody.methods.qp.active_set import (
     solve_in_arrays,
 )
 from wholebody.methods.qp.quadratic_program import ActiveSet
-from wholebody.methods.qp.solvers.base import make_solver, solver_names
+from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 from wholebody.methods.qp.solvers.split_form import split
 
 

@@ -11,7 +11,7 @@ from tests.methods.qp.test_programs import by_quadprog
 from wholebody.methods.qp.active_set import lacking, minimise_on_face, solve_from, solve_in_arrays
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 from wholebody.methods.qp.semismooth_newton import minimise
-from wholebody.methods.qp.solvers.base import make_solver
+from wholebody.methods.qp.solvers.registry import make_solver
 
 
 def crowded(rng, n=12, m=3, k=400, diagonal=2e-3):

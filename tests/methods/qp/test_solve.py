@@ -243,7 +243,7 @@ def test_the_same_question_has_the_same_answer(planar_arm):
 
 @pytest.mark.parametrize("solver", ["osqp", "daqp", "quadprog", "proxqp"])
 def test_every_solver_poses_the_human(solver, honest):
-    from wholebody.methods.qp.solvers.base import solver_names
+    from wholebody.methods.qp.solvers.registry import solver_names
 
     if solver not in solver_names():
         pytest.skip(f"{solver} is not installed")

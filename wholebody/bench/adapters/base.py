@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol, runtime_checkable
 
 from wholebody.bench.track import Array
-from wholebody.methods.solve import Method
+from wholebody.methods.base import Method
 from wholebody.problem import Problem
 
 Budget = tuple[float, "int | None"]

@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.assessment import Assessment, assess
 from wholebody.errors import InputError
 from wholebody.geometry.proximity import COAL_ACCURACY
-from wholebody.methods.contradictions import explanation
+from wholebody.methods.base import SolvingTracker, UnsupportedTermError, named_terms, refusal
+from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress
-from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.problem import Problem
+from wholebody.solution import Iterate, Solution
 from wholebody.tasks import Displacement, Effort, Hold
 from wholebody.workspace import Workspace
 
@@ -117,7 +117,9 @@ class Loop(ABC):
             InputError: the tool cannot express the problem, or its scene changed after it was stated.
         """
         problem.check_fresh()
-        self._check(problem)
+        refused = self._unsupported(problem)
+        if refused:
+            raise UnsupportedTermError(self.name, refused)
         if self._built is None or self._built[0] is not problem:
             self._built = (problem, self.build(problem))
 
@@ -137,36 +139,25 @@ class Loop(ABC):
         with problem.lend() as workspace, Control(None, progress) as control:
             run = _Run(problem, workspace, self._built[1], self, control)
             run.go()
-        judgement = assess(problem, run.q)
-        status = _status(judgement, run, 1.05 * self.tolerance + 1e-6)
-        why = "" if status == "solved" else explanation(problem)
-        said = why or control.message(judgement) or _message(status, judgement, run, self.name)
-        return Solution(
-            q=run.q,
-            status=status,
-            seconds=time.perf_counter() - began,
-            iterations=run.steps,
-            assessment=judgement,
-            trace=tuple(run.trace),
-            method=self.name,
-            message=said + judgement.in_the_way,
-        )
+        failure = f"{self.name} gave up at step {run.steps} ({run.failure})" if run.failure else ""
+        ending = Ending(run.q, run.rested, run.steps, tuple(run.trace), f"in {run.steps} steps", "steps", failure)
+        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
-    def _check(self, problem: Problem) -> None:
+    def accepts(self, problem: Problem) -> str | None:
+        """None where the tool can express all terms; else the sentence that names those that it cannot."""
+        return refusal(self.name, self._unsupported(problem))
+
+    def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
+        """What follows the goals of a problem by solving every step anew."""
+        return SolvingTracker(self, problem, dt)
+
+    def _unsupported(self, problem: Problem) -> list[str]:
         refused = []
-        groups: tuple[tuple[str, Iterable[Any]], ...] = (
-            ("goals", problem.goals),
-            ("constraints", problem.constraints),
-            ("constraints", problem.bounds),
-            ("measures", problem.measures),
-        )
-        for group, terms in groups:
-            for number, term in enumerate(terms):
-                reason = self.takes(term)
-                if reason is not None:
-                    refused.append(f"{group}[{number}], {type(term).__name__}" + (f" ({reason})" if reason else ""))
-        if refused:
-            raise InputError(f"{self.name} cannot take {'; '.join(refused)}; leave them out or use method='qp'")
+        for where, term in named_terms(problem):
+            reason = self.takes(term)
+            if reason is not None:
+                refused.append(where + (f" ({reason})" if reason else ""))
+        return refused
 
 
 def pulls(problem: Problem) -> list[Pull]:
@@ -174,8 +165,8 @@ def pulls(problem: Problem) -> list[Pull]:
     found = []
     for measure in problem.measures:
         if isinstance(measure, (Effort, Displacement)):
-            weights = measure._distance.weights
-            found.append(Pull(measure._distance.reference, measure.weight * weights / max(float(weights.max()), 1e-12)))
+            weights = measure.distance.weights
+            found.append(Pull(measure.distance.reference, measure.weight * weights / max(float(weights.max()), 1e-12)))
     return found
 
 
@@ -189,7 +180,7 @@ def kept_apart(problem: Problem) -> list[tuple[int, int, float]]:
     still = {0}
     for term in problem.constraints:
         if isinstance(term, Hold) and term.relative_to is None and term.orientation:
-            still.add(term._residual.place.joint)
+            still.add(term.residual.place.joint)
     pairs = zip(problem.scene.geometry.collisionPairs, problem.clearances.tolist(), strict=True)
     return [
         (pair.first, pair.second, clearance)
@@ -268,27 +259,3 @@ class _Run:
         clearances = self._problem.clearances
         near = self._proximity.near(self._state.data, float(clearances.max(initial=0.0)))
         return bool((near.distance >= clearances[near.number] - tolerance - COAL_ACCURACY).all())
-
-
-def _status(judgement: Assessment, run: _Run, slack: float) -> Status:
-    if not judgement.holds(slack):
-        return "infeasible" if run.rested or run.failure else "stalled"
-    if judgement.met(slack):
-        return "solved"
-    if run.failure:
-        return "infeasible"
-    return "unreachable" if run.rested else "stalled"
-
-
-def _message(status: Status, judgement: Assessment, run: _Run, name: str) -> str:
-    left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
-    if status == "solved":
-        return f"solved in {run.steps} steps"
-    if run.failure:
-        return f"{name} gave up at step {run.steps} ({run.failure}): {left}"
-    if status == "unreachable":
-        return f"came to rest: nothing is violated, {left}"
-    if status == "stalled":
-        return f"ran out of iterations: {left}"
-    worst = max(judgement.clearance_lack, judgement.constraint_violation, judgement.limit_violation)
-    return f"came to rest where something does not hold: missed by {worst:.3g} m or rad"

@@ -81,12 +81,12 @@ class _MinkStepper(Stepper):
         self._sites: dict[str, tuple[int, Any]] = {}
         for term in (*problem.goals, *problem.constraints):
             if isinstance(term, Point):
-                self._site(term._place, term._offset)
+                self._site(term.place, term.resolved_offset)
             elif isinstance(term, Axis):
-                self._site(term._place)
+                self._site(term.place)
             elif isinstance(term, (Frame, Orientation, Relative, Hold)):
-                self._site(term._residual.place)
-                self._site(term._residual.base)
+                self._site(term.residual.place)
+                self._site(term.residual.base)
         self._compile()
 
     def begin(self) -> None:
@@ -99,7 +99,7 @@ class _MinkStepper(Stepper):
         model = self._mujoco
         self._points: list[tuple[Any, str, Array]] = []
         self._tasks = [self._goal(goal) for goal in problem.goals]
-        self._hard = [self._placement(term._residual, 1.0) for term in problem.constraints if isinstance(term, Hold)]
+        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, Hold)]
         frozen = [bound for bound in problem.bounds if isinstance(bound, Freeze)]
         if frozen:
             dofs = {self._dof[dof] for bound in frozen for dof in scene.figure.dofs(bound.joints).tolist()}
@@ -213,30 +213,30 @@ class _MinkStepper(Stepper):
 
         cost = goal.weight**0.5
         if isinstance(goal, Point):
-            site = self._site(goal._place, goal._offset)
+            site = self._site(goal.place, goal.resolved_offset)
             task = mink.FrameTask(site, "site", position_cost=cost, orientation_cost=0.0)
-            self._points.append((task, site, np.array(goal._target)))
+            self._points.append((task, site, np.array(goal.resolved_target)))
         elif isinstance(goal, Axis):
             kind = mink.AxisAlignTask if goal.toward is None else mink.LookAtTask
-            task = kind(self._site(goal._place), "site", axis=np.array(goal._basis[2]), cost=cost)
-            task.set_target(np.array(goal._wanted))
+            task = kind(self._site(goal.place), "site", axis=np.array(goal.basis[2]), cost=cost)
+            task.set_target(np.array(goal.resolved_target))
         elif isinstance(goal, CenterOfMass):
             task = mink.ComTask(cost=np.array([cost, cost, cost if goal.axes == "xyz" else 0.0]))
-            task.set_target(np.array((*goal._target, 0.0)[:3]))
+            task.set_target(np.array((*goal.resolved_target, 0.0)[:3]))
         elif isinstance(goal, Posture):
-            task = self._joints(goal._q)
+            task = self._joints(goal.resolved_target)
             costs = np.zeros(self._mujoco.nv)
-            costs[self._dof[np.asarray(goal._dofs)]] = cost
+            costs[self._dof[np.asarray(goal.dofs)]] = cost
             task.set_cost(costs)
         else:
-            task = self._placement(goal._residual, cost)
+            task = self._placement(goal.residual, cost)
         return task
 
     def _placement(self, residual: PlacementResidual, cost: float) -> Any:
         import mink
 
         costs = {"position_cost": cost * residual.position, "orientation_cost": cost * residual.orientation}
-        target = mink.SE3.from_matrix(pin.SE3(residual.undo.rotation.T, residual.target).homogeneous)
+        target = mink.SE3.from_matrix(residual.placement.homogeneous)
         site = self._site(residual.place)
         if residual.base.frame:
             task = mink.RelativeFrameTask(site, "site", self._site(residual.base), "site", **costs)

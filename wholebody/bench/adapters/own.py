@@ -11,7 +11,7 @@ import wholebody as wb
 from wholebody.bench.adapters.base import FIRST_FIT, LADDER, Adapter, Budget, Tool, few
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Array, Track
 from wholebody.figures.state import State, Wrench
-from wholebody.methods.solve import Method
+from wholebody.methods.base import Method
 from wholebody.tasks.base import Goal, Surroundings, filled
 
 _QP_BUDGETS: tuple[Budget, ...] = (

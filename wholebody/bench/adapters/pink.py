@@ -102,7 +102,7 @@ class _PinkStepper(Stepper):
             self._geometry.geometryObjects[number].placement = scene.geometry.geometryObjects[ours].placement * shift
         self._points: list[tuple[Any, Array]] = []
         self._tasks = [self._goal(goal) for goal in problem.goals]
-        self._hard = [self._placement(term._residual, 1.0) for term in problem.constraints if isinstance(term, Hold)]
+        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, Hold)]
         frozen = [figure_dof for bound in problem.bounds if isinstance(bound, Freeze)
                   for figure_dof in scene.figure.dofs(bound.joints).tolist()]  # fmt: skip
         if frozen:
@@ -145,22 +145,22 @@ class _PinkStepper(Stepper):
         cost = goal.weight**0.5
         if isinstance(goal, Point):
             task = FrameTask(_offset_name(goal), position_cost=cost, orientation_cost=0.0)
-            self._points.append((task, np.array(goal._target)))
+            self._points.append((task, np.array(goal.resolved_target)))
             return task
         if isinstance(goal, CenterOfMass):
             task = ComTask(cost=[cost, cost, cost if goal.axes == "xyz" else 0.0])
-            task.set_target(np.array((*goal._target, 0.0)[:3]))
+            task.set_target(np.array((*goal.resolved_target, 0.0)[:3]))
             return task
         if isinstance(goal, Posture):
-            dofs = np.asarray(goal._dofs)
-            return self._joints(goal._q, dofs, np.full(len(dofs), cost))
-        return self._placement(goal._residual, cost)
+            dofs = np.asarray(goal.dofs)
+            return self._joints(goal.resolved_target, dofs, np.full(len(dofs), cost))
+        return self._placement(goal.residual, cost)
 
     def _placement(self, residual: PlacementResidual, cost: float) -> Any:
         from pink.tasks import FrameTask, RelativeFrameTask
 
         costs = {"position_cost": cost * residual.position, "orientation_cost": cost * residual.orientation}
-        target = pin.SE3(residual.undo.rotation.T, residual.target)
+        target = residual.placement
         names = [self._model.frames[place.frame].name for place in (residual.place, residual.base)]
         task = RelativeFrameTask(*names, **costs) if residual.base.frame else FrameTask(names[0], **costs)
         task.set_target(target)
@@ -173,15 +173,15 @@ class _PinkStepper(Stepper):
 
 
 def _offset_name(goal: Point) -> str:
-    return f"{goal.frame} at {goal._offset.tolist()}"
+    return f"{goal.frame} at {goal.resolved_offset.tolist()}"
 
 
 def _offset_frame(model: Any, goal: Point) -> None:
-    frame = model.frames[goal._place.frame]
-    there = frame.placement * pin.SE3(np.eye(3), goal._offset)
+    frame = model.frames[goal.place.frame]
+    there = frame.placement * pin.SE3(np.eye(3), goal.resolved_offset)
     if not model.existFrame(_offset_name(goal)):
         model.addFrame(
-            pin.Frame(_offset_name(goal), frame.parentJoint, goal._place.frame, there, pin.FrameType.OP_FRAME)
+            pin.Frame(_offset_name(goal), frame.parentJoint, goal.place.frame, there, pin.FrameType.OP_FRAME)
         )
 
 

@@ -15,7 +15,7 @@ import pinocchio as pin
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, WITHIN, Array, Track
 from wholebody.figures.shipped import urdf_path
-from wholebody.methods.solve import Method
+from wholebody.methods.base import Method
 
 
 def placo_adapter() -> Adapter:

@@ -76,7 +76,7 @@ def _outside(name: str) -> Adapter:
 
 
 def _rows() -> dict[str, _Row]:
-    from wholebody.methods.qp.solvers.base import solver_names
+    from wholebody.methods.qp.solvers.registry import solver_names
 
     rows = {f"qp/{solver}": _Row(partial(qp_adapter, solver)) for solver in ("osqp", "daqp")}
     for solver, module in SOLVERS.items():

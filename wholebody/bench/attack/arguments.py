@@ -89,7 +89,7 @@ CALLS: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     ("scene.contacts", (("q", "figure.neutral"), ("within", "0.1"))),
     ("scene.penetration", (("q", "figure.neutral"),)),
     ("scene.sweep", (("q0", "figure.neutral"), ("q1", "figure.neutral"))),
-    ("scene.simplified", (("problem", "problem"), ("lock", "True"))),
+    ("wb.simplify", (("problem", "problem"), ("lock", "True"))),
     ("scene.frame_id", (("name", "'link2'"),)),
     ("figure.posture", (("name", "'neutral'"),)),
     ("figure.frame_id", (("name", "'link2'"),)),

@@ -1,14 +1,12 @@
-"""What a case of the attack is: a script with its files, written from a seed and a number and from nothing else."""
+"""What a case of the attack is: a script with its files, which follow from a seed and a number alone."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-
-from wholebody.errors import UnknownNameError
 
 Outcome = Literal["right", "refused", "gave up", "wrong"]
 
@@ -83,23 +81,3 @@ class Case:
 def kind_of(number: int) -> str:
     """Return the kind of a case of an attack on everything."""
     return PATTERN[number % len(PATTERN)]
-
-
-def write(case: Case) -> Written:
-    """Write a case.
-
-    Raises:
-        UnknownNameError: there is no such kind.
-    """
-    from wholebody.bench.attack import arguments, files, solves, streams, sweeps
-
-    writers: dict[str, Callable[[np.random.Generator], Written]] = {
-        "argument": arguments.written,
-        "file": files.written,
-        "solve": solves.written,
-        "stream": streams.written,
-        "sweep": sweeps.written,
-    }
-    if case.kind not in writers:
-        raise UnknownNameError("kind of case", case.kind, KINDS)
-    return writers[case.kind](case.rng())

@@ -11,7 +11,8 @@ from wholebody.bench.attack.case import Verdict
 from wholebody.bench.attack.judging import Judged, Pairs, judge
 from wholebody.methods import METHODS
 from wholebody.methods.solve import method_named
-from wholebody.problem import Problem, Solution, Status
+from wholebody.problem import Problem
+from wholebody.solution import Solution, Status
 
 ROUNDING = 2e-6  # m, rad: by which two ways of measuring may differ for pieces of up to a metre
 OF_SIZE = 1e-5  # of the size of the largest piece: coal's distances of ellipsoids are relative to it

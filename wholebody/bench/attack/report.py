@@ -27,7 +27,8 @@ ATTACKED = {
 INDEX = "README.md"
 UNWRITTEN = '''"""A case that cannot be written."""
 
-from wholebody.bench.attack.case import Case, write
+from wholebody.bench.attack.case import Case
+from wholebody.bench.attack.writing import write
 
 write(Case({seed}, {number}, {kind!r}))
 '''

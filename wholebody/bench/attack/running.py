@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from wholebody.bench.attack.case import SCRIPT, Case, Verdict, Written, write
+from wholebody.bench.attack.case import SCRIPT, Case, Verdict, Written
+from wholebody.bench.attack.writing import write
 from wholebody.errors import WholebodyError
 from wholebody.files import Scratch
 from wholebody.runner import ONE_THREAD, Child, EndedError, Job, allow, run_jobs, tell

@@ -12,11 +12,7 @@ from numpy.typing import NDArray
 from wholebody.assessment import Assessment, assess
 from wholebody.bench.compare.record import ANSWERED, Record
 from wholebody.bench.problem_sets.case import Case
-from wholebody.methods.drag import qp_frame
-from wholebody.methods.newton.method import Newton
-from wholebody.methods.newton.tracking import NewtonTracker
-from wholebody.methods.qp.method import QP
-from wholebody.methods.qp.tracking import Tracker
+from wholebody.methods.base import SolvedStep, Tracker
 from wholebody.motion_assessment import third_differences
 from wholebody.problem import Problem
 
@@ -37,16 +33,18 @@ class _Frame(NamedTuple):
 def follow(method: Any, problem: Problem, case: Case, empty: Record) -> Record:
     """Follow the goals of a case; `problem` is a copy of its problem, that may be changed.
 
-    QP and newton make a few steps a frame, as `wb.Drag` does; every other method solves each frame from the posture of
-    the frame before.
+    Each frame is one of the method's tracker, to the method's tolerance: qp and newton make a few steps, as `wb.Drag`
+    does; every other method solves each frame from the posture of the frame before.
     """
     q = problem.scene.figure.clamp(problem.start)
     frames: list[_Frame] = []
-    tracker = method.tracker(problem, case.dt) if isinstance(method, (QP, Newton)) else None
+    tracker: Tracker = method.tracker(problem, case.dt)
     for goals in case.frames:
         problem.retarget(goals)
         worked, began = time.process_time(), time.perf_counter()
-        q, iterations, judging = _advance(method, tracker, problem, q)
+        step = tracker.frame(q, method.tolerance)
+        q, iterations = step.q, step.iterations
+        judging = step.judging if isinstance(step, SolvedStep) else 0.0
         seconds = time.perf_counter() - began - judging
         worked = time.process_time() - worked
         if not np.isfinite(q).all():
@@ -57,20 +55,6 @@ def follow(method: Any, problem: Problem, case: Case, empty: Record) -> Record:
             worked -= time.process_time() - again  # the same judgement as the one within the call
         frames.append(_Frame(q, max(seconds, 0.0), max(worked, 0.0), iterations, judgement))
     return _summary(frames, case, empty)
-
-
-def _advance(
-    method: Any, tracker: Tracker | NewtonTracker | None, problem: Problem, q: Array
-) -> tuple[Array, int, float]:
-    """Posture, iterations, and the seconds of a judgement that was made on the way."""
-    if isinstance(tracker, NewtonTracker):
-        made = tracker.step(q)
-        return made.q, made.iterations, 0.0
-    if tracker is not None:
-        return (*qp_frame(tracker, q, method.tolerance), 0.0)
-    problem.start = q
-    solution = method.solve(problem)
-    return np.asarray(solution.q, dtype=float), solution.iterations, solution.assessment.seconds
 
 
 def _summary(frames: list[_Frame], case: Case, empty: Record) -> Record:

@@ -9,7 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.figures.description import Description
+from wholebody.figures.description import Articulated, Description
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Shape
 
@@ -93,7 +93,7 @@ class Builder:
         return Figure(self.name, self.model, self.geometry, "own", description)
 
 
-def _neutral(figure: Figure) -> Any:
+def _neutral(figure: Articulated) -> Any:
     return figure.clamp(pin.neutral(figure.model))
 
 

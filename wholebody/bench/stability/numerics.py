@@ -15,7 +15,8 @@ from wholebody.methods.drag import Drag
 from wholebody.methods.qp.active_set import guess_active_set
 from wholebody.methods.qp.method import QP
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import GUESS_TOLERANCE, QPSolver
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.fallback import GUESS_TOLERANCE
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver, _Workspace
 from wholebody.problem import Problem
 from wholebody.scene import Scene

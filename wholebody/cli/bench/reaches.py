@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.machine import machine
     from wholebody.bench.reaches import reaches_report, run
     from wholebody.bench.tables import write_rows
-    from wholebody.methods.qp.solvers.base import make_solver
+    from wholebody.methods.qp.solvers.registry import make_solver
 
     count = 10 if arguments.quick else arguments.count
     check_count(count, "--count")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -10,22 +11,25 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.assessment import Assessment, assess
 from wholebody.checks import posture
+from wholebody.methods.base import SolvingTracker, UnsupportedTermError
 from wholebody.methods.ccd.overlap import SHAKES
 from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.remover import TOUCH, Remover
 from wholebody.methods.ccd.terms import read
-from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, in_words, least_left, proven
+from wholebody.methods.conclusion import Ending, concluded
+from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, check_problem, check_settings
-from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.problem import Problem
+from wholebody.solution import Iterate, Solution
 from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
 
 DISTURBANCES = (0.0, 0.05, 0.2, 0.6)  # rad: of the first starts, from the posture at hand; later ones begin anywhere
 ROUNDS = 6  # reaching and leaving overlap by turns, from one start
+ON_THE_WAY = 1e-3  # m, rad: to which the frames of a motion meet their goals before the end
 HALVINGS = 12  # of the way back to the start, which ends within a 4000th of it
 SHARE = 0.5  # of the tolerance: to what goals are met and overlap is removed, so that the judge agrees
 
@@ -88,6 +92,14 @@ class CCD:
         """Name for tables."""
         return "ccd"
 
+    def accepts(self, problem: Problem) -> str | None:
+        """None where this method can take all terms; else the sentence that names those that it cannot."""
+        try:
+            read(check_problem(problem, "CCD.accepts: problem"))
+        except UnsupportedTermError as error:
+            return str(error)
+        return None
+
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture.
 
@@ -106,24 +118,25 @@ class CCD:
         with problem.lend() as workspace, Control(self.time_limit, progress) as control:
             search = _Search(self, problem, workspace, control)
             best = search.run()
-        judgement = assess(problem, best.q)
-        status = self._status(best, judgement)
-        status = proven(status, search.contradictions)
-        said = (
-            in_words(search.contradictions)
-            or control.message(judgement)
-            or _message(status, judgement, len(search.trace))
+        turns = len(search.trace)
+        ending = Ending(
+            best.q,
+            best.rested,
+            search.sweeps,
+            tuple(search.trace),
+            "from the start" if turns == 1 else f"at turn {turns}",
+            unit="sweeps",
+            contradictions=search.contradictions,
         )
-        return Solution(
-            q=best.q,
-            status=status,
-            seconds=time.perf_counter() - began,
-            iterations=search.sweeps,
-            assessment=judgement,
-            trace=tuple(search.trace),
-            method=self.name,
-            message=said + judgement.in_the_way,
-        )
+        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+
+    def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
+        """What follows the goals of a problem by solving every step anew; frames on the way to a millimetre.
+
+        Raises:
+            InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
+        """
+        return _CCDTracker(self, problem, dt, replace(self, tolerance=ON_THE_WAY))
 
     def pushed_out(self, problem: Problem, q: Array) -> Array:
         """Where pushing the posture q (nq,) out of what it overlaps ends, whatever the goals are.
@@ -139,13 +152,17 @@ class CCD:
         with problem.lend() as workspace:
             return _Search(self, problem, workspace, Control(np.inf)).pushed_out(q)
 
-    def _status(self, best: _Trial, judgement: Assessment) -> Status:
-        slack = 1.05 * self.tolerance + 1e-6
-        if not judgement.holds(slack):
-            return "infeasible" if best.rested else "stalled"
-        if judgement.met(slack):
-            return "solved"
-        return "unreachable" if best.rested else "stalled"
+
+class _CCDTracker(SolvingTracker):
+    """Follows by solves; pushes the figure out of what came into it."""
+
+    def __init__(self, method: CCD, problem: Problem, dt: float, rough: CCD) -> None:
+        super().__init__(method, problem, dt, rough)
+        self._ccd = method
+
+    def ways_out(self, q: Array) -> Sequence[Array]:
+        """Where pushing the posture q (nq,) out ends."""
+        return (self._ccd.pushed_out(self.problem, q),)
 
 
 class _Search:
@@ -252,15 +269,3 @@ class _Search:
             else:
                 inside = middle
         return np.asarray(pin.interpolate(model, free, q, inside))
-
-
-def _message(status: Status, judgement: Assessment, turns: int) -> str:
-    left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
-    if status == "solved":
-        return "solved from the start" if turns == 1 else f"solved at turn {turns}"
-    if status == "unreachable":
-        return f"no start led there: nothing is violated, {left}"
-    if status == "stalled":
-        return f"ran out of sweeps: {left}"
-    worst = max(judgement.clearance_lack, judgement.constraint_violation, judgement.limit_violation)
-    return f"what must hold could not all be met: missed by {worst:.3g} m or rad"

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.errors import InputError
 from wholebody.figures.description import followers_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State, joint_support
 from wholebody.geometry.placement import placement
+from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.ccd.limbs import movable
 from wholebody.problem import Problem
 from wholebody.tasks.bounds import Freeze, StepLimit
@@ -22,24 +22,6 @@ from wholebody.tasks.point import Point
 from wholebody.tasks.reach_cones import ReachCones
 
 HELD = 1e-6  # m, rad: a hold that is this near to its place at the start is kept by what does not move
-
-
-class UnsupportedTermError(InputError):
-    """A method cannot take some terms of a problem.
-
-    Attributes:
-        terms: one text for each term: what it is and why it cannot be taken.
-    """
-
-    def __init__(self, method: str, terms: list[str]) -> None:
-        """Build the sentence.
-
-        Args:
-            method: its name.
-            terms: texts such as "constraints[1], Balance".
-        """
-        self.terms = tuple(terms)
-        super().__init__(f"method {method!r} cannot take {'; '.join(terms)}; leave them out or use method='qp'")
 
 
 @dataclass(frozen=True)

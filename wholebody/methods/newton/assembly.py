@@ -230,6 +230,18 @@ class Assembly:
         """(7 n,) where the bodies are."""
         return np.concatenate(self._places)
 
+    def place(self, variables: ArrayLike) -> Assembly:
+        """Put the bodies elsewhere.
+
+        Args:
+            variables: (7 n,) as `variables` returns them: of each body its origin [m] and its quaternion (x, y, z, w).
+
+        Raises:
+            InputError: another number of values, or one that is not finite.
+        """
+        self._places = list(numbers(variables, (7 * len(self._places),), "place: variables").reshape(-1, 7))
+        return self
+
     def solve(
         self,
         *,

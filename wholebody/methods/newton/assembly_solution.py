@@ -13,7 +13,7 @@ from wholebody.methods.newton.course import Course, unit
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.reaching import reach
 from wholebody.methods.newton.settling import settle
-from wholebody.problem import Status
+from wholebody.solution import Status
 
 Array = NDArray[np.float64]
 

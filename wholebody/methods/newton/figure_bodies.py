@@ -8,9 +8,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.state import State
 from wholebody.geometry.memory_views import placement_view
+from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.newton.angles import Angle
 from wholebody.methods.newton.equations import EquationSet
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
@@ -36,7 +37,7 @@ class FigureBodies:
         """Read the joints.
 
         Raises:
-            InputError: a joint of a type that has no equations here.
+            UnsupportedTermError: a joint of a type that has no equations here.
         """
         self.figure, self.model = figure, figure.model
         self.count = self.model.njoints - 1
@@ -64,7 +65,46 @@ class FigureBodies:
         forms = relative_forms(first, second)[:, 2:]
         self.angles = Angle(pairs, labels, forms, center, np.zeros(len(pairs)), np.ones(len(pairs)))
         self.weight = self._weight()
+        self._tangent: Indices = np.array([self.model.joints[row[0]].idx_v for row in self._turning], dtype=np.intp)
         self._step: tuple[Array, Array, Array] | None = None
+        self._state: State | None = None
+        self._state_of: Array | None = None
+
+    @property
+    def floating(self) -> bool:
+        """Whether the first joint is a free root."""
+        return self.figure.root == "free"
+
+    @property
+    def uncharted(self) -> tuple[str, ...]:
+        """Names of the joints whose degrees of freedom `tangent_rows` does not have."""
+        return tuple(self.names[joint - 1] for joint in self._others if not (joint == 1 and self.floating))
+
+    @property
+    def start_state(self) -> State:
+        """The state that `state_at` moves, wherever it is."""
+        if self._state is None:
+            self._state = State(self.model)
+        return self._state
+
+    def state_at(self, x: Array) -> State:
+        """The figure where the bodies x (count + 1, 7) have it."""
+        if self._state_of is not x:
+            self.start_state.update(self.posture(x[:-1].ravel()))
+            self._state_of = x
+        return self.start_state
+
+    def tangent_rows(self, x: Array) -> Array:
+        """Derivative (nv, 7 count) of the tangent displacement of postures by the bodies x (count + 1, 7)."""
+        result = np.zeros((self.model.nv, 7 * (self.count + 1)))
+        columns = 7 * self.angles.bodies[:, :, None] + np.arange(7)
+        result[self._tangent[:, None], columns.reshape(len(columns), 14)] = self.angles.jacobian(x)[:, 0]
+        if self.floating:
+            a, b, c, w = x[0, 3:].tolist()
+            result[:3, :3] = pin.Quaternion(x[0, 3:]).toRotationMatrix().T
+            # the turn is 2 vec(conj(e) de), in the root's own axes
+            result[3:6, 3:7] = 2.0 * np.array(((w, c, -b, -a), (-c, w, a, -b), (b, -a, w, -c)))
+        return result[:, : 7 * self.count]
 
     def bound_step(self, q: Array, lower: Array, upper: Array) -> None:
         """Keep postures within tangent displacements (nv,) of the posture q (nq,) from now on: a frame's speeds."""
@@ -86,9 +126,8 @@ class FigureBodies:
     def distance(self, q: Array) -> tuple[Angle, Indices]:
         """One row for each turning joint, its angle from that at q (nq,); and the joints' tangent places."""
         part = self.angles
-        tangent = np.array([self.model.joints[row[0]].idx_v for row in self._turning], dtype=np.intp)
         bound, sign = q[self._places].copy(), np.ones(len(part))
-        return Angle(part.bodies, part.labels, part.forms, part.center, bound, sign), tangent
+        return Angle(part.bodies, part.labels, part.forms, part.center, bound, sign), self._tangent
 
     def angles_at(self, q: Array) -> Array:
         """(k,) angles of the turning joints at the posture q (nq,)."""
@@ -204,9 +243,7 @@ class FigureBodies:
                     equations.slide(a, b, f"the limit of {label[4:]}", sign * along, np.zeros(3), height, above=True)
             self._others.append(joint)
         else:
-            raise InputError(
-                f"newton has no equations for {label}, a {name}; use method='qp', or lock it with figure.reduced(...)"
-            )
+            raise UnsupportedTermError("newton", [f"{label}, a {name} (figure.reduced can lock it)"])
 
     def _weight(self) -> Array:
         """Turning a body costs what moving the farthest thing on it does."""

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from wholebody.checks import choice, known
-from wholebody.methods.contradictions import in_words, proven
+from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.linear_algebra.choice import NAMES
-from wholebody.methods.newton.search import Found, Search, Settings
-from wholebody.problem import Iterate, Problem, Solution, Status
-
-if TYPE_CHECKING:
-    from wholebody.methods.newton.tracking import NewtonTracker
+from wholebody.methods.newton.search import Search, Settings
+from wholebody.methods.newton.terms import state_equations
+from wholebody.methods.newton.tracking import NewtonTracker
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -27,9 +24,10 @@ class Newton:
     """Newton's method in full coordinates (Choi and Cremer 1999), for trees and closed loops alike.
 
     Every body has seven variables, every joint is an equation, and each step is the least motion that meets all of
-    them. `Effort` is minimised on the way, up to what the stopping of the iteration leaves; other measures are reported
-    only, and the solution's message says so. Where the goals cannot be met, their least squares are sought with
-    everything else held.
+    them. Measures of the turning joints, your own among them, are minimised on the way, up to what the stopping of the
+    iteration leaves; one that depends on the root's place or on other joints is reported only, and the solution's
+    message says so. Goals and constraints of your own are taken where all joints turn but a free root. Where the goals
+    cannot be met, their least squares are sought with everything else held.
 
     These are settings alone: one object serves any number of problems and threads at the same time.
 
@@ -69,6 +67,16 @@ class Newton:
         """Name for tables."""
         return f"newton/{self.algebra}"
 
+    def accepts(self, problem: Problem) -> str | None:
+        """None where all terms and joints have equations here; else the sentence that names what has none."""
+        check_problem(problem, "Newton.accepts: problem")
+        with problem.lend() as workspace:
+            try:
+                state_equations(problem, workspace.state)
+            except UnsupportedTermError as error:
+                return str(error)
+        return None
+
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
 
@@ -86,7 +94,7 @@ class Newton:
             course.control = control
             search = Search(course, self.settings)
             found = search.everywhere(problem.scene.figure.clamp(problem.start))
-            return answer(search, found, began)
+            return search.solution(found, began)
 
     def tracker(self, problem: Problem, dt: float | None = None) -> NewtonTracker:
         """What follows the goals of a problem that move from call to call; its equations are laid out once.
@@ -99,70 +107,9 @@ class Newton:
             InputError: the problem has a term that this method has no equations for, dt is not a positive finite
                 number, or the scene changed after the problem was stated.
         """
-        from wholebody.methods.newton.tracking import NewtonTracker
-
-        return NewtonTracker(problem, self.algebra, self.settings, dt)
+        return NewtonTracker(problem, self.algebra, self.settings, dt, self)
 
     @property
     def settings(self) -> Settings:
         """What a search is bounded by."""
         return Settings(self.tolerance, self.iterations, self.restarts, self.seed, self.inequalities)
-
-
-def answer(search: Search, found: Found, began: float) -> Solution:
-    """The solution that a search found, with status and message; it began at `began` by `time.perf_counter`."""
-    stopped = search.course.control.message(found.judgement)
-    status = _status(found, search.settings)
-    if stopped and status != "solved":
-        status = "stalled"
-    status = proven(status, search.contradictions)
-    said = in_words(search.contradictions) or stopped or _message(status, found, search)
-    return Solution(
-        q=found.q,
-        status=status,
-        seconds=time.perf_counter() - began,
-        iterations=search.iterations,
-        assessment=found.judgement,
-        trace=tuple(Iterate(error, 0.0, 0.0, 0.0) for error in search.residuals),
-        method=f"newton/{search.course.algebra.name}",
-        message=said + found.judgement.in_the_way + _reported(search.course),
-    )
-
-
-def _status(found: Found, settings: Settings) -> Status:
-    if not found.judgement.holds(settings.counted):
-        return "infeasible" if found.reached.stationary else "stalled"
-    if found.judgement.met(settings.counted):
-        return "solved"
-    return "unreachable" if found.reached.stationary else "stalled"
-
-
-def _message(status: Status, found: Found, search: Search) -> str:
-    judgement = found.judgement
-    left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
-    if status == "solved":
-        return f"solved in {search.iterations} iterations{found.how}"
-    if status == "unreachable":
-        return f"not reachable from here: nothing is violated, {left}"
-    if judgement.holds(search.settings.counted):
-        return f"ran out of iterations: {left}"
-    name, missed = _worst(search.course, found)
-    why = "what must hold cannot all hold" if status == "infeasible" else "ran out of iterations"
-    return f"{why}: {name} is missed by {missed:.3g} m or rad"
-
-
-def _worst(course: FigureCourse, found: Found) -> tuple[str, float]:
-    """What is farthest from holding, and by how much."""
-    problem, state = course.problem, course.workspace.state.update(found.q)
-    worst = ("the clearance of a pair", max(found.judgement.clearance_lack, found.judgement.penetration))
-    for number, term in enumerate(problem.constraints):
-        value = np.atleast_1d(term.value(state))
-        missed = float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0))
-        if missed > worst[1]:
-            worst = (f"constraints[{number}], {type(term).__name__}", missed)
-    return worst
-
-
-def _reported(course: FigureCourse) -> str:
-    names = ", ".join(course.objective.reported)
-    return f"; {names} is reported, not minimised" if names else ""

@@ -1,7 +1,9 @@
 """The measures as rows of joint angles whose squares are to be small.
 
 A measure f with gradient g and diagonal second derivative h at angles theta is, to second order, a sum of squares of
-angles from theta - g / h, with the factors h / 2. For `Effort` and `Displacement` that is exact.
+angles from theta - g / h, with the factors h / 2. For `Effort` and `Displacement` that is exact. Any measure of the
+turning joints is taken like this; one that depends on the root's place or on other joints is reported, and the
+solution's message says so.
 """
 
 from __future__ import annotations
@@ -9,15 +11,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.system import System
 from wholebody.problem import Problem
 from wholebody.tasks import Discomfort, Displacement, Effort
+from wholebody.tasks.base import Measure
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
-CAN = (Effort, Displacement, Discomfort)
+CAN = (Effort, Displacement, Discomfort)  # sums over joints: what the others of them cost does not hinder
+SAMPLES = 3  # postures at which a measure is asked what it depends on
 STIFFNESS = 10.0  # m^2 a unit of effort [rad^2]: what bodies' motion counts against it; larger = nearer to least effort
 LEAST_STIFFNESS = 0.03  # rad^-2: half of the least second derivative that a joint counts as having
 
@@ -40,9 +46,14 @@ class Objective:
             state: of the run; it is moved.
         """
         self._state, self._bodies = state, bodies
-        self.minimised = [term for term in problem.measures if isinstance(term, CAN)]
-        self.reported = [type(term).__name__ for term in problem.measures if not isinstance(term, CAN)]
         self.rows, self._tangent = bodies.distance(problem.start)
+        self.minimised: list[Measure] = []
+        self.reported: list[str] = []
+        for term in problem.measures:
+            if isinstance(term, CAN) or _depends_on(term, self._tangent, problem.start, state):
+                self.minimised.append(term)
+            else:
+                self.reported.append(type(term).__name__)
         self._follows = True
         self.stiffness = np.full(len(self.rows), STIFFNESS * LEAST_STIFFNESS)
 
@@ -79,3 +90,11 @@ class Objective:
         half = np.maximum(0.5 * curvature[self._tangent], LEAST_STIFFNESS)
         self.rows.bound = self._bodies.angles_at(q) - 0.5 * gradient[self._tangent] / half
         self.stiffness = STIFFNESS * half
+
+
+def _depends_on(measure: Measure, tangent: Indices, start: Array, state: State) -> bool:
+    """Whether a measure depends on these degrees of freedom alone, at the start and some other postures."""
+    others = np.ones(state.model.nv, dtype=bool)
+    others[tangent] = False
+    postures = [start, *random_postures(state.model, SAMPLES, seed=1)] if others.any() else []
+    return not any(np.abs(measure.gradient(state.update(q))[others]).max() > 0.0 for q in postures)

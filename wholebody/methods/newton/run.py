@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.inequalities import FREE, Inequalities, Kind, inequalities
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
-from wholebody.problem import Iterate
+from wholebody.solution import Iterate
 
 Array = NDArray[np.float64]
 Measures = Literal["lower", "keep", "ignore"]

@@ -12,18 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
+from wholebody.methods.conclusion import Ending, concluded, counted
 from wholebody.methods.contradictions import Contradiction, contradictions, least_left
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.polishing import polish
 from wholebody.methods.newton.reaching import Reached, reach
 from wholebody.methods.starts import Minima, bent, restarts
+from wholebody.solution import Iterate, Solution
 
 Array = NDArray[np.float64]
 
 SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessment adds the rows of a goal up
-SLACK = 1.05  # times the tolerance: an assessment measures with other arithmetic, and coal's own accuracy is 1e-6 m
-COAL_ACCURACY = 1e-6  # m
 TRIAL = 30  # iterations that another start is given to come nearer than the best so far
 FOR_STARTS = 0.5  # share of the time limit that other starts may take: to come nearest takes its time too
 ALIKE = 1e-5  # share of a goal's error by which two ends may differ and count as equally near
@@ -41,7 +41,7 @@ class Settings(NamedTuple):
     @property
     def counted(self) -> float:
         """Error below which an assessment counts as good."""
-        return SLACK * self.tolerance + COAL_ACCURACY
+        return counted(self.tolerance)
 
 
 class Found(NamedTuple):
@@ -101,6 +101,28 @@ class Search:
         if self._serves(best) and self.course.objective.minimised:
             best = self._polished(best)
         return best
+
+    def solution(self, found: Found, began: float) -> Solution:
+        """What was found as a solution; the search began at `began` by `time.perf_counter`."""
+        reported = ", ".join(self.course.objective.reported)
+        ending = Ending(
+            found.q,
+            found.reached.stationary,
+            self.iterations,
+            tuple(Iterate(error, 0.0, 0.0, 0.0) for error in self.residuals),
+            f"in {self.iterations} iterations{found.how}",
+            remark=f"; {reported} is reported, not minimised" if reported else "",
+            contradictions=self.contradictions,
+            judgement=found.judgement,
+        )
+        return concluded(
+            self.course.problem,
+            ending,
+            method=f"newton/{self.course.algebra.name}",
+            tolerance=self.settings.tolerance,
+            control=self.course.control,
+            began=began,
+        )
 
     def _starts(self, q: Array) -> Iterator[tuple[Array, str]]:
         problem = self.course.problem

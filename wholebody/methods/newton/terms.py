@@ -1,22 +1,23 @@
-"""Goals and constraints of a problem as equations of bodies; what has none is refused by name."""
+"""Goals and constraints of a problem as equations of bodies; terms of other classes by their rows in the tangent."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.errors import InputError
 from wholebody.figures.state import State
+from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.newton.batches import Array, Batch
 from wholebody.methods.newton.directions import Cone, Toward
 from wholebody.methods.newton.equations import EquationSet
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.mass_center import MassCenter
 from wholebody.methods.newton.quaternions import axes_with_z
+from wholebody.methods.newton.tangent_rows import constraint_rows, goal_rows
 from wholebody.problem import Problem
 from wholebody.tasks import (
     Axis,
@@ -36,34 +37,49 @@ from wholebody.tasks import (
 from wholebody.tasks.base import Goal
 from wholebody.tasks.residuals import PlacementResidual
 
-CAN = "Point, Frame, Orientation, Relative, Axis, CenterOfMass, Posture; Hold, Plane, Balance, ReachCones; Freeze"
+
+def state_equations(problem: Problem, state: State) -> None:
+    """State all equations of a problem once, for what it may be refused for.
+
+    Args:
+        problem: what is asked.
+        state: it is moved to the problem's start.
+
+    Raises:
+        UnsupportedTermError: a term or a joint has no equations here.
+    """
+    bodies = FigureBodies(problem.scene.figure)
+    goal_equations(problem, bodies, problem.goals)
+    constraint_equations(problem, bodies)
+    bound_equations(problem, state)
 
 
 def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]) -> EquationSet:
     """Equations of goals.
 
     Raises:
-        InputError: a goal that has none here.
+        UnsupportedTermError: a goal that has none here.
     """
     result = EquationSet()
     for number, goal in enumerate(goals):
         label = f"goals[{number}], {type(goal).__name__}"
         if isinstance(goal, Point):
-            place = goal._place
-            point = _local(problem, place.frame).act(goal._offset)
-            result.coincide(place.joint - 1, -1, label, point, goal._target, goal=True, weight=goal.weight)
+            place = goal.place
+            point = _local(problem, place.frame).act(goal.resolved_offset)
+            result.coincide(place.joint - 1, -1, label, point, goal.resolved_target, goal=True, weight=goal.weight)
         elif isinstance(goal, (Frame, Orientation, Relative)):
-            _placement(result, problem, goal._residual, label, goal=True, weight=goal.weight)
+            _placement(result, problem, goal.residual, label, goal=True, weight=goal.weight)
         elif isinstance(goal, Axis):
             _axis(result, problem, goal, label)
         elif isinstance(goal, CenterOfMass):
             directions = np.eye(3)[: len(goal.axes)]
-            make = partial(_mass_center, bodies, label, directions, goal._target)
+            make = partial(_mass_center, bodies, label, directions, goal.resolved_target)
             result.add(make, "mass center", goal=True, weight=goal.weight)
         elif isinstance(goal, Posture):
-            bodies.ask(result, label, goal._q, set(goal._dofs.tolist()), goal.weight)
+            bodies.ask(result, label, goal.resolved_target, set(goal.dofs.tolist()), goal.weight)
         else:
-            raise _refused(label)
+            _check_own(bodies, label)
+            result.add(_as_made(goal_rows(bodies, goal, label)), "own", goal=True, weight=goal.weight)
     return result
 
 
@@ -71,25 +87,28 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
     """Equations of constraints.
 
     Raises:
-        InputError: one that has none here.
+        UnsupportedTermError: one that has none here.
     """
     result = EquationSet()
     for number, term in enumerate(problem.constraints):
         label = f"constraints[{number}], {type(term).__name__}"
         if isinstance(term, Hold):
-            _placement(result, problem, term._residual, label)
+            _placement(result, problem, term.residual, label)
         elif isinstance(term, Plane):
-            place = np.array(_local(problem, term._place.frame).translation)
+            place = np.array(_local(problem, term.place.frame).translation)
             above = term.side == "above"
-            result.slide(-1, term._place.joint - 1, label, term._normal, place, term._height, above=above)
+            result.slide(-1, term.place.joint - 1, label, term.resolved_normal, place, term.height, above=above)
         elif isinstance(term, Balance):
-            normals = np.column_stack([term._normals, np.zeros(len(term._normals))])
-            make = partial(_mass_center, bodies, label, normals, term._offsets + term.margin)
+            normals = np.column_stack([term.normals, np.zeros(len(term.normals))])
+            make = partial(_mass_center, bodies, label, normals, term.offsets + term.margin)
             result.add(make, "mass center", one_sided=True)
         elif isinstance(term, ReachCones):
             result.add(partial(_cones, problem, term, label), "cone", one_sided=True)
         else:
-            raise _refused(label)
+            _check_own(bodies, label)
+            for rows, one_sided in zip(constraint_rows(bodies, term, label), (False, True), strict=True):
+                if rows is not None:
+                    result.add(_as_made(rows), "own", one_sided=one_sided)
     return result
 
 
@@ -101,26 +120,28 @@ def bound_equations(problem: Problem, state: State) -> EquationSet:
         state: of the run; it is moved to the problem's start.
 
     Raises:
-        InputError: one that has none here.
+        UnsupportedTermError: one that has none here.
     """
     result = EquationSet()
-    for bound in problem.bounds:
+    for number, bound in enumerate(problem.bounds):
         if isinstance(bound, Freeze):
             _frozen(result, problem, bound, state)
         elif not isinstance(bound, StepLimit):  # a solve is not tied to time, so a step limit bounds nothing
-            raise _refused(type(bound).__name__)
+            raise UnsupportedTermError(
+                "newton", [f"bounds[{number}], {type(bound).__name__} (it takes Freeze and StepLimit)"]
+            )
     return result
 
 
 def _axis(equations: EquationSet, problem: Problem, goal: Axis, label: str) -> None:
     """An axis along a direction, or towards a place."""
-    local, joint = _local(problem, goal._place.frame), goal._place.joint
+    local, joint = _local(problem, goal.place.frame), goal.place.joint
     if goal.toward is None:
-        ours = pin.Quaternion(axes_with_z((local.rotation @ goal._basis[2])[None])[0])
-        wanted = pin.Quaternion(axes_with_z(goal._wanted[None])[0])
+        ours = pin.Quaternion(axes_with_z((local.rotation @ goal.basis[2])[None])[0])
+        wanted = pin.Quaternion(axes_with_z(goal.resolved_target[None])[0])
         equations.turn(joint - 1, -1, label, ours, wanted, 2, goal=True, weight=goal.weight)
         return
-    axes, point, place = goal._basis @ local.rotation.T, np.array(local.translation), goal._wanted
+    axes, point, place = goal.basis @ local.rotation.T, np.array(local.translation), goal.resolved_target
 
     def make(world: int) -> Batch:
         body = np.array([[joint - 1 if joint else world]])
@@ -138,7 +159,7 @@ def _mass_center(bodies: FigureBodies, label: str, directions: Array, height: Ar
 
 
 def _cones(problem: Problem, term: ReachCones, label: str, world: int) -> Batch:
-    limbs = term._limbs
+    limbs = term.limbs
     pairs = np.array([(limb.reference.joint - 1, limb.limb.joint - 1) for limb in limbs], dtype=np.intp)
     pairs[pairs < 0] = world
     turns = np.array([_local(problem, limb.reference.frame).rotation for limb in limbs])
@@ -188,5 +209,16 @@ def _local(problem: Problem, frame: int) -> Any:
     return problem.scene.model.frames[frame].placement
 
 
-def _refused(label: str) -> InputError:
-    return InputError(f"newton has no equations for {label}; it takes {CAN}; use method='qp' for the others")
+def _as_made(batch: Batch) -> Callable[[int], Batch]:
+    return lambda world: batch
+
+
+def _check_own(bodies: FigureBodies, label: str) -> None:
+    """Refuse a term of another class where a figure's tangent is not a function of its bodies here.
+
+    Raises:
+        UnsupportedTermError: it has joints other than turning ones and one free root.
+    """
+    if bodies.uncharted:
+        reason = f"its rows need turning joints and one free root, and {bodies.uncharted[0]!r} is neither"
+        raise UnsupportedTermError("newton", [f"{label} ({reason})"])

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.checks import number, posture, time_step
+from wholebody.methods.base import Method, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.figure_course import FigureCourse
 from wholebody.methods.newton.linear_algebra.base import Pattern
-from wholebody.methods.newton.method import answer
 from wholebody.methods.newton.reaching import reach
 from wholebody.methods.newton.search import SHARPER, Search, Settings
+from wholebody.methods.passage import SHORT
 from wholebody.pool import OneAtATime
-from wholebody.problem import Problem, Solution
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
 
 Array = NDArray[np.float64]
@@ -51,17 +54,29 @@ class NewtonTracker:
         problem: whose goals are followed.
         dt: seconds a frame; None where frames are not tied to time.
         workspace: its own; between calls it may be moved.
+        unswept: radians and metres: shorter ways go into nothing, as every iteration of a frame was looked after.
+        leaves_overlap: True.
     """
 
-    def __init__(self, problem: Problem, algebra: str, settings: Settings, dt: float | None) -> None:
+    unswept = SHORT
+    leaves_overlap = True
+
+    def __init__(self, problem: Problem, algebra: str, settings: Settings, dt: float | None, method: Method) -> None:
         """Lay out the equations.
+
+        Args:
+            problem: whose goals are followed.
+            algebra: name of the factorisation.
+            settings: of whole solves.
+            dt: seconds a frame; None where frames are not tied to time.
+            method: for solves whose measures count from elsewhere.
 
         Raises:
             InputError: the problem has a term that this method has no equations for, or dt is not positive and finite.
         """
         self.problem = check_problem(problem, "tracker: problem")
         self.dt = None if dt is None else time_step(dt, "dt")
-        self._algebra, self._settings = algebra, settings
+        self._algebra, self._settings, self._method = algebra, settings, method
         self.workspace = problem.workspace()
         self._alone = OneAtATime("tracker")
         self._lay_out()
@@ -97,6 +112,18 @@ class NewtonTracker:
             )
             return NewtonStep(course.posture(found.x), found.iterations, found.systems, course.structures)
 
+    def frame(self, q: Array, tolerance: float | None = None) -> NewtonStep:
+        """One frame of a motion: the same as `step`."""
+        return self.step(q, FRAME_TOLERANCE if tolerance is None else tolerance)
+
+    def nearest(self, q: Array) -> Solution:
+        """The method's answer from q (nq,), with measures that count from there."""
+        return self._method.solve(nearest_to(self.problem, q))
+
+    def ways_out(self, q: Array) -> Sequence[Array]:
+        """None: the steps lead out."""
+        return ()
+
     def solve(self, q: Array) -> Solution:
         """The straight way from the posture q (nq,) to the problem's present goals; no other starts are tried.
 
@@ -107,7 +134,7 @@ class NewtonTracker:
         q = posture(q, self.workspace.model.nq)
         with self._alone:
             search = Search(self._renewed(), self._settings)
-            return answer(search, search.from_here(q), began)
+            return search.solution(search.from_here(q), began)
 
     @property
     def pattern(self) -> Pattern:

@@ -10,14 +10,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.assessment import Assessment, assess
 from wholebody.geometry.proximity import COAL_ACCURACY
-from wholebody.methods.contradictions import explanation
+from wholebody.methods.base import SolvingTracker, UnsupportedTermError, refusal
+from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.methods.placo.robot import SWELL, Robot
-from wholebody.methods.placo.terms import add_terms, check, named_frames
-from wholebody.problem import Iterate, Problem, Solution, Status
+from wholebody.methods.placo.terms import add_terms, named_frames, unsupported
+from wholebody.problem import Problem
+from wholebody.solution import Iterate, Solution
 from wholebody.workspace import Workspace
 
 Array = NDArray[np.float64]
@@ -72,6 +73,11 @@ class Placo:
         """Name for tables."""
         return "placo"
 
+    def accepts(self, problem: Problem) -> str | None:
+        """None where placo has classes for all terms and joints; else the sentence that names what it has none for."""
+        check_problem(problem, "Placo.accepts: problem")
+        return refusal(self.name, unsupported(problem))
+
     def prepare(self, problem: Problem) -> None:
         """Build placo's robot for a problem; `solve` does it where this was not called.
 
@@ -103,20 +109,19 @@ class Placo:
         ):
             run = _Run(problem, workspace, room.robot(problem, workspace), self, control)
             run.go()
-        judgement = assess(problem, run.q)
-        status = _status(judgement, run, 1.05 * self.tolerance + 1e-6)
-        why = "" if status == "solved" else explanation(problem)
-        said = why or control.message(judgement) or _message(status, judgement, run)
-        return Solution(
-            q=run.q,
-            status=status,
-            seconds=time.perf_counter() - began,
-            iterations=run.programs,
-            assessment=judgement,
-            trace=tuple(run.trace),
-            method=self.name,
-            message=said + judgement.in_the_way,
+        failure = f"placo gave up at program {run.programs} ({run.failure})" if run.failure else ""
+        ending = Ending(
+            run.q, run.rested, run.programs, tuple(run.trace), f"in {run.programs} programs", failure=failure
         )
+        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+
+    def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
+        """What follows the goals of a problem by solving every step anew.
+
+        Raises:
+            InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
+        """
+        return SolvingTracker(self, problem, dt)
 
 
 class _Room:
@@ -127,7 +132,9 @@ class _Room:
 
     def robot(self, problem: Problem, workspace: Workspace) -> Robot:
         """Placo's robot for a problem, with things where the workspace sees them."""
-        check(problem)
+        refused = unsupported(problem)
+        if refused:
+            raise UnsupportedTermError("placo", refused)
         frames = named_frames(problem)
         if self._robot is None or not self._robot.serves(problem, frames):
             self._robot = Robot(problem, frames)
@@ -230,26 +237,3 @@ class _Run:
         self._damping = min(max(STIFFER * self._damping, DAMPING), MOST_DAMPING) if back else LOOSER * self._damping
         self._last = move
         return move
-
-
-def _status(judgement: Assessment, run: _Run, slack: float) -> Status:
-    ended = run.rested or bool(run.failure)
-    if not judgement.holds(slack):
-        return "infeasible" if ended else "stalled"
-    if judgement.met(slack):
-        return "solved"
-    return "unreachable" if run.rested else "stalled"
-
-
-def _message(status: Status, judgement: Assessment, run: _Run) -> str:
-    left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
-    if status == "solved":
-        return f"solved in {run.programs} programs"
-    if run.failure:
-        return f"placo gave up at program {run.programs} ({run.failure}): {left}"
-    if status == "unreachable":
-        return f"came to rest: nothing is violated, {left}"
-    if status == "stalled":
-        return f"ran out of iterations: {left}"
-    worst = max(judgement.clearance_lack, judgement.constraint_violation, judgement.limit_violation)
-    return f"came to rest where something does not hold: missed by {worst:.3g} m or rad"

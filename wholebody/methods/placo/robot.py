@@ -15,8 +15,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError, MissingPackageError
+from wholebody.errors import MissingPackageError
 from wholebody.figures.figure import Figure
+from wholebody.methods.base import UnsupportedTermError
 from wholebody.problem import Problem
 
 Array = NDArray[np.float64]
@@ -173,16 +174,27 @@ def _joint(robot: ElementTree.Element, name: str, kind: str, parent: str, child:
     return joint
 
 
+def unsupported_joints(figure: Figure) -> list[str]:
+    """The first joint of a kind that placo's robots do not have, with the reason; empty without one."""
+    model = figure.model
+    for index in range(2 if figure.root == "free" else 1, model.njoints):
+        if _urdf_kind(model.joints[index]) is None:
+            kind = model.joints[index].shortname()
+            return [f"joint {model.names[index]!r}, a {kind} (its robots have turning and sliding joints and one root)"]
+    return []
+
+
+def _urdf_kind(joint: Any) -> str | None:
+    kinds = {("R", 1): "revolute", ("R", 2): "continuous", ("P", 1): "prismatic"}
+    return kinds.get((joint.shortname().removeprefix("JointModel")[0], joint.nq)) if joint.nv == 1 else None
+
+
 def _kind(model: Any, index: int) -> tuple[str, Array]:
     """URDF's word for a joint, and its axis (3,)."""
     joint = model.joints[index]
-    kinds = {("R", 1): "revolute", ("R", 2): "continuous", ("P", 1): "prismatic"}
-    kind = kinds.get((joint.shortname().removeprefix("JointModel")[0], joint.nq)) if joint.nv == 1 else None
+    kind = _urdf_kind(joint)
     if kind is None:
-        raise InputError(
-            f"method 'placo' cannot take joint {model.names[index]!r}, a {joint.shortname()}: its robots have turning "
-            "and sliding joints and one floating base; use method='qp'"
-        )
+        raise UnsupportedTermError("placo", [f"joint {model.names[index]!r}, a {joint.shortname()}"])
     data = joint.createData()
     joint.calc(data, pin.neutral(model))
     motion = np.array(data.S).ravel()

@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.errors import InputError
-from wholebody.methods.placo.robot import Robot
+from wholebody.methods.base import named_terms
+from wholebody.methods.placo.robot import Robot, unsupported_joints
 from wholebody.problem import Problem
 from wholebody.tasks import (
     Axis,
@@ -59,26 +59,14 @@ class Tasks:
             task.configure(f"measure {number}", "soft", weight * share)
 
 
-def check(problem: Problem) -> None:
-    """Refuse what placo has no class for.
-
-    Raises:
-        InputError: naming every term.
-    """
+def unsupported(problem: Problem) -> list[str]:
+    """What placo has no class for, each with the reason: terms, and joints of another kind than its robots have."""
     refused = []
-    for group, terms in (
-        ("goals", problem.goals),
-        ("constraints", problem.constraints),
-        ("constraints", problem.bounds),
-        ("measures", problem.measures),
-    ):
-        for number, term in enumerate(terms):
-            if not _takes(term):
-                kind = type(term).__name__
-                reason = f" ({REASONS[kind]})" if kind in REASONS else ""
-                refused.append(f"{group}[{number}], {kind}{reason}")
-    if refused:
-        raise InputError(f"method 'placo' cannot take {'; '.join(refused)}; leave them out or use method='qp'")
+    for where, term in named_terms(problem):
+        if not _takes(term):
+            kind = type(term).__name__
+            refused.append(where + (f" ({REASONS[kind]})" if kind in REASONS else ""))
+    return refused + unsupported_joints(problem.scene.figure)
 
 
 def _takes(term: object) -> bool:
@@ -95,12 +83,12 @@ def named_frames(problem: Problem) -> Frames:
     found: Frames = {}
     for term in (*problem.goals, *problem.constraints):
         if isinstance(term, Point):
-            _add(found, problem, term._place, term._offset)
+            _add(found, problem, term.place, term.resolved_offset)
         elif isinstance(term, (Axis, Plane)):
-            _add(found, problem, term._place)
+            _add(found, problem, term.place)
         elif isinstance(term, (Frame, Orientation, Relative, Hold)):
-            _add(found, problem, term._residual.place)
-            _add(found, problem, term._residual.base)
+            _add(found, problem, term.residual.place)
+            _add(found, problem, term.residual.base)
     return found
 
 
@@ -136,15 +124,15 @@ def add_terms(solver: Any, robot: Robot, problem: Problem) -> Tasks:
 
 def _goal(solver: Any, robot: Robot, problem: Problem, name: str, goal: Any) -> None:
     if isinstance(goal, Point):
-        task = solver.add_position_task(_name(goal._place, goal._offset), np.array(goal._target))
+        task = solver.add_position_task(_name(goal.place, goal.resolved_offset), np.array(goal.resolved_target))
         task.configure(name, "soft", goal.weight)
     elif isinstance(goal, (Frame, Orientation, Relative)):
-        _placement(solver, name, goal._residual, "soft", goal.weight)
+        _placement(solver, name, goal.residual, "soft", goal.weight)
     elif isinstance(goal, Axis):
-        task = solver.add_axisalign_task(_name(goal._place), np.array(goal._basis[2]), np.array(goal._wanted))
+        task = solver.add_axisalign_task(_name(goal.place), np.array(goal.basis[2]), np.array(goal.resolved_target))
         task.configure(name, "soft", goal.weight)
     elif isinstance(goal, CenterOfMass):
-        task = solver.add_com_task(np.array((*goal._target, 0.0)[:3]))
+        task = solver.add_com_task(np.array((*goal.resolved_target, 0.0)[:3]))
         task.mask.set_axises(goal.axes, "task")
         task.configure(name, "soft", goal.weight)
     elif isinstance(goal, Posture):
@@ -152,35 +140,35 @@ def _goal(solver: Any, robot: Robot, problem: Problem, name: str, goal: Any) -> 
 
 
 def _posture(solver: Any, robot: Robot, problem: Problem, name: str, goal: Posture) -> None:
-    figure, dofs = problem.scene.figure, set(np.asarray(goal._dofs).tolist())
-    values = _joint_values(robot, problem, goal._q, dofs)
+    figure, dofs = problem.scene.figure, set(np.asarray(goal.dofs).tolist())
+    values = _joint_values(robot, problem, goal.resolved_target, dofs)
     if values:
         task = solver.add_joints_task()
         task.set_joints(values)
         task.configure(name, "soft", goal.weight)
     if robot.floating and 0 in dofs:
-        base = figure.model.jointPlacements[1] * pin.XYZQUATToSE3(goal._q[:7])
+        base = figure.model.jointPlacements[1] * pin.XYZQUATToSE3(goal.resolved_target[:7])
         solver.add_frame_task("base", base.homogeneous).configure(f"{name}, root", "soft", goal.weight, goal.weight)
 
 
 def _constraint(solver: Any, name: str, term: Any) -> None:
     if isinstance(term, Hold):
-        _placement(solver, name, term._residual, "hard", 1.0)
+        _placement(solver, name, term.residual, "hard", 1.0)
     elif isinstance(term, Plane):
-        task = solver.add_position_task(_name(term._place), term._height * np.array(term._normal))
-        across = np.linalg.svd(term._normal[None])[2]  # rows: the normal, and two directions in the plane
-        task.mask.R_custom_world = np.array([across[1], across[2], term._normal])
+        task = solver.add_position_task(_name(term.place), term.height * np.array(term.resolved_normal))
+        across = np.linalg.svd(term.resolved_normal[None])[2]  # rows: the normal, and two directions in the plane
+        task.mask.R_custom_world = np.array([across[1], across[2], term.resolved_normal])
         task.mask.set_axises("z", "custom")
         task.configure(name, "hard", 1.0)
     elif isinstance(term, Balance):
-        corners = _corners(term._normals, term._offsets)
+        corners = _corners(term.normals, term.offsets)
         constraint = solver.add_com_polygon_constraint(list(corners[::-1]), term.margin)
         constraint.configure(name, "hard", 1.0)
 
 
 def _placement(solver: Any, name: str, residual: PlacementResidual, priority: str, weight: float) -> None:
     """The residual of one frame in another, or in the world."""
-    frame, target = _name(residual.place), pin.SE3(residual.undo.rotation.T, residual.target)
+    frame, target = _name(residual.place), residual.placement
     if residual.base.frame:
         arguments: tuple[Any, ...] = (_name(residual.base), frame)
         kind = "relative_"
@@ -207,9 +195,9 @@ def _freeze(solver: Any, robot: Robot, problem: Problem, bound: Freeze) -> None:
 
 def _measure(solver: Any, robot: Robot, problem: Problem, measure: Effort | Displacement, tasks: Tasks) -> None:
     """Weighted squared distance from a posture: a joints task for every weight that occurs."""
-    weights = measure._distance.weights
+    weights = measure.distance.weights
     for value in sorted(set(weights[weights > 0.0].tolist())):
-        values = _joint_values(robot, problem, measure._distance.reference, np.flatnonzero(weights == value).tolist())
+        values = _joint_values(robot, problem, measure.distance.reference, np.flatnonzero(weights == value).tolist())
         if values:
             task = solver.add_joints_task()
             task.set_joints(values)

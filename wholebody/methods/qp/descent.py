@@ -26,7 +26,7 @@ from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import PULL, Subproblem
 from wholebody.methods.qp.visit import Local, Visit
 from wholebody.methods.qp.working_set import WorkingSet
-from wholebody.problem import Iterate
+from wholebody.solution import Iterate
 
 FIRST_RADIUS = 0.3  # rad, m: of the trust region; larger = fewer iterations in the open, more rejected ones in clutter
 LARGEST_RADIUS = 0.8

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import numpy as np
-
-from wholebody.assessment import Assessment, assess
 from wholebody.checks import flag
-from wholebody.methods.contradictions import in_words, proven
+from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.qp.search import Search, Settings
-from wholebody.methods.qp.solvers.base import QPSolver, make_solver
-from wholebody.methods.qp.tracking import Tracker
-from wholebody.methods.qp.visit import Local
-from wholebody.problem import Problem, Solution, Status
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.registry import make_solver
+from wholebody.methods.qp.tracking import QPTracker
+from wholebody.problem import Problem
+from wholebody.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -65,6 +63,10 @@ class QP:
         """Name for tables."""
         return f"qp/{self.solver}"
 
+    def accepts(self, problem: Problem) -> str | None:
+        """None: every term that says its values and derivatives can be taken."""
+        return None
+
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture; the best of a descent, of goals approached in stages, and of seeded starts.
 
@@ -84,56 +86,19 @@ class QP:
         with problem.lend() as workspace, Control(self.time_limit, progress) as control:
             search = Search(problem, workspace, self._qp_solver(), settings, control)
             best = search.run()
-        judgement = assess(problem, best.q)
-        status = _status(best, judgement, self.tolerance)
-        status = proven(status, search.contradictions)
-        said = in_words(search.contradictions) or control.message(judgement) or _message(status, judgement, search.how)
-        return Solution(
-            q=best.q,
-            status=status,
-            seconds=time.perf_counter() - began,
-            iterations=search.spent,
-            assessment=judgement,
-            trace=tuple(search.trace),
-            method=self.name,
-            message=said + judgement.in_the_way,
+        ending = Ending(
+            best.q, best.converged, search.spent, tuple(search.trace), search.how, contradictions=search.contradictions
         )
+        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def _qp_solver(self) -> QPSolver:
         """A QP solver of the name in the settings, for one run."""
         return make_solver(self.solver)
 
-    def tracker(self, problem: Problem, dt: float) -> Tracker:
+    def tracker(self, problem: Problem, dt: float) -> QPTracker:
         """What follows the goals of a problem that move from call to call: one program a step of `dt` seconds.
 
         Raises:
             InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
         """
-        return Tracker(problem, self._qp_solver(), dt)
-
-
-def _status(local: Local, judgement: Assessment, tolerance: float) -> Status:
-    # the assessment measures with other arithmetic (coal's tolerance is 1e-6 m), so it may find a little more
-    slack = 1.05 * tolerance + 1e-6
-    if not judgement.holds(slack):
-        return "infeasible" if local.converged else "stalled"
-    if judgement.met(slack):
-        return "solved"
-    return "unreachable" if local.converged else "stalled"
-
-
-def _message(status: Status, judgement: Assessment, how: str) -> str:
-    left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
-    if status == "solved":
-        return f"solved {how}"
-    if status == "unreachable":
-        return f"not reachable from here: nothing is violated, {left}"
-    if status == "stalled":
-        return f"ran out of iterations: {left}"
-    worst = max(
-        ("a clearance", judgement.clearance_lack),
-        ("a constraint", judgement.constraint_violation),
-        ("a joint limit", judgement.limit_violation),
-        key=lambda item: item[1],
-    )
-    return f"what must hold cannot all hold: {worst[0]} is missed by {worst[1]:.3g} m or rad"
+        return QPTracker(problem, self._qp_solver(), dt, self, lambda: replace(self, measures=True))

@@ -18,7 +18,8 @@ from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.visit import Local
 from wholebody.methods.starts import Minima, bent, restarts
-from wholebody.problem import Iterate, Problem
+from wholebody.problem import Problem
+from wholebody.solution import Iterate
 from wholebody.workspace import Workspace
 
 ALIKE = 1e-5  # share of a goal's error by which two descents may differ and count as equally near

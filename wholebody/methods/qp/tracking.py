@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -11,13 +11,17 @@ import pinocchio as pin
 
 from wholebody.checks import flag, time_step
 from wholebody.linearisation import Linearisation
+from wholebody.methods.base import Method, goal_error, nearest_to
 from wholebody.methods.inputs import check_problem
+from wholebody.methods.passage import SHORT, is_free
 from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
+from wholebody.solution import Solution
+from wholebody.tasks import StepLimit
 from wholebody.tasks.base import Goal
 
 LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
@@ -27,12 +31,15 @@ RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before veloc
 UNSEEN = 1e-4  # m: by which turning may bring things nearer than the linearisation says without being looked after
 CORRECTIONS = 3  # programs that ask again for what turning brought nearer, before the step is cut
 CUTS = 6  # times that a step is halved before it is given up
+OF_A_FRAME = 1e-4  # m, rad: to which the goals of a frame are met
+PROGRAMS = 3  # most of a frame; more = nearer to a goal that turns quickly, dearer frames where it cannot be met
+WORTH = 0.5  # share of the error that another program must leave at most for one more to follow
 DAMPING = (
     0.3  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at what is in the way
 )
 
 
-class Step(NamedTuple):
+class QPStep(NamedTuple):
     """Answer of one step.
 
     Attributes:
@@ -58,7 +65,19 @@ class Step(NamedTuple):
     share: float
 
 
-class Tracker:
+class FrameStep(NamedTuple):
+    """Answer of one frame.
+
+    Attributes:
+        q: (nq,) the next posture.
+        iterations: programs.
+    """
+
+    q: Array
+    iterations: int
+
+
+class QPTracker:
     """Follows the goals of one problem, step by step.
 
     No step moves any piece farther than half the distance within which pairs were looked at, so nothing is jumped over,
@@ -71,16 +90,31 @@ class Tracker:
         problem: whose goals are followed.
         dt: seconds a step.
         workspace: its own; between steps it may be moved.
+        unswept: infinite: no step passes through anything, and a frame of several is swept where it is long.
+        leaves_overlap: True.
     """
 
-    def __init__(self, problem: Problem, solver: QPSolver, dt: float) -> None:
+    unswept = np.inf
+    leaves_overlap = True
+
+    def __init__(
+        self, problem: Problem, solver: QPSolver, dt: float, method: Method, minimising: Callable[[], Method]
+    ) -> None:
         """Set up for steps of `dt` seconds.
+
+        Args:
+            problem: whose goals are followed.
+            solver: of the programs.
+            dt: seconds a step.
+            method: for whole solves.
+            minimising: makes the same method that minimises the measures.
 
         Raises:
             InputError: dt is not a positive finite number.
         """
         self.problem = check_problem(problem, "tracker: problem")
         self.dt = time_step(dt, "dt")
+        self._method, self._minimising = method, minimising
         self._working_set = WorkingSet(solver)
         self._within = LEAST_WITHIN
         self._alone = OneAtATime("tracker")
@@ -91,7 +125,7 @@ class Tracker:
         self._support = self.workspace.state.support[table.joint[self._moving]]
         self._reach = table.reach[self._moving]
 
-    def step(self, q: Array, measures: bool = True) -> Step:
+    def step(self, q: Array, measures: bool = True) -> QPStep:
         """One step from q, shape (nq,); a posture out of limits is brought back first.
 
         Without `measures` it is the least step that meets the goals, which puts right what a step with them left: it
@@ -105,7 +139,43 @@ class Tracker:
         with self._alone:
             return self._step(q, measures)
 
-    def _step(self, q: Array, measures: bool) -> Step:
+    def frame(self, q: Array, tolerance: float | None = None) -> FrameStep:
+        """One frame of a motion: programs until the goals are met as a frame should, or another brings little.
+
+        Args:
+            q: (nq,) posture of the frame before.
+            tolerance: to which the goals of a frame are met, metres and radians; `OF_A_FRAME` where None.
+
+        Raises:
+            InputError: as for `step`.
+        """
+        enough = OF_A_FRAME if tolerance is None else tolerance
+        # a bound on speeds is one of the way of a whole frame
+        most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else PROGRAMS
+        here, error = self.step(q).q, np.inf
+        for spent in range(1, most):
+            before, error = error, goal_error(self.problem, self.workspace, here)
+            if error <= enough or error > WORTH * before:
+                return FrameStep(here, spent)
+            there = self.step(here, measures=False).q
+            if not is_free(self.workspace, q, there, SHORT):
+                return FrameStep(here, spent + 1)
+            here = there
+        return FrameStep(here, most)
+
+    def solve(self, q: Array) -> Solution:
+        """The method's answer for the present goals, begun at the posture q (nq,)."""
+        return self._method.solve(self.problem.with_start(q))
+
+    def nearest(self, q: Array) -> Solution:
+        """The same with measures that count from q, and are minimised: they say what is near."""
+        return self._minimising().solve(nearest_to(self.problem, q))
+
+    def ways_out(self, q: Array) -> Sequence[Array]:
+        """None: the steps lead out."""
+        return ()
+
+    def _step(self, q: Array, measures: bool) -> QPStep:
         self.problem.check_fresh()
         self.workspace.refresh()
         self._renew()
@@ -122,7 +192,7 @@ class Tracker:
             displacement, share = self._looked_after(at, rows, program, displacement, share)
         self._within = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
         following = pin.integrate(self.problem.scene.model, at.q, displacement)
-        return Step(
+        return QPStep(
             following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
             answer.iterations, answer.by, share,
         )  # fmt: skip

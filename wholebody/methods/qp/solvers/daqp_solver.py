@@ -8,7 +8,8 @@ import daqp
 import numpy as np
 
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import QPSolver, finish, last_resort
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.fallback import finish, last_resort
 from wholebody.methods.qp.solvers.split_form import split
 
 FAR = 1e30  # DAQP's infinity

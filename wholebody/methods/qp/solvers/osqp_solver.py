@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import QPSolver, finish, last_resort
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.fallback import finish, last_resort
 
 HEAVIEST = 1e5  # weights are cut to this: OSQP needs many times the iterations for larger ones
 SLOTS = 8  # elastic rows come in multiples of this, so that the sparsity seldom changes; more slots = slower iterations

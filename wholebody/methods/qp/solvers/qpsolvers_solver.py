@@ -7,7 +7,8 @@ import warnings
 import numpy as np
 
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import QPSolver, finish, last_resort
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.fallback import finish, last_resort
 from wholebody.methods.qp.solvers.split_form import split
 
 HEAVIEST = 1e5  # weights are cut to this: solvers find the active set of a milder program more reliably

@@ -1,0 +1,86 @@
+"""Every method follows one protocol: it says what it cannot take, solves, and makes a tracker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.methods import METHODS
+from wholebody.methods.base import Method, UnsupportedTermError
+from wholebody.methods.solve import method_named
+
+REFUSED = {
+    "qp": None,
+    "newton": None,
+    "ccd": (wb.Posture("neutral"), [wb.Plane("tip", (0, 1, 0))]),
+    "placo": (wb.Axis("tip", (1, 0, 0), toward=(1, 1, 1)), [wb.Plane("tip", (0, 1, 0), side="above")]),
+    "dls": (wb.Point("tip", (0.3, 0.0, 0.3)), [wb.Plane("tip", (0, 1, 0), side="above")]),
+}
+"""A goal and constraints that a method cannot take; None where it can take all of ours."""
+
+
+@pytest.fixture(scope="module")
+def scene(planar_arm: Callable[..., wb.Figure]) -> wb.Scene:
+    return wb.Scene(planar_arm((0.3, 0.3, 0.2)))
+
+
+def chosen(name: str) -> Method:
+    if name == "placo":
+        pytest.importorskip("placo")
+    return method_named(name)
+
+
+@pytest.mark.parametrize("name", [name for name in METHODS if REFUSED[name]])
+def test_what_a_method_cannot_take_is_named_by_one_sentence_everywhere(name: str, scene: wb.Scene) -> None:
+    method = chosen(name)
+    goal, constraints = REFUSED[name]  # type: ignore[misc]
+    problem = wb.Problem(
+        scene, goals=[goal], constraints=constraints, measures=[wb.Effort()] if name != "ccd" else None
+    )
+    sentence = method.accepts(problem)
+    assert sentence is not None
+    assert "Plane" in sentence
+    assert "method='qp'" in sentence
+    with pytest.raises(UnsupportedTermError) as caught:
+        method.solve(problem)
+    assert str(caught.value) == sentence
+    with pytest.raises(UnsupportedTermError, match="Plane"):
+        method.tracker(problem, 0.02).step(problem.start)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_tracker_comes_to_a_goal_and_follows_it_elsewhere(name: str, scene: wb.Scene) -> None:
+    """Judged by Pinocchio's own placement of the tip."""
+    method, q = chosen(name), np.array([0.3, 0.4, 0.5])
+    there = scene.state(q).frame(scene.frame_id("tip")).translation
+    problem = wb.Problem(scene, [0.1, 0.2, 0.3], goals=[wb.Point("tip", there)])
+    assert method.accepts(problem) is None
+    tracker, at = method.tracker(problem, 0.1), problem.start
+    for _ in range(60):
+        at = tracker.step(at).q
+    assert scene.state(at).frame(scene.frame_id("tip")).translation == pytest.approx(there, abs=2e-3)
+    there = scene.state(q + 0.1).frame(scene.frame_id("tip")).translation
+    problem.retarget([wb.Point("tip", there)])
+    for _ in range(10):
+        at = tracker.frame(at, 1e-4).q
+    assert scene.state(at).frame(scene.frame_id("tip")).translation == pytest.approx(there, abs=5e-4)
+    assert tracker.solve(at).assessment.goal_error < 2e-4
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_drag_uses_a_method_by_its_protocol_alone(name: str, scene: wb.Scene) -> None:
+    """A method of somebody else, which only hands on what the protocol has, drags as the one that it wraps."""
+    method = chosen(name)
+
+    class Wrapped:
+        name, accepts, solve, tracker = method.name, method.accepts, method.solve, method.tracker
+
+    there = scene.state(np.array([0.3, 0.4, 0.5])).frame(scene.frame_id("tip")).translation
+    found = []
+    for one in (method, Wrapped()):
+        drag = wb.Drag(wb.Problem(scene, [0.1, 0.2, 0.3], goals=[wb.Point("tip", there)]), one)
+        found.append([drag.to(there + (0.0, 0.01 * k, 0.0)).q for k in range(3)])
+    assert np.array_equal(found[0], found[1])

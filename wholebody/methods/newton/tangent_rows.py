@@ -1,0 +1,102 @@
+"""Equations that are stated in the tangent of postures, as rows of bodies: goals and constraints of anybody's own.
+
+A term says its derivative J by the tangent displacement (nv,) of a posture. Every degree of freedom of turning joints
+and of a free root is in turn a function of one or two bodies, with derivative D (nv, 7 n), so the term's rows are J D.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from wholebody.figures.state import State, Wrench
+from wholebody.methods.newton.batches import Array, Batch, Indices, Mask
+from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.tasks.base import Constraint, Goal
+
+
+class TangentRows(Batch):
+    """Rows sign (value(posture) - bound) of all bodies of a figure."""
+
+    def __init__(
+        self,
+        bodies: FigureBodies,
+        label: str,
+        value: Callable[[State], Array],
+        jacobian: Callable[[State], Array],
+        chosen: Indices,
+        sign: Array,
+        bound: Array,
+    ) -> None:
+        """Take a function with its derivative.
+
+        Args:
+            bodies: of the figure; its joints are turning ones, and a free root.
+            label: what it is called in messages.
+            value: (m,) at a state.
+            jacobian: (m, nv) at a state.
+            chosen: (size,) which of the m rows.
+            sign: (size,) 1 or -1.
+            bound: (size,) what is taken off the value.
+        """
+        super().__init__(np.arange(bodies.count)[None], [label])
+        self._figure, self._value, self._slope = bodies, value, jacobian
+        self.chosen, self.sign, self.bound = chosen, sign, bound
+        self.size = len(chosen)
+        self.pattern = np.tile(_reads(bodies), (self.size, 1))
+
+    def residual(self, x: Array) -> Array:  # noqa: D102
+        value = np.atleast_1d(self._value(self._figure.state_at(x)))[self.chosen]
+        result: Array = (self.sign * (value - self.bound))[None]
+        return result
+
+    def jacobian(self, x: Array) -> Array:  # noqa: D102
+        rows = self._slope(self._figure.state_at(x))[self.chosen]
+        result: Array = (self.sign[:, None] * (rows @ self._figure.tangent_rows(x)))[None]
+        return result
+
+
+def goal_rows(bodies: FigureBodies, goal: Goal, label: str) -> TangentRows:
+    """Rows of a goal: its error."""
+    error = np.atleast_1d(goal.error(bodies.start_state))
+    return TangentRows(
+        bodies, label, goal.error, lambda state: _dense(goal.jacobian(state), state),
+        np.arange(len(error)), np.ones(len(error)), np.zeros(len(error)),
+    )  # fmt: skip
+
+
+def constraint_rows(
+    bodies: FigureBodies, term: Constraint, label: str
+) -> tuple[TangentRows | None, TangentRows | None]:
+    """Rows of a constraint that are equalities, and those that are to be at least zero; None where there are none."""
+    size = np.atleast_1d(term.value(bodies.start_state)).shape
+    lower, upper = np.broadcast_to(term.lower, size), np.broadcast_to(term.upper, size)
+    equal = np.flatnonzero(lower == upper)
+    above = np.flatnonzero((lower != upper) & np.isfinite(lower))
+    below = np.flatnonzero((lower != upper) & np.isfinite(upper))
+
+    def rows(chosen: Indices, sign: Array, bound: Array) -> TangentRows | None:
+        if not len(chosen):
+            return None
+        slope = lambda state: _dense(term.jacobian(state), state)  # noqa: E731
+        return TangentRows(bodies, label, term.value, slope, chosen, sign, bound)
+
+    sides = np.concatenate([np.ones(len(above)), -np.ones(len(below))])
+    return (
+        rows(equal, np.ones(len(equal)), lower[equal]),
+        rows(np.concatenate([above, below]), sides, np.concatenate([lower[above], upper[below]])),
+    )
+
+
+def _dense(part: Wrench | Array, state: State) -> Array:
+    return state.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part)
+
+
+def _reads(bodies: FigureBodies) -> Mask:
+    """(7 n,) which variables the tangent depends on: all turns, and the place of a free root."""
+    result = np.zeros((bodies.count, 7), dtype=bool)
+    result[:, 3:] = True
+    if bodies.floating:
+        result[0, :3] = True
+    return result.ravel()

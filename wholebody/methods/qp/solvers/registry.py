@@ -1,0 +1,50 @@
+"""The QP solvers there are, by name."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from wholebody.checks import shown
+from wholebody.errors import InputError, MissingPackageError, UnknownNameError
+from wholebody.methods.qp.active_set import compiled_kernel
+from wholebody.methods.qp.solvers.base import QPSolver
+
+
+def solver_names() -> tuple[str, ...]:
+    """Names that `make_solver` takes on this machine: "osqp", "daqp" and what qpsolvers finds installed."""
+    names = ["osqp"]
+    if find_spec("daqp") is not None:
+        names.append("daqp")
+    if find_spec("qpsolvers") is not None:
+        from qpsolvers import available_solvers
+
+        names += sorted(set(available_solvers) - set(names))
+    return tuple(names)
+
+
+def make_solver(name: str) -> QPSolver:
+    """A QP solver by name.
+
+    Raises:
+        InputError: not a text.
+        UnknownNameError: no installed solver has this name.
+        MissingPackageError: it exists but its package is not installed.
+    """
+    compiled_kernel()  # not in the middle of a solve
+    if not isinstance(name, str):
+        raise InputError(f"solver is {shown(name)}; give the name of a QP solver, such as 'osqp'")
+    if name == "osqp":
+        from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
+
+        return OSQPSolver()
+    if name == "daqp":
+        if find_spec("daqp") is None:
+            raise MissingPackageError("the QP solver daqp is not installed; install it with: pip install daqp")
+        from wholebody.methods.qp.solvers.daqp_solver import DAQPSolver
+
+        return DAQPSolver()
+    if name not in solver_names():
+        raise UnknownNameError("QP solver", name, solver_names())
+    from wholebody.methods.qp.solvers.qpsolvers_solver import QpsolversSolver
+
+    return QpsolversSolver(name)

@@ -1,0 +1,63 @@
+"""A solution: what a method answers, with the judgement of its posture and the way there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.assessment import Assessment
+
+Array = NDArray[np.float64]
+Status = Literal["solved", "unreachable", "infeasible", "stalled"]
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """One line of a solution's trace.
+
+    Attributes:
+        goal_error: largest goal error left, metres or radians.
+        violation: largest violation of anything that must hold, metres or radians.
+        measure: weighted sum of the measures.
+        step: largest entry of the displacement that led here, radians or metres.
+        note: what happened: "", "restart", "continuation", ...
+    """
+
+    goal_error: float
+    violation: float
+    measure: float
+    step: float
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a method answers.
+
+    Attributes:
+        q: (nq,) the posture, within limits, never NaN.
+        status: "solved", "unreachable", "infeasible" or "stalled"; see the guide.
+        seconds: wall time of the call.
+        iterations: iterations of the method.
+        assessment: the independent judgement of q.
+        trace: one entry an iteration.
+        method: name of the method and of what it used.
+        message: one sentence for a reader.
+    """
+
+    q: Array
+    status: Status
+    seconds: float
+    iterations: int
+    assessment: Assessment
+    trace: tuple[Iterate, ...] = field(repr=False)
+    method: str
+    message: str
+
+    @property
+    def solved(self) -> bool:
+        """Whether the status is "solved"."""
+        return self.status == "solved"
