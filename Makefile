@@ -27,8 +27,8 @@ help: ## list the targets
 demo: $(VENV)/.run ## pose a person reaching into a shelf, and say where the pictures are
 	$(BIN)/wholebody demo --out $(OUT)
 
-test: $(VENV)/.test ## run the tests (ARGS="-k name" passes arguments to pytest)
-	$(BIN)/python -m pytest $(ARGS)
+test: $(VENV)/.test ## run the tests on two cores (ARGS="-k name" passes arguments to pytest)
+	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 lint: $(VENV)/.test ## check style and formatting
 	$(BIN)/ruff check .
@@ -52,10 +52,10 @@ wheel: $(VENV)/.test ## build the wheel into dist/
 	$(BIN)/python -m build --wheel --no-isolation --outdir dist .
 
 lock: $(VENV)/.lock ## choose the newest versions that work together and write them to requirements/
-	$(CHOOSE) --output-file requirements/run.txt
-	$(CHOOSE) --constraint requirements/run.txt --extra test --extra build --output-file requirements/test.txt
+	$(CHOOSE) --extra placo --output-file requirements/run.txt
+	$(CHOOSE) --constraint requirements/run.txt --extra placo --extra test --extra build --output-file requirements/test.txt
 	$(CHOOSE) --constraint requirements/run.txt --extra docs --output-file requirements/docs.txt
-	$(CHOOSE) --constraint requirements/test.txt --extra solvers --extra compare --extra charts --extra fast --output-file requirements/compare.txt
+	$(CHOOSE) --constraint requirements/test.txt --extra placo --extra solvers --extra compare --output-file requirements/compare.txt
 
 clean: ## remove the environment and everything that was built
 	rm -rf $(VENV) build dist site demo .pytest_cache .mypy_cache .ruff_cache .hypothesis
@@ -71,6 +71,7 @@ $(BIN)/python:
 $(VENV)/.run: requirements/run.txt $(RECIPE) | $(BIN)/python
 	$(PIP) install -r requirements/run.txt
 	$(PIP) install --no-deps --editable .
+	$(BIN)/python -m wholebody.compiled
 	touch $@
 
 $(VENV)/.test: requirements/test.txt $(VENV)/.run

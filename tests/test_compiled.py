@@ -1,23 +1,79 @@
-"""Loops that numba compiles: there, or not, but never an error."""
+"""Loops that numba compiles: kept where a folder can be written to, told the first time, and not charged to solves."""
 
 from __future__ import annotations
 
-from types import ModuleType
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
 from wholebody import compiled
 
+LOOP = """
+from wholebody.compiled import compiled
 
-def test_there_is_none_where_numba_cannot_keep_what_it_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(name: str) -> ModuleType:
-        raise RuntimeError("cannot cache function 'settle': no locator available for file")
+@compiled()
+def twice(x):
+    return 2.0 * x
+"""
+USE = """
+import logging, sys
+logging.basicConfig(level=logging.INFO, format="%(message)s")
+from wholebody import loop_of_a_test
+from wholebody.compiled import compile_seconds
+print(loop_of_a_test.twice(1.5), loop_of_a_test.twice(2), compile_seconds() > 0.0)
+"""
 
-    monkeypatch.setattr(compiled, "find_spec", lambda name: object())
-    monkeypatch.setattr(compiled, "import_module", refuse)
-    assert compiled.compiled_module("wholebody.methods.qp.active_set_kernel") is None
+
+@pytest.fixture
+def run(tmp_path: Path, root: Path):
+    """Return a function: folder that numba may keep things in -> output and messages of a process that uses a loop."""
+    place = tmp_path / "wholebody"
+    place.mkdir()
+    for path in (root / "wholebody").glob("*.py"):
+        (place / path.name).symlink_to(path)
+    (place / "loop_of_a_test.py").write_text(LOOP)
+
+    def use(**variables: str) -> tuple[list[str], list[str]]:
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path), **variables}
+        done = subprocess.run(
+            [sys.executable, "-c", USE], env=environment, cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        return done.stdout.split(), done.stderr.splitlines()
+
+    return use
 
 
-def test_there_is_none_without_numba(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiled, "find_spec", lambda name: None)
-    assert compiled.compiled_module("wholebody.methods.qp.active_set_kernel") is None
+def test_the_first_compilation_is_told_once_and_kept(run, tmp_path: Path) -> None:
+    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    assert run(**kept) == (
+        ["3.0", "4.0", "True"],
+        ["compiling the inner loops: half a minute, once on a machine"],
+    )
+    assert run(**kept) == (["3.0", "4.0", "False"], [])
+
+
+def test_the_users_cache_is_taken_where_the_package_cannot_be_written_to(run, tmp_path: Path) -> None:
+    (tmp_path / "wholebody" / "__pycache__").write_text("in the way")
+    kept = {"NUMBA_CACHE_DIR": "", "HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    assert [len(run(**kept)[1]) for _ in range(2)] == [1, 0]
+    assert list((tmp_path / "cache").rglob("*.nbi"))
+
+
+def test_loops_work_where_nothing_can_be_kept(run, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    nowhere = str(tmp_path / "file" / "folder")
+    (tmp_path / "wholebody" / "__pycache__").write_text("in the way")
+    for _ in range(2):
+        answers, told = run(NUMBA_CACHE_DIR=nowhere, HOME=nowhere, XDG_CACHE_HOME=nowhere)
+        assert answers == ["3.0", "4.0", "True"]
+        assert len(told) == 1
+
+
+def test_all_loops_are_compiled_by_one_call() -> None:
+    compiled.compile_all()
+    for name in compiled.LOOPS:
+        loops = vars(sys.modules[name].compiled_kernel()).values()
+        assert any(loop.signatures for loop in loops if hasattr(loop, "signatures")), name

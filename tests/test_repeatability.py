@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.needs import each
 from wholebody.geometry.guesses import Guesses
 
 FEET = ("left_foot", "right_foot")
@@ -56,7 +57,7 @@ def test_a_solve_after_others_is_the_solve_before_them(scene: wb.Scene, method: 
     assert np.array_equal(first.q, restated.q)
 
 
-@pytest.mark.parametrize("name", ["ccd", "newton", "placo"])
+@pytest.mark.parametrize("name", each(["ccd", "newton", "placo"]))
 def test_so_it_is_for_the_other_methods(scene: wb.Scene, name: str) -> None:
     def asked(place: str) -> wb.Problem:
         holds = [] if name == "ccd" else [wb.Hold(foot) for foot in FEET]

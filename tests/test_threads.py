@@ -12,6 +12,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.needs import each
 from wholebody.figures.state import State
 from wholebody.pool import OneAtATime, Pool
 
@@ -82,7 +83,7 @@ METHODS = {
 }
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", each(METHODS))
 def test_threads_with_one_method_problem_and_scene_answer_as_one_alone(scene: wb.Scene, name: str) -> None:
     method, repeats = METHODS[name]
     asked = problems(scene)

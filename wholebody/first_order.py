@@ -14,7 +14,6 @@ import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
@@ -259,6 +258,8 @@ def _of_joint(model: pin.Model, column: int, limited: bool) -> Label:
 
 def _balanced(objective: Array, signed: _Rows, one_sided: _Rows) -> tuple[Array, Array]:
     """How hard each labelled row pushes against the objective's gradient (nv,), and what is left of it (nv,)."""
+    from scipy.optimize import nnls
+
     equal, pushing = np.vstack(signed.rows), np.vstack(one_sided.rows)
     rows = np.vstack([equal, -equal, pushing])
     if not rows.size:

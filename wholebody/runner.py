@@ -297,7 +297,7 @@ def _memory(process: int | None) -> float:
 
 
 def _dumps(value: Any) -> bytes:
-    """Pickle; with cloudpickle, where it is installed, what is not importable by its code."""
+    """Pickle; what is not importable by its code, unless cloudpickle is missing, which the doctor has to survive."""
     try:
         import cloudpickle
     except ImportError:

@@ -13,7 +13,6 @@ from wholebody.cli import main
 
 
 def test_both_methods_sit_down(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("matplotlib")
     (tmp_path / "results.md").write_text("<!-- bench:challenge -->\n<!-- /bench:challenge -->\n")
     command = ["bench", "challenge", "--quick", "--out", str(tmp_path / "out")]
     assert main([*command, "--update-docs", str(tmp_path)]) == 0

@@ -35,7 +35,7 @@ def docs(tmp_path: Path) -> Path:
 
 
 def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("matplotlib")
+    pytest.importorskip("placo", reason="placo is not installed, with which steps are compared")
     words = ("--repeats", "2", "--steps", "6", "--tools", "wholebody/daqp", "placo", "--out", str(tmp_path / "out"))
     assert bench("step", *words, "--update-docs", str(docs)) == 0
     facts, rows = read_rows(tmp_path / "out" / "step.csv", StepRow)
@@ -59,7 +59,6 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_reaches(tmp_path: Path, docs: Path) -> None:
-    pytest.importorskip("matplotlib")
     words = ("--count", "2", "--first", "5", "--solver", "daqp", "--out", str(tmp_path / "out"))
     assert bench("reaches", *words, "--update-docs", str(docs)) == 0
     _, rows = read_rows(tmp_path / "out" / "reaches.csv", ReachRow)
@@ -79,7 +78,6 @@ def test_solve(tmp_path: Path, docs: Path) -> None:
 
 
 def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     from wholebody.bench import charts
 
     times = [

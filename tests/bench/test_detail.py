@@ -63,7 +63,6 @@ def test_a_person_is_asked_the_same_in_another_detail() -> None:
 
 
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("matplotlib")
     made = [
         replace(ROW, task=name, detail=kind, level=level, solve_ms=5.0 + len(level))
         for name, kinds in (("clutter", detail.DETAILS), ("arm", ("own",)))

@@ -75,7 +75,6 @@ def test_rows_say_what_was_measured() -> None:
 
 
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("matplotlib")
     monkeypatch.setattr(scaling, "QUICK", {"joints": (3, 5), "pieces": (1, 2), "things": (4, 8)})
     (tmp_path / "results.md").write_text("<!-- bench:scaling -->\n<!-- /bench:scaling -->")
     parser = argparse.ArgumentParser()

@@ -15,6 +15,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.needs import each
 from wholebody.cli import main
 from wholebody.cli.demo import shipped_tasks
 from wholebody.view import browser
@@ -110,7 +111,7 @@ def test_every_method_can_be_named_and_the_help_lists_them(
     assert "qp, ccd, newton, placo, dls" in " ".join(capsys.readouterr().out.split())
 
 
-@pytest.mark.parametrize("method", ["newton", "dls", "placo"])
+@pytest.mark.parametrize("method", each(["newton", "dls", "placo"]))
 def test_methods_are_called_the_same_everywhere(
     tmp_path: Path, method: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

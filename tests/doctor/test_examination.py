@@ -65,7 +65,7 @@ def test_what_is_absent_but_not_needed_is_no_fault_and_says_how_it_is_had(fake: 
             "placo needs pin==3.8.0, and 4.1.0 is installed",
             "pip install 'placo' 'pin==3.8.0'",
         ),
-        ({"fails": {"placo": "ImportError: undefined symbol"}}, {}, "undefined symbol", examination.AGAIN),
+        ({"fails": {"coal": "ImportError: undefined symbol"}}, {}, "undefined symbol", examination.AGAIN),
         ({"absent": ["coal"]}, {}, "the package coal is absent", examination.AGAIN),
         ({"fails": {"osqp": "ended the process (SIGSEGV)"}}, {}, "SIGSEGV", examination.AGAIN),
         ({"fails": {"qp": "ArithmeticError: a reach of 5 cm ended stalled"}}, {}, "stalled", examination.AGAIN),

@@ -12,6 +12,7 @@ import pytest
 import wholebody as wb
 from wholebody.errors import FileFormatError
 from wholebody.figures.state import State, Wrench
+from wholebody.methods import installed_methods
 
 BALL = '<collision><geometry><sphere radius="0.02"/></geometry></collision>'
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
@@ -137,7 +138,7 @@ def test_it_is_solved_swept_tracked_reduced_and_judged(load: Callable[..., wb.Fi
     assert scene.sweep(figure.neutral, goal_q) is None
     assert figure.reduced("own").joints == ("own",)
     assert figure.reduced("z_leader").joints == ("a_finger", "b_slider", "z_leader")
-    for method in ("ccd", "newton", "placo"):
+    for method in set(installed_methods()) - {"qp", "dls"}:
         with pytest.raises(wb.WholebodyError, match=r"(?i)mimic"):
             wb.solve(problem, method=method)
 

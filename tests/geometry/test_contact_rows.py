@@ -11,7 +11,9 @@ import pytest
 from scipy.spatial import ConvexHull
 
 import wholebody as wb
+from tests.reference.contact_rows import ReferenceRowBuilder
 from wholebody.geometry import contact_rows as module
+from wholebody.geometry.contact_rows import ContactRowBuilder
 
 SHAPES = {
     "sphere": wb.Sphere(0.15),
@@ -232,18 +234,13 @@ def test_box_on_a_table_has_a_row_at_every_corner_of_the_patch(free_bodies, size
     assert (np.abs(found[:, :2]) <= np.array([0.2, 0.1]) + 2e-3).all()
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-def test_round_face_has_few_rows_that_keep_it_from_rocking(free_bodies, monkeypatch, compiled):
+def test_round_face_has_few_rows_that_keep_it_from_rocking(free_bodies):
     """A disc of 48 corners: whichever way it tips, some row lowers nearly as much as its lowest corner does."""
     rim = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0.0, 2 * np.pi, 48, endpoint=False)])
     disc = wb.Hull([(*(0.1 * corner), z) for corner in rim for z in (-0.02, 0.02)])
     scene = wb.Scene(free_bodies(disc)).add(wb.Box((1.0, 1.0, 0.1)), name="table", at=(0.0, 0.0, -0.05))
     q = scene.figure.neutral
     q[2] = 0.021
-    if not compiled:
-        monkeypatch.setattr(scene.built.rows, "_kernel", None)
-    elif scene.built.rows._kernel is None:
-        pytest.skip("numba is not installed")
     _, rows, jacobian = rows_of(scene, q)
     assert 5 <= len(rows.gap) <= module.MOST_ENDS + 1
     for angle in np.linspace(0.0, 2 * np.pi, 60):
@@ -342,18 +339,15 @@ def corner_points(piece):
     return np.array(piece.points())
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-def test_array_code_says_what_plain_loops_say(free_bodies, monkeypatch, compiled):
+@pytest.mark.parametrize("builder", [ContactRowBuilder, ReferenceRowBuilder])
+def test_rows_are_those_of_plain_loops(free_bodies, monkeypatch, builder):
     monkeypatch.setattr(module, "MOST_ENDS", 1000)  # the plain loops keep all
     rng = np.random.default_rng(4)
     flat = [SHAPES["box"], SHAPES["prism"], wb.Box((1.0, 0.3, 0.05)), wb.Hull(rng.normal(size=(12, 3)) * 0.2)]
     scene = wb.Scene(free_bodies(*flat[:3]))
     for k, shape in enumerate(flat):
         scene.add(shape, name=f"thing{k}", at=(0.3 * k - 0.5, 0.1 * k, -0.2))
-    if not compiled:
-        monkeypatch.setattr(scene.built.rows, "_kernel", None)
-    elif scene.built.rows._kernel is None:
-        pytest.skip("numba is not installed")
+    monkeypatch.setattr(scene.built, "rows", builder(scene.pair_table))
     levers = 0
     for _ in range(40):
         q = scene.figure.neutral
@@ -373,6 +367,44 @@ def test_array_code_says_what_plain_loops_say(free_bodies, monkeypatch, compiled
                 assert away.min() < 1e-8
             levers += len(mine) - 1
     assert levers > 100
+
+
+def test_compiled_rows_are_those_of_array_code_entry_by_entry(free_bodies):
+    """Flat and round pieces, rims of 48 corners of which eight are kept, and faces that lie on faces."""
+    rim = np.array([(np.cos(a), np.sin(a)) for a in np.linspace(0.0, 2 * np.pi, 48, endpoint=False)])
+    wide = np.random.default_rng(3).uniform(0.1999, 0.2, (48, 2))  # no corner is as far out as another
+    disc = wb.Hull(
+        [
+            (*(far * at), z)
+            for at, pair in zip(rim, wide, strict=True)
+            for far, z in zip(pair, (-0.02, 0.02), strict=True)
+        ]
+    )
+    scene = wb.Scene(free_bodies(SHAPES["box"], SHAPES["capsule"], SHAPES["hull"], disc))
+    scene.add(wb.Box((1.0, 1.0, 0.1)), name="table", at=(0.0, 0.0, -0.05))
+    scene.add(wb.Capsule(0.05, 0.8), name="rail", at=(0.3, 0.0, 0.05)).add(SHAPES["half-space"], name="floor")
+    compiled, reference = ContactRowBuilder(scene.pair_table), ReferenceRowBuilder(scene.pair_table)
+    rng, levers, snapped = np.random.default_rng(11), 0, 0
+    for _ in range(150):
+        q = scene.figure.neutral
+        for k in range(0, scene.model.nq, 7):
+            q[k : k + 3] = *rng.uniform(-0.4, 0.4, 2), rng.uniform(0.0, 0.2)
+            q[k + 3 : k + 7] = pin.Quaternion(pin.exp3(rng.normal(size=3) * rng.choice([1e-3, 0.02, 1.0]))).coeffs()
+        with scene.lend() as workspace:
+            contacts = workspace.near(q, 0.1)
+        twin = contacts._replace(normal=contacts.normal.copy())
+        found = contacts.normal.copy()
+        rows, wanted = compiled.rows(contacts), reference.rows(twin)
+        assert contacts.normal == pytest.approx(twin.normal, abs=1e-12)
+        assert np.array_equal(rows.contact, wanted.contact)
+        assert np.array_equal(rows.first, wanted.first)
+        assert np.array_equal(rows.second, wanted.second)
+        assert rows.gap == pytest.approx(wanted.gap, abs=1e-12)
+        assert rows.wrench == pytest.approx(wanted.wrench, abs=1e-11)
+        levers += len(rows.gap) - len(contacts.distance)
+        snapped += int((contacts.normal != found).any(axis=1).sum())
+    assert levers > 1000
+    assert snapped > 10
 
 
 def test_rows_are_between_the_joints_of_the_pieces(free_bodies):

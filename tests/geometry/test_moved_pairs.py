@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.geometry.moved_pairs import Placed, compiled_kernel, far_moved, far_moved_in_arrays
+from tests.reference import moved_pairs as reference
+from wholebody.geometry.moved_pairs import Placed, compiled_kernel, far_moved
 
 WITHIN = 0.05
 
@@ -37,13 +38,11 @@ def ways(scene, rng, count):
 
 
 def test_compiled_loops_find_the_pairs_that_array_code_finds(scene):
-    if compiled_kernel() is None:
-        pytest.skip("numba is not installed")
     found, kinds = 0, len(compiled_kernel().far_moved.signatures)
     for q0, q1 in ways(scene, np.random.default_rng(3), 60):
         before, after = placed(scene, q0), placed(scene, q1)
         mine = far_moved(scene.pair_table, before, after)
-        assert np.array_equal(mine, far_moved_in_arrays(scene.pair_table, before, after))
+        assert np.array_equal(mine, reference.far_moved(scene.pair_table, before, after))
         found += len(mine)
     assert found > 20
     assert len(compiled_kernel().far_moved.signatures) == kinds  # nothing was compiled in the middle

@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.needs import each
 from wholebody.bench.problem_sets.registry import SETS
 from wholebody.methods.contradictions import contradictions
 
@@ -79,7 +80,7 @@ def test_an_arm_without_joints_to_move():
     assert [entry.status for entry in found(problem)] == ["unreachable"]
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", each(METHODS))
 def test_every_method_names_both_sides(name):
     scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.5, 0.5, 0.5)), name="block", at=(0.0, 0.1, 0.1))

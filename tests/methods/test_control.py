@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from tests.needs import each
 from wholebody.methods.control import Control
 
 METHODS = {"qp": wb.QP, "ccd": wb.CCD, "newton": wb.Newton, "placo": wb.Placo, "dls": wb.DampedLeastSquares}
@@ -31,7 +32,7 @@ def reach():
     return wb.Problem(scene, goals=[wb.Point("right_index_tip", (2.0, -1.0, 1.5))], measures=[])
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", each(METHODS))
 def test_a_time_limit_ends_a_solve_with_the_best_so_far(reach, name):
     whole = METHODS[name]().solve(reach)
     began = time.monotonic()
@@ -44,7 +45,7 @@ def test_a_time_limit_ends_a_solve_with_the_best_so_far(reach, name):
     assert reach.scene.figure.within_limits(answer.q)
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", each(METHODS))
 def test_progress_sees_every_iteration_and_may_end_the_solve(reach, name):
     seen = []
 
@@ -59,7 +60,7 @@ def test_progress_sees_every_iteration_and_may_end_the_solve(reach, name):
     assert seen[-1] <= seen[0]
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", each(METHODS))
 def test_ctrl_c_answers_with_the_best_so_far(reach, name):
     calls = []
 

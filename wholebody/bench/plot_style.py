@@ -6,8 +6,6 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wholebody.errors import MissingPackageError
-
 COLORS = {
     "wholebody/osqp": "#0072b2",
     "wholebody/daqp": "#56b4e9",
@@ -70,15 +68,9 @@ PNG_DPI = 150
 
 
 def figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:
-    """Return an empty figure, inches, and its axes (rows, columns).
+    """Return an empty figure, inches, and its axes (rows, columns)."""
+    import matplotlib
 
-    Raises:
-        MissingPackageError: matplotlib is not installed.
-    """
-    try:
-        import matplotlib
-    except ImportError:
-        raise MissingPackageError("charts need matplotlib; install it with: pip install 'wholebody[charts]'") from None
     matplotlib.use("agg")
     from matplotlib import pyplot
 

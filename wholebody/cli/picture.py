@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,9 @@ from wholebody import files
 from wholebody.errors import InputError, MissingPackageError
 from wholebody.problem import Problem
 from wholebody.taskfile.task import View
-from wholebody.view import Viewer
+
+if TYPE_CHECKING:
+    from wholebody.view import Viewer
 
 
 def make_folder(folder: Path) -> None:
@@ -29,6 +31,8 @@ def make_folder(folder: Path) -> None:
 
 def viewer_of(problem: Problem, view: View, title: str, **served: Any) -> Viewer:
     """A viewer of the problem's scene, its camera as the task asks; `served` is the viewer's host and port."""
+    from wholebody.view import Viewer
+
     viewer = Viewer(problem.scene, see_through=view.see_through, title=title, **served)
     if view.eye is not None:
         viewer.look(view.eye, view.target)

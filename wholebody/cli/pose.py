@@ -58,26 +58,27 @@ def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False, dr
     Raises:
         WholebodyError: the task cannot be read, or the folder cannot be written to.
     """
-    from rich.console import Console
-
     from wholebody import files
-    from wholebody.cli import picture, result, tables
+    from wholebody.cli import picture, result
     from wholebody.methods.solve import method_named, solve
     from wholebody.taskfile import read_task
 
-    console = Console()
-    notes = Console(stderr=True) if as_json else console
     chosen = None if method is None else method_named(method)
-    with notes.status("reading the task"):
-        task = read_task(path)
+    task = read_task(path)
     picture.make_folder(out)
-    with notes.status("posing"):
-        solution = solve(task.problem, chosen or task.method)
+    solution = solve(task.problem, chosen or task.method)
     text = result.as_json(result.describe(task, solution, out))
     files.write(out / "result.json", text)
+
+    from rich.console import Console  # what only tables and pictures need comes after the answer is written
+
+    console = Console()
+    notes = Console(stderr=True) if as_json else console
     if as_json:
         print(text, end="")
     else:
+        from wholebody.cli import tables
+
         tables.show_solution(console, task, solution)
     with notes.status("drawing"):
         written, note = picture.draw(task.problem, solution.q, task.view, out, task.title, picture=draw)

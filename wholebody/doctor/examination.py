@@ -10,6 +10,7 @@ from typing import Literal
 
 from wholebody.doctor import packages, surroundings, trials
 from wholebody.doctor.packages import EXTRAS, MODULES, Distribution
+from wholebody.methods import EXTRAS as OF_METHODS
 
 State = Literal["works", "absent", "broken"]
 
@@ -127,7 +128,8 @@ def _methods() -> Iterator[Entry]:
         if outcome.works:
             yield Entry("method", name, "works", outcome.detail)
         else:
-            yield Entry("method", name, "broken", outcome.detail, mend=AGAIN)
+            mend = f"pip install --force-reinstall 'wholebody[{OF_METHODS[name]}]'" if name in OF_METHODS else AGAIN
+            yield Entry("method", name, "broken", outcome.detail, name not in OF_METHODS, mend)
 
 
 def _tools() -> Iterator[Entry]:

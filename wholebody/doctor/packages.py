@@ -11,13 +11,16 @@ from typing import NamedTuple
 MODULES = {
     "pin": "pinocchio",
     "coal": "coal",
-    "placo": "placo",
+    "numba": "numba",
     "numpy": "numpy",
     "scipy": "scipy",
     "qpsolvers": "qpsolvers",
     "osqp": "osqp",
     "daqp": "daqp",
     "meshcat": "meshcat",
+    "matplotlib": "matplotlib",
+    "joblib": "joblib",
+    "cloudpickle": "cloudpickle",
     "pillow": "PIL",
     "trimesh": "trimesh",
     "coacd": "coacd",
@@ -28,8 +31,7 @@ MODULES = {
 """What wholebody needs: distribution -> the module it brings."""
 
 EXTRAS = {
-    "matplotlib": "charts",
-    "numba": "fast",
+    "placo": "placo",
     "quadprog": "solvers",
     "proxsuite": "solvers",
     "piqp": "solvers",

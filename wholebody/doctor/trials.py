@@ -84,10 +84,10 @@ def use_tool(name: str) -> str:
 
 
 def list_methods(_: str) -> str:
-    """Names of the methods, separated by spaces."""
-    from wholebody.methods import METHODS
+    """Names of the methods whose packages are installed, separated by spaces."""
+    from wholebody.methods import installed_methods
 
-    return " ".join(METHODS)
+    return " ".join(installed_methods())
 
 
 TRIALS: dict[str, Callable[[str], str]] = {

@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 _PLACED = {"pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"}
 """Attributes that place a body; Pinocchio drops them of a first body that is fixed."""
+WORLD = "universe"
+"""Pinocchio's frame of the world, whose geoms it reads from 4.0 on."""
 
 
 def xml_figure(
@@ -60,16 +62,18 @@ def xml_figure(
     links = tuple(frame.name for frame in model.frames if frame.type == pin.FrameType.BODY)
     if not links:
         raise FileFormatError(f"{place}: there are no bodies in it; give an MJCF of a robot")
-    shapes = [_shape(model, piece, place) for piece in meshes.geometryObjects]
+    pieces = [piece for piece in meshes.geometryObjects if model.frames[piece.parentFrame].name != WORLD]
+    shapes = [_shape(model, piece, place) for piece in pieces]
     geometry, notes = geometry_of_links(model, shapes, check_concavity(concavity, links), place)
     name = outermost.get("model") or place.stem
     return robot_figure(name, model, links, geometry, (*_unread(outermost), *notes), samples, seed)
 
 
 def _read(path: Path, root: str | None) -> tuple[pin.Model, pin.GeometryModel]:
-    base = [pin.JointModelFreeFlyer()] if root == "free" else []
+    base = [pin.JointModelFreeFlyer(), ROOT_JOINT] if root == "free" else []
     try:
-        model = pin.buildModelFromMJCF(str(path), *base)
+        built = pin.buildModelFromMJCF(str(path), *base)
+        model = built[0] if isinstance(built, tuple) else built  # with its constraints, where the root has a name
         meshes = pin.buildGeomFromMJCF(model, str(path), pin.COLLISION)
     except Exception as error:  # boost's and Pinocchio's own, of several kinds
         reason = " ".join(str(error).split()).rpartition("message: ")[2]

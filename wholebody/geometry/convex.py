@@ -7,7 +7,6 @@ import pickle
 import subprocess
 import sys
 from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
 import numpy as np
@@ -137,6 +136,8 @@ def _decomposed(vertices: bytes, faces: bytes, max_vertices: int, threshold: flo
 
 def coacd_version() -> str:
     """Return the version of coacd that is installed, or "none"."""
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return version("coacd")
     except PackageNotFoundError:

@@ -1,20 +1,17 @@
-"""Which pairs moved by more than lay between them, as compiled loops: what `moved_pairs` does in array code.
-
-Needs numba (the extra "fast"), which compiles it at the first use and keeps the result beside this file. Both ways find
-the same pairs; the array code is the reference.
-"""
+"""Which pairs moved by more than lay between them, as compiled loops: see `moved_pairs`."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from wholebody.compiled import compiled
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled()
 def far_moved(
     before: Array,
     after: Array,
@@ -85,7 +82,7 @@ def far_moved(
     return found[:kept]
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _between(placements: Array, first: int, second: int) -> float:
     """Distance of two pieces' origins."""
     total = 0.0
@@ -94,7 +91,7 @@ def _between(placements: Array, first: int, second: int) -> float:
     return float(np.sqrt(total))
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _seen(before: Array, after: Array, carrier: int, other: int, reach: float, arc: float, endless: float) -> float:
     """Longest way that any point of a piece made in the axes of another one."""
     shift, turn = 0.0, 0.0

@@ -1,20 +1,17 @@
-"""Exact face normals and the ends of contact patches as compiled loops: what `ContactRowBuilder` does in array code.
-
-Needs numba (the extra "fast"), which compiles it at the first use and keeps the result beside this file. Both ways give
-the same rows to rounding; the array code is the reference.
-"""
+"""Exact face normals and the ends of contact patches, as compiled loops: see `contact_rows`."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from wholebody.compiled import compiled
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled()
 def snap_normals(
     wide: Indices,
     pair: Indices,
@@ -72,7 +69,7 @@ def snap_normals(
                     break
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled()
 def patch_ends(
     wide: Indices,
     pair: Indices,
@@ -192,7 +189,7 @@ def patch_ends(
     return contact[:filled], place[:filled], gap[:filled]
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled()
 def _farthest_first(place: Array, gap: Array, witness: Array, count: int) -> None:
     """Move `count` places of a contact to the front, with their gaps: each the farthest from those before it.
 

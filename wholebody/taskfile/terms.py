@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
+import wholebody
 from wholebody import tasks
-from wholebody.methods.ccd.method import CCD
-from wholebody.methods.damped_least_squares import DampedLeastSquares
 from wholebody.methods.inputs import BUDGET, CCD_TOLERANCE, DAMPING, ITERATIONS, RESTARTS, SEED, TOLERANCE, Range
-from wholebody.methods.newton.method import Newton
-from wholebody.methods.placo.method import Placo
-from wholebody.methods.qp.method import QP
 from wholebody.taskfile import kinds
 from wholebody.taskfile.kinds import DIRECTION, FRAME, PLACEMENT, POSITION, QUATERNION, WEIGHT, Number
 from wholebody.taskfile.tables import Form, Key
@@ -138,6 +137,12 @@ MEASURES = {
     "potential_energy": Form("Lifting and lowering of segments.", (_weight("1/J^2"),), tasks.PotentialEnergy),
 }
 
+
+def _later(name: str) -> Callable[..., Any]:
+    """A method by its public name, imported when one is made: nobody waits for the others."""
+    return lambda **settings: getattr(wholebody, name)(**settings)
+
+
 METHODS = {
     "qp": Form(
         "Sequential quadratic programming.",
@@ -151,7 +156,7 @@ METHODS = {
             Key("measures", kinds.Flag(), "whether the measures are to be least; false is faster, true if left out"),
             Key("time_limit", Number(1e-9, 1e9, "s"), "after which the best posture so far is the answer"),
         ),
-        QP,
+        _later("QP"),
     ),
     "ccd": Form(
         "Cyclic coordinate descent: points, frames and orientations, without measures.",
@@ -162,7 +167,7 @@ METHODS = {
             Key("seed", _number(SEED), "of those starts"),
             Key("time_limit", Number(1e-9, 1e9, "s"), "after which the best posture so far is the answer"),
         ),
-        CCD,
+        _later("CCD"),
     ),
     "newton": Form(
         "Sparse Newton in full coordinates; least effort.",
@@ -177,7 +182,7 @@ METHODS = {
             ),
             Key("time_limit", Number(1e-9, 1e9, "s"), "after which the best posture so far is the answer"),
         ),
-        Newton,
+        _later("Newton"),
     ),
     "placo": Form(
         "placo's differential inverse kinematics, iterated; to compare with.",
@@ -186,7 +191,7 @@ METHODS = {
             Key("iterations", _number(ITERATIONS), "most of them"),
             Key("time_limit", Number(1e-9, 1e9, "s"), "after which the best posture so far is the answer"),
         ),
-        Placo,
+        _later("Placo"),
     ),
     "dls": Form(
         "Damped least squares, the textbook baseline: it sees no contacts.",
@@ -196,6 +201,6 @@ METHODS = {
             Key("damping", _number(DAMPING), "left when the goals are met; 1e-3 if left out"),
             Key("time_limit", Number(1e-9, 1e9, "s"), "after which the best posture so far is the answer"),
         ),
-        DampedLeastSquares,
+        _later("DampedLeastSquares"),
     ),
 }

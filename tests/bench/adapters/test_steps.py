@@ -83,9 +83,10 @@ def test_unknown_and_missing_tools_are_named() -> None:
     with pytest.raises(UnknownNameError, match="placo"):
         chosen_tools(["plako"])
     assert all(differences(name) is not None for name in installed_tools())
-    if find_spec("mink") is None:
-        with pytest.raises(MissingPackageError, match="compare"):
-            chosen_tools(["mink"])
+    for name, extra in (("mink", "compare"), ("placo", "placo")):
+        if find_spec(name) is None:
+            with pytest.raises(MissingPackageError, match=extra):
+                chosen_tools([name])
 
 
 def test_mujoco_has_the_same_human(short_free: Track) -> None:

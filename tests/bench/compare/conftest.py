@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 @pytest.fixture(scope="session")
 def fakes() -> ModuleType:
     """Return the misbehaving methods, sent to other processes by their code, since they cannot import them."""
-    cloudpickle = pytest.importorskip("cloudpickle")
+    import cloudpickle
     import fakes
 
     cloudpickle.register_pickle_by_value(fakes)

@@ -7,9 +7,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("joblib")
-pytest.importorskip("matplotlib")
-
 from wholebody.bench.compare.record import Record
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import add_to

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 from types import ModuleType
 
-import pytest
-
-pytest.importorskip("joblib")
-
 from wholebody.bench.compare.jobs import Task, own_child, work
 
 

@@ -9,8 +9,6 @@ from types import ModuleType
 
 import pytest
 
-pytest.importorskip("matplotlib")
-
 from wholebody.bench.compare import publish as publishing
 from wholebody.bench.compare.charts import BAND, Point, lowest
 from wholebody.bench.compare.record import ANSWERED, OVERTIME, REFUSED, Record

@@ -13,8 +13,6 @@ from types import ModuleType
 
 import pytest
 
-pytest.importorskip("joblib")
-
 from wholebody.bench.compare.record import FAILED, OVERTIME, REFUSED, Record
 from wholebody.bench.compare.run import run
 from wholebody.bench.compare.settings import Settings

@@ -30,7 +30,6 @@ def bench(*words: str) -> int:
 
 
 def test_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("matplotlib")
     assert bench("--methods", *METHODS, "--cases", *CASES, "--jobs", "2", "--out", str(tmp_path)) == 0
     _, rows = read_rows(tmp_path / "stability.csv", StabilityRow)
     assert [(row.case, row.method) for row in rows] == [(case, method) for case in CASES for method in METHODS]

@@ -13,7 +13,7 @@ import wholebody as wb
 from wholebody.errors import InputError
 from wholebody.methods.placo.robot import Robot
 
-pytest.importorskip("placo")
+pytest.importorskip("placo", reason="placo is not installed (the extra placo)")
 
 
 @pytest.fixture(scope="module")

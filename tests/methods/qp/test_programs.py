@@ -8,14 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.reference import active_set as reference
 from wholebody import UnknownNameError
-from wholebody.methods.qp.active_set import (
-    compiled_kernel,
-    guess_active_set,
-    minimise_on_face,
-    solve_from,
-    solve_in_arrays,
-)
+from wholebody.methods.qp.active_set import guess_active_set, minimise_on_face, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 from wholebody.methods.qp.solvers.split_form import split
@@ -129,8 +124,6 @@ def test_active_set_method_needs_only_a_guess_that_is_near(random_program):
 
 @pytest.mark.parametrize("rows", [(4, 9), (0, 9), (4, 0), (0, 0), (30, 60)])
 def test_compiled_loops_correct_an_active_set_as_array_code_does(random_program, rows):
-    if compiled_kernel() is None:
-        pytest.skip("numba is not installed")
     rng = np.random.default_rng(21)
     settled = []
     for _ in range(60):
@@ -141,12 +134,12 @@ def test_compiled_loops_correct_an_active_set_as_array_code_does(random_program,
         guess = ActiveSet(*(rng.random(size) < 0.2 for size in (program.size, program.size, rows[1])))
         guess = guess._replace(upper=guess.upper & ~guess.lower)
         kept = ActiveSet(*(part.copy() for part in guess))
-        mine, reference = (way(program, guess, 60) for way in (solve_from, solve_in_arrays))
+        mine, wanted = (way(program, guess, 60) for way in (solve_from, reference.solve_from))
         assert kept.same(guess)
-        assert (mine is None) == (reference is None)
+        assert (mine is None) == (wanted is None)
         if mine is not None:
-            assert mine.x == pytest.approx(reference.x, abs=1e-9)
-            assert mine.active.same(reference.active)
+            assert mine.x == pytest.approx(wanted.x, abs=1e-9)
+            assert mine.active.same(wanted.active)
             assert program.optimality(mine.x) < 1e-7
         settled.append(mine is not None)
     assert any(settled)

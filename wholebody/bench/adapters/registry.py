@@ -87,7 +87,7 @@ def _rows() -> dict[str, _Row]:
         rows[f"newton/{way}"] = _Row(partial(newton_adapter, way))
     rows["ccd"] = _Row(ccd_adapter)
     rows["dls"] = _Row(dls_adapter)
-    rows["placo"] = _Row(partial(_outside, "placo"), ("placo",), "compare")
+    rows["placo"] = _Row(partial(_outside, "placo"), ("placo",), "placo")
     rows["pink"] = _Row(partial(_outside, "pink"), ("pink", "daqp"), "compare")
     rows["mink"] = _Row(partial(_outside, "mink"), ("mink", "mujoco", "daqp"), "compare")
     return rows
@@ -122,7 +122,8 @@ def chosen_tools(names: Iterable[str] | None) -> tuple[str, ...]:
         if name not in STEPPING:
             raise UnknownNameError("tool", name, STEPPING)
         if name not in installed_tools():
-            raise MissingPackageError(f"{name} is not installed; install it with: pip install 'wholebody[compare]'")
+            extra = "placo" if name == "placo" else "compare"
+            raise MissingPackageError(f"{name} is not installed; install it with: pip install 'wholebody[{extra}]'")
     return chosen
 
 

@@ -130,10 +130,11 @@ def _prepare() -> None:
     """Bound the memory of this process; compile and import what cases need, so that none is timed with it."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     import wholebody as wb
+    from wholebody.methods import installed_methods
 
     scene = wb.Scene(wb.load("avatar")).add(wb.HalfSpace(), name="floor")
     problem = wb.Problem(scene, goals=[wb.Point(scene.figure.frames[0], (0.3, 0.0, 1.0))])
-    for method in ("qp", "ccd", "newton", "placo", "dls"):
+    for method in installed_methods():
         wb.solve(problem, method=method)
     scene.sweep(problem.start, scene.figure.neutral)
 

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from wholebody.bench.attack.bodies import Body, body
 from wholebody.bench.attack.case import Written
 from wholebody.bench.attack.things import Placed, Thing, clear, inside, seven
+from wholebody.methods import installed_methods
 
 Array = NDArray[np.float64]
 
 CLEARANCES = (0.0, 0.0, 0.001, 0.005, 0.005, 0.05, 0.3)
-METHODS = ("'qp'",) * 12 + (
-    "wb.QP(tolerance=1e-8)", "wb.QP(measures=False)", "wb.QP(solver='daqp')", "'ccd'", "'newton'", "'placo'", "'dls'",
-)  # fmt: skip
+METHODS = (*("'qp'",) * 12, "wb.QP(tolerance=1e-8)", "wb.QP(measures=False)", "wb.QP(solver='daqp')") + tuple(
+    f"'{name}'" for name in installed_methods() if name != "qp"
+)
 MEASURES = (
     "None", "None", "None", "[]", "[wb.Effort(), wb.Discomfort(weight=0.1)]", "[wb.Displacement()]",
     "[wb.PotentialEnergy(weight=0.01)]", "[wb.Discomfort()]",

@@ -141,13 +141,11 @@ def compute(tasks: Iterator[Task], jobs: int, cluster: str | None = None) -> Ite
         cluster: address of a dask scheduler; processes of this machine where None.
 
     Raises:
-        MissingPackageError: joblib or dask is not installed.
+        MissingPackageError: dask is not installed.
         WholebodyError: the cluster does not answer.
     """
-    try:
-        import joblib
-    except ImportError:
-        raise MissingPackageError("comparing needs joblib; install it with: pip install 'wholebody[charts]'") from None
+    import joblib
+
     with ExitStack() as stack:
         if cluster is not None:
             stack.enter_context(_client(cluster))

@@ -40,7 +40,6 @@ def publish(
 
     Raises:
         FileFormatError: the documentation has no place for it.
-        MissingPackageError: matplotlib is not installed.
     """
     given = report.material(settings, store.chunks, facts, missing)
     write_rows(folder / "solves.csv", facts, store.records)

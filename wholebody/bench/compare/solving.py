@@ -18,6 +18,7 @@ from wholebody.assessment import Assessment, assess
 from wholebody.bench.adapters.base import Adapter, Budget, set_up
 from wholebody.bench.compare.record import ANSWERED, DEFAULT, FAILED, REFUSED, Record
 from wholebody.bench.problem_sets.case import Case, ProblemSet
+from wholebody.compiled import compile_all
 from wholebody.errors import WholebodyError
 from wholebody.problem import Problem
 from wholebody.runner import allow
@@ -100,11 +101,7 @@ def _ready(which: Which) -> Ready:
 
 def ready(family: ProblemSet, number: int, seed: int) -> Ready:
     """Build a case; what is built at first use by whoever asks first is built here, in nobody's time."""
-    from wholebody.methods.newton.linear_algebra import gram
-    from wholebody.methods.qp import active_set
-
-    for module in (active_set, gram):
-        module.compiled_kernel()  # seconds at the first time on a machine, more than the quick comparison gives a solve
+    compile_all()  # seconds at the first time on a machine, more than the quick comparison gives a solve
     case = family.make(number, seed)
     with case.problem.lend():  # room that the solves below use again
         pass

@@ -50,12 +50,16 @@ class Robot:
 
         Raises:
             InputError: placo has no joint of a kind that the figure has.
-            MissingPackageError: placo is not installed.
+            MissingPackageError: placo is not installed, or was built for another Pinocchio.
         """
         try:
             import placo
-        except ImportError:
-            raise MissingPackageError("placo is not installed; install it with: pip install placo") from None
+        except ModuleNotFoundError:
+            raise MissingPackageError("placo is not installed; install: pip install 'wholebody[placo]'") from None
+        except ImportError as error:
+            raise MissingPackageError(
+                f"placo cannot be imported ({error}); install what it was built for: pip install 'wholebody[placo]'"
+            ) from None
         figure = problem.scene.figure
         self.frames, self._root = dict(frames), figure.root
         self._clearances = problem.clearances.copy()

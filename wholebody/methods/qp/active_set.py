@@ -18,10 +18,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import qr_multiply, solve_triangular
-from scipy.linalg.lapack import dposv
 
-from wholebody.compiled import compiled_module
 from wholebody.methods.qp.quadratic_program import ActiveSet, Array, Mask, QPSolution, QuadraticProgram
 
 BOUND_TOLERANCE = 1e-11  # rad, m: an x this far outside its box counts as inside
@@ -61,43 +58,24 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
         ValueError: the sizes of the program or of the guess do not fit together.
     """
     program.check_shapes(guess)
-    kernel = compiled_kernel()
-    if kernel is None:
-        return solve_in_arrays(program, guess, corrections)
     x = np.empty(program.size)
     active = ActiveSet(guess.lower.copy(), guess.upper.copy(), guess.elastic.copy())
     parts = (
         program.diagonal, program.linear, program.rows, program.target, program.weight, program.elastic, program.least,
         program.elastic_weight, program.lower, program.upper,
     )  # fmt: skip
-    settled = kernel.settle(
+    settled = compiled_kernel().settle(
         *map(np.ascontiguousarray, parts), *active, corrections, FULL_CORRECTIONS, BOUND_TOLERANCE, ROW_TOLERANCE, x
     )
     return QPSolution(x, active, True, 0) if settled else None
 
 
-def solve_in_arrays(program: QuadraticProgram, guess: ActiveSet, corrections: int) -> QPSolution | None:
-    """`solve_from` in array code, which takes four times as long: for machines without numba."""
-    active = guess
-    for attempt in range(corrections):
-        point = minimise_on_face(program, active)
-        if point is None:
-            return None
-        following = _corrected(program, active, point)
-        if following.same(active):
-            return QPSolution(np.clip(point.x, program.lower, program.upper), active, True, 0)
-        active = following if attempt < FULL_CORRECTIONS else _worst_corrected(program, active, following, point)
-    return None
-
-
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
-    """The module of compiled loops where numba is installed (the extra "fast"), else None."""
-    active_set_kernel = compiled_module("wholebody.methods.qp.active_set_kernel")
-    if active_set_kernel is None:
-        return None
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody.methods.qp import active_set_kernel
+
     none, one, mask = np.zeros(0), np.ones(1), np.zeros(1, dtype=bool)
-    # compiled, or read back: here, and not in the middle of a solve
     active_set_kernel.settle(
         one, one, np.zeros((0, 1)), none, none, np.zeros((0, 1)), none, none, -one, one, mask, mask.copy(),
         np.zeros(0, dtype=bool), 1, 1, BOUND_TOLERANCE, ROW_TOLERANCE, np.zeros(1),
@@ -118,6 +96,8 @@ def minimise_on_face(program: QuadraticProgram, active: ActiveSet) -> FacePoint 
 
     Signs are read off the multipliers: weight times residual would drown them in rounding where weights are large.
     """
+    from scipy.linalg.lapack import dposv
+
     rows = np.vstack([program.rows, program.elastic[active.elastic]])
     target = np.concatenate([program.target, program.least[active.elastic]])
     weight = np.concatenate([program.weight, program.elastic_weight[active.elastic]])
@@ -149,6 +129,8 @@ def _in_columns(program: QuadraticProgram, rows: Array, target: Array, weight: A
     They minimise |W^1/2 (A x - b)|^2 + |D^1/2 x + D^-1/2 g|^2. The rows stand in the order of their weights, for which
     Householder's QR is stable row by row (Cox and Higham 1998).
     """
+    from scipy.linalg import qr_multiply, solve_triangular
+
     if not free.any():
         return np.zeros(0)
     heavy = np.argsort(-weight, kind="stable")
@@ -158,28 +140,3 @@ def _in_columns(program: QuadraticProgram, rows: Array, target: Array, weight: A
     turned, factor = qr_multiply(table, right, mode="right")
     result: Array = solve_triangular(factor, turned)
     return result
-
-
-def _corrected(program: QuadraticProgram, active: ActiveSet, point: FacePoint) -> ActiveSet:
-    """The set with wrong signs put right."""
-    x, gradient = point.x, point.gradient
-    elastic = program.elastic @ x < program.least - ROW_TOLERANCE
-    elastic[active.elastic] = point.push >= 0.0
-    lower = np.where(active.lower, gradient >= 0.0, x < program.lower - BOUND_TOLERANCE)
-    upper = np.where(active.upper, gradient <= 0.0, x > program.upper + BOUND_TOLERANCE)
-    return ActiveSet(lower, upper, elastic)
-
-
-def _worst_corrected(program: QuadraticProgram, active: ActiveSet, following: ActiveSet, point: FacePoint) -> ActiveSet:
-    """The active set with the one entry changed that is most wrong, in units of x."""
-    pull = np.abs(point.gradient) / program.diagonal
-    wrong_low = np.where(active.lower, pull, program.lower - point.x) * (following.lower != active.lower)
-    wrong_high = np.where(active.upper, pull, point.x - program.upper) * (following.upper != active.upper)
-    lack = program.least - program.elastic @ point.x
-    lack[active.elastic] = -point.push * (program.elastic[active.elastic] ** 2 @ (1.0 / program.diagonal))
-    wrong = np.concatenate([wrong_low, wrong_high, lack * (following.elastic != active.elastic)])
-    worst = int(np.argmax(wrong))
-    flat = np.concatenate([active.lower, active.upper, active.elastic])
-    flat[worst] = not flat[worst]
-    size = program.size
-    return ActiveSet(flat[:size], flat[size : 2 * size], flat[2 * size :])

@@ -1,20 +1,17 @@
-"""The correcting of an active set as compiled loops: what `active_set` does in array code, at a quarter of the time.
-
-Needs numba (the extra "fast"), which compiles it at the first use and keeps the result beside this file. Both ways give
-the same answers to rounding, as far as the program is well conditioned; the array code is the reference.
-"""
+"""The correcting of an active set, as compiled loops: see `active_set`."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from wholebody.compiled import compiled
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@compiled(error_model="numpy")
 def settle(
     diagonal: Array,
     linear: Array,
@@ -138,7 +135,7 @@ def settle(
     return False
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@compiled(error_model="numpy")
 def _minimise_in_columns(
     stacked: Array,
     right: Array,
@@ -223,7 +220,7 @@ def _minimise_in_columns(
         multiplier[r] = total / compliance[r]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})  # type: ignore[untyped-decorator]
+@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
 def _solve(system: Array, right: Array) -> bool:
     """Solve a symmetric positive definite system in place by Cholesky's L L'; false where it is not one."""
     size = len(right)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.compiled import compiled_module
 from wholebody.methods.newton.linear_algebra.base import Indices, Pattern
 
 Array = NDArray[np.float64]
@@ -37,42 +36,29 @@ class Gram:
         inner = (places % max(pattern.height, 1)).astype(np.int32)
         self.matrix = csc_matrix((np.zeros(len(places)), inner, pointer), shape=shape)
         order = np.argsort(index[: len(first)], kind="stable")
-        self._first, self._second = first[order], second[order]
-        self._target = index[: len(first)][order]
+        target = index[: len(first)][order]
+        filled = np.unique(target)
+        starts = np.append(np.searchsorted(target, filled), len(first))
         self._diagonal = index[len(first) :]
-        self._products, self._factors = np.empty(len(first)), np.empty(len(first))  # kept: fresh ones cost page faults
-        filled = np.unique(self._target)
-        self._filled = filled
-        self._starts = np.searchsorted(self._target, filled)
         self._kernel = compiled_kernel()
-        if self._kernel is not None:
-            ends = np.append(self._starts, len(first))
-            listed = (self._first, self._second, ends, filled)
-            self._places = tuple(part.astype(np.int32) for part in listed)
+        listed = (first[order], second[order], starts, filled)
+        self._places = tuple(part.astype(np.int32) for part in listed)
 
     def refill(self, values: Array, weight: Array, damping: Array) -> None:
         """Compute the matrix for values (nnz,) of J, diagonals D and M."""
         scaled = values / weight[self.pattern.columns]
         data = self.matrix.data
         data[:] = 0.0
-        if self._kernel is not None:
-            self._kernel.sum_products(scaled, values, *self._places, data)
-        elif len(self._first):
-            np.take(scaled, self._first, out=self._products)
-            np.take(values, self._second, out=self._factors)
-            self._products *= self._factors
-            data[self._filled] = np.add.reduceat(self._products, self._starts)
+        self._kernel.sum_products(scaled, values, *self._places, data)
         data[self._diagonal] += damping
 
 
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
-    """The module of compiled loops where numba is installed (the extra "fast"), else None."""
-    gram_kernel = compiled_module("wholebody.methods.newton.linear_algebra.gram_kernel")
-    if gram_kernel is None:
-        return None
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody.methods.newton.linear_algebra import gram_kernel
+
     none, places = np.zeros(0), np.zeros(0, dtype=np.int32)
-    # compiled, or read back: here, and not in the middle of a solve
     gram_kernel.sum_products(none, none, places, places, np.zeros(1, dtype=np.int32), places, none)
     return gram_kernel
 

@@ -1,20 +1,17 @@
-"""The products of J D^-1 J' as a compiled loop: what `Gram` does in array code, without the arrays of products.
-
-Needs numba (the extra "fast"), which compiles it at the first use and keeps the result beside this file. Both ways give
-the same sums to rounding; the array code is the reference.
-"""
+"""The products of J D^-1 J', as a compiled loop: see `gram`."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from wholebody.compiled import compiled
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int32]
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled()
 def sum_products(
     scaled: Array, values: Array, first: Places, second: Places, starts: Places, filled: Places, data: Array
 ) -> None:

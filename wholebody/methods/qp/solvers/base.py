@@ -40,6 +40,10 @@ class QPSolver(ABC):
             return last_resort(program, np.zeros(program.size), 0, self.name)
         return self.solve_cold(program)
 
+    def load(self) -> None:
+        """Import what `solve_cold` needs, for those who cannot wait for it later: most programs are closed without."""
+        return
+
     @abstractmethod
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise without a guess; what `solve` falls back on."""

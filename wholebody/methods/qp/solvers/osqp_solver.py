@@ -5,9 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import osqp
 from numpy.typing import NDArray
-from scipy import sparse
 
 from wholebody.methods.qp.quadratic_program import Array, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
@@ -34,6 +32,10 @@ class OSQPSolver(QPSolver):
         """Begin without a workspace."""
         self._workspace: _Workspace | None = None
 
+    def load(self) -> None:
+        """Import OSQP."""
+        import osqp  # noqa: F401
+
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise; see `QPSolver.solve_cold`."""
         if self._workspace is None or not self._workspace.fits(program):
@@ -53,6 +55,9 @@ class _Workspace:
     """One OSQP workspace: a fixed pattern of soft rows and a fixed number of dense slots for elastic rows."""
 
     def __init__(self, program: QuadraticProgram, before: _Workspace | None) -> None:
+        import osqp
+        from scipy import sparse
+
         n, m = program.size, len(program.target)
         self.n, self.m = n, m
         self.slots = SLOTS * -(-max(len(program.least), 1) // SLOTS)
