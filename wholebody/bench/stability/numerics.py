@@ -183,7 +183,6 @@ class QPLimit(HardCase):
 
 def unfinished(method: Any) -> Any:
     """The method with quadratic programs that `Unfinished` solves; one without any gets one iteration itself."""
-    from wholebody.bench.stability.numerics import UnfinishedQP
     from wholebody.methods.qp.method import QP
 
     if isinstance(method, QP):
