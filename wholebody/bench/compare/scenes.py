@@ -11,10 +11,10 @@ from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.front import OURS
 from wholebody.bench.compare.record import COARSE, DEFAULT, Record
 from wholebody.bench.compare.results import Results
-from wholebody.bench.compare.solving import BUILDING, Ready, Which, drawn
+from wholebody.bench.compare.solving import BUILDING, Ready, Which, case_of
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.files import Scratch
-from wholebody.runner import ONE_THREAD, Child, EndedError
+from wholebody.runner import ONE_THREAD, Child, EndedError, allow
 
 OPENING = '<script id="picture" type="application/octet-stream">'
 CLOSING = "</script>"
@@ -53,6 +53,13 @@ def draw(
     finally:
         child.close()
     return scenes
+
+
+def drawn(which: Which, good: Adapter, bad: Adapter, cap: float) -> str:
+    """HTML of a case with two answers; a job of a process of its own."""
+    made = case_of(which)
+    allow(2.0 * cap)
+    return page(good, bad, made)
 
 
 def page(good: Adapter, bad: Adapter, made: Ready) -> str:

@@ -1,6 +1,6 @@
 """One solve of one case, timed, and judged by `assess` alone.
 
-`built`, `warmed`, `solved` and `drawn` are jobs of a process of `wholebody.runner`, which keeps the last case and knows
+`built`, `warmed` and `solved` are jobs of a process of `wholebody.runner`, which keeps the last case and knows
 which methods have run in it.
 """
 
@@ -56,7 +56,7 @@ _warm: set[tuple[str, bool]] = set()  # methods that have run in this process, o
 def built(which: Which) -> str | None:
     """Build a case; return what went wrong, if anything."""
     try:
-        _ready(which)
+        case_of(which)
     except Exception as error:
         return f"{type(error).__name__}: {sentence(error)}"
     return None
@@ -64,7 +64,7 @@ def built(which: Which) -> str | None:
 
 def warmed(which: Which, adapter: Adapter, cap: float) -> None:
     """Let a method import and compile what it needs, before it is timed for the first time in this process."""
-    made = _ready(which)
+    made = case_of(which)
     key = (adapter.name, bool(made.case.frames))
     if key not in _warm:
         _warm.add(key)
@@ -75,21 +75,13 @@ def warmed(which: Which, adapter: Adapter, cap: float) -> None:
 def solved(which: Which, adapter: Adapter, level: Budget, cap: float) -> Record:
     """Solve a case; the process ends where that takes longer than it may."""
     warmed(which, adapter, cap)
-    made = _ready(which)
+    made = case_of(which)
     allow(max(cap, FRAME_CAP * len(made.case.frames)))
     return solve(adapter, level, made)
 
 
-def drawn(which: Which, good: Adapter, bad: Adapter, cap: float) -> str:
-    """HTML of a case: the answer of one method solid, that of the other transparent."""
-    from wholebody.bench.compare.scenes import page
-
-    made = _ready(which)
-    allow(2.0 * cap)
-    return page(good, bad, made)
-
-
-def _ready(which: Which) -> Ready:
+def case_of(which: Which) -> Ready:
+    """The case, built where it is not the last one of this process."""
     key = (which.family.name, which.number, which.seed)
     if key not in _kept:
         _kept.clear()
