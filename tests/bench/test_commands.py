@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.bench import style
+from wholebody.bench import plot_style
+from wholebody.bench.adapters import STEPPING
 from wholebody.bench.reaches import ReachRow
 from wholebody.bench.solve import MemoryRow, SolveRow
 from wholebody.bench.step import StepRow, StepTime
 from wholebody.bench.tables import read_rows
-from wholebody.bench.tools import NEEDS
 from wholebody.bench.track import VARIANTS
 from wholebody.cli.bench import add_to
 
@@ -92,13 +92,9 @@ def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
 
 
 def test_every_tool_has_a_colour_of_its_own() -> None:
-    assert set(NEEDS) <= set(style.COLORS)
-    assert set(style.MARKERS) <= set(style.COLORS)
-    twice = {"wholebody/osqp": "qp/osqp", "wholebody/daqp": "qp/daqp"}  # the same method in another chart
-    for tool, method in twice.items():
-        assert style.COLORS[tool] == style.COLORS[method]
-    assert len(set(style.COLORS.values())) == len(style.COLORS) - len(twice)
-    assert len(set(style.MARKERS.values())) == len(style.MARKERS)
+    assert set(STEPPING) <= set(plot_style.COLORS)
+    assert plot_style.look("qp/osqp").color == plot_style.COLORS["wholebody/osqp"]  # the same method in another chart
+    assert len(set(plot_style.COLORS.values())) == len(plot_style.COLORS)
 
 
 @pytest.mark.parametrize("words", [("step", "--repeats", "0"), ("reaches", "--count", "0"), ("solve", "--count", "-1")])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench import detail, detail_report
+from wholebody.bench import detail
 from wholebody.bench.chains import TIP, chain, task
 from wholebody.bench.detail import LEVELS, DetailRow
 from wholebody.bench.problem_sets import clutter
@@ -24,13 +24,13 @@ ROW = DetailRow("clutter", 0, "hulls", "all", 55, 700, "solved", 10.0, 2.0, 0.0,
 def test_errors_count_where_a_model_calls_its_answer_solved() -> None:
     wrong = replace(ROW, case=1, status="unreachable", penetration_mm=5.0, above=float("nan"))
     deep = replace(ROW, case=2, penetration_mm=0.3, above=0.2, solve_ms=30.0)
-    (one,) = detail_report.summaries([ROW, wrong, deep])
+    (one,) = detail.summaries([ROW, wrong, deep])
     assert (one.cases, one.solved, one.inside) == (3, 2, 1)
     assert one.worst_penetration_mm == 0.3
     assert one.solve_ms == 10.0
     assert one.above == pytest.approx(0.1)
     assert one.worst_above == pytest.approx(0.2)
-    assert "| 2 of 3 |" in detail_report.report([ROW, wrong, deep], ["spheres: not asked"], {"wholebody": "1"})
+    assert "| 2 of 3 |" in detail.report([ROW, wrong, deep], ["spheres: not asked"], {"wholebody": "1"})
 
 
 def test_levels_are_judged_in_the_finest_model() -> None:

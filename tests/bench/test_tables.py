@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from wholebody.bench.machine import machine, sentence
 from wholebody.bench.step import StepRow, goal_lines
-from wholebody.bench.tables import markdown, read_rows, replace_section, write_rows
+from wholebody.bench.tables import read_rows, replace_section, write_rows
 from wholebody.errors import FileFormatError
 
 PAGE = "# Results\n\nbefore\n\n<!-- bench:step -->\nold\n<!-- /bench:step -->\n\nafter\n"
@@ -68,12 +68,6 @@ def test_a_section_is_replaced_and_the_rest_of_the_page_stays(tmp_path: Path) ->
     assert page.read_text() == once
     with pytest.raises(FileFormatError, match="no such page"):
         replace_section(tmp_path / "none.md", "step", "new")
-
-
-def test_a_table_has_a_cell_for_every_column() -> None:
-    table = markdown(["tool", "a", "b"], [("x", "1", "2"), ("y", "3", "")])
-    assert table.splitlines()[1] == "| --- | ---: | ---: |"
-    assert {line.count("|") for line in table.splitlines()} == {4}
 
 
 def test_the_machine_is_described() -> None:

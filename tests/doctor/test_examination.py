@@ -67,7 +67,7 @@ def test_what_is_absent_but_not_needed_is_no_fault_and_says_how_it_is_had(fake: 
         ),
         ({"fails": {"coal": "ImportError: undefined symbol"}}, {}, "undefined symbol", examination.AGAIN),
         ({"absent": ["coal"]}, {}, "the package coal is absent", examination.AGAIN),
-        ({"fails": {"osqp": "ended the process (code -11)"}}, {}, "code -11", examination.AGAIN),
+        ({"fails": {"osqp": "ended the process (SIGSEGV)"}}, {}, "SIGSEGV", examination.AGAIN),
         ({"fails": {"qp": "ArithmeticError: a reach of 5 cm ended stalled"}}, {}, "stalled", examination.AGAIN),
         ({"fails": {"": "ImportError: no pinocchio"}}, {}, "no pinocchio", examination.AGAIN),
         (

@@ -17,7 +17,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.interaction.judging import overlaps
+from wholebody.motion_assessment import assess_motion
 
 Example = Callable[[str], ModuleType]
 
@@ -219,7 +219,7 @@ def test_a_person_is_dragged_down_onto_a_chair(example: Example, tmp_path: Path,
     for dragged in drags.values():
         assert dragged.end.status == "solved"
         assert dragged.end.assessment.met(1e-5)
-        depth, _ = overlaps(problem.scene, dragged.q)
+        depth = assess_motion(problem.scene, dragged.q, dragged.dt).depth
         assert depth.max() < 1e-4
         lowest = np.inf
         for number, q in enumerate(dragged.q):

@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.interaction import SCENES, Recording, build_scene, follow, gallery, judge
-from wholebody.interaction.judging import overlaps
+from wholebody.motion_assessment import assess_motion
 from wholebody.tasks import ReachCones
 
 BEFORE, AFTER = 8, 32
@@ -23,7 +23,7 @@ def test_the_shown_figure_stays_outside(name: str, overlap: str, allowed: float,
     scene, track = made.scene, made.track
     assert len(track) >= 600
     coarse = np.arange(0, len(track), 6)
-    first = int(coarse[np.argmax(overlaps(scene, track.q[coarse])[0] > 5e-3)])
+    first = int(coarse[np.argmax(assess_motion(scene, track.q[coarse], 1.0).depth > 5e-3)])
     part = track.part(first - BEFORE, first + AFTER)
     recording = follow(scene, part, overlap=overlap, rigid=made.rigid)
     assert min(least(scene, q) for q in part.q) < -0.01  # the tracked one goes in

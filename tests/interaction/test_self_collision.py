@@ -12,7 +12,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.interaction import Track, follow
-from wholebody.interaction.judging import overlaps
+from wholebody.motion_assessment import assess_motion
 
 ALONG, ACROSS = 41, 9  # points on a capsule's axis, and along each edge of a box
 
@@ -79,6 +79,8 @@ def test_no_limb_enters_the_body(avatar: wb.Figure, limbs: Callable[..., Any], o
     tracked = [*tracked, *[inside] * 5, *tracked[::-1], *[back] * 30]
     recording = follow(scene, Track.of(avatar, tracked, 1 / 60), overlap=overlap)
     assert sampled_depth(scene, inside) > 0.02
-    assert sampled_depth(scene, inside) == pytest.approx(overlaps(scene, np.array([inside]))[0][0], rel=0.25)
+    assert sampled_depth(scene, inside) == pytest.approx(
+        assess_motion(scene, np.array([inside]), 1.0).depth[0], rel=0.25
+    )
     assert max(sampled_depth(scene, q) for q in recording.q[::3]) < allowed
     assert np.abs(pin.difference(avatar.model, recording.q[-1], back)).max() < 1e-3

@@ -10,8 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.bench.drag import DragFrameRow, DragRow, drag_frames, drag_summary
-from wholebody.bench.machine import sentence
-from wholebody.bench.tables import markdown
+from wholebody.bench.report import render
 from wholebody.interaction.dragging import Dragged, drag_along, judge_drag, present_place
 from wholebody.interaction.paths import read_path, spread
 from wholebody.problem import Problem
@@ -20,12 +19,6 @@ from wholebody.taskfile import read_task
 TASK = "sit_on_chair"
 METHODS = ("newton", "qp")
 FRAMES = 240
-
-COLUMNS = (
-    "method", "frames", "ms/frame, mean", "p95", "max", "CPU ms/frame", "iterations/frame", "deepest in a posture mm",
-    "between postures mm", "pelvis over the seat mm", "thorax to backrest mm", "feet drift mm",
-    "pelvis off its place mm", "end",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -78,24 +71,7 @@ def measure(
 
 def report(rows: Sequence[ChallengeRow], facts: Mapping[str, str]) -> str:
     """The table as Markdown."""
-    cells = [
-        (
-            row.method, str(row.frames), f"{row.mean_ms:.2f}", f"{row.p95_ms:.2f}", f"{row.max_ms:.1f}",
-            f"{row.cpu_mean_ms:.2f}", f"{row.iterations:.1f}", f"{row.depth_mm:.4f}", f"{row.between_mm:.2g}",
-            f"{row.seat_mm:.2f}", f"{row.back_mm:.2f}", f"{row.feet_mm:.3f}", f"{row.left_mm:.1e}", row.status,
-        )
-        for row in rows
-    ]  # fmt: skip
-    return "\n\n".join(
-        [
-            markdown(COLUMNS, cells),
-            "Penetration is judged by coal over every pair of pieces in every posture; between postures stands a "
-            "bound, found by a continuous sweep, on how much deeper any pair gets on the way than at its deeper end. "
-            "The goal goes 20 mm into the seat and 10 mm towards the backrest before its place; distances are those "
-            "of the last posture.",
-            sentence(facts),
-        ]
-    )
+    return render("challenge.md", rows=rows, facts=facts)
 
 
 def _row(problem: Problem, dragged: Dragged, row: DragRow) -> ChallengeRow:

@@ -8,21 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from wholebody.bench import style
-from wholebody.bench.machine import sentence
-from wholebody.bench.tables import markdown
+from wholebody.bench import plot_style
+from wholebody.bench.report import render
 from wholebody.interaction.dragging import Dragged, DragJudgement
 
 ALLOWED = 1e-3  # m: of overlap, in a frame and on the way to the next
 
 COLORS = {"newton": "#d55e00", "qp": "#0072b2", "ccd": "#009e73"}
 """By the first part of a method's name; Okabe and Ito's."""
-
-COLUMNS = (
-    "task", "method", "frames", "frame ms, mean", "p95", "max", "CPU mean", "iterations/frame",
-    "left to the goal mm, mean", "max", "at the end", "deepest in a frame mm", "between frames mm",
-    "beyond limits rad", "holds off mm", "jerk, median", "end",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -76,7 +69,7 @@ class DragRow:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """The row as text, in the order of `COLUMNS`."""
+        """The row as text, in the order of the table's columns."""
         between = f"{self.between_mm:.2g}" if np.isfinite(self.between_mm) else "passes"
         return (
             self.task, self.method, str(self.frames), f"{self.mean_ms:.2f}", f"{self.p95_ms:.2f}",
@@ -130,22 +123,12 @@ def drag_frames(task: str, dragged: Dragged, judged: DragJudgement) -> list[Drag
 
 def drag_report(rows: Sequence[DragRow], facts: Mapping[str, str]) -> str:
     """The table as Markdown."""
-    return "\n\n".join(
-        [
-            markdown(COLUMNS, [row.cells for row in rows]),
-            "Left to the goal is the distance of what is dragged to where the goal is in that frame (its angle, in "
-            "mrad, where that is more). Depths are found by coal over every pair of pieces; between frames stands a "
-            "bound, found by a continuous sweep, on how much deeper any pair gets on the way than at its deeper end. "
-            "Jerk is the third difference of the joint angles, rad/s³; CPU is the time that the processor worked on a "
-            "frame; holds are in mm or mrad.",
-            sentence(facts),
-        ]
-    )
+    return render("drag.md", rows=rows, facts=facts)
 
 
 def drag_chart(drags: Mapping[str, Sequence[DragFrameRow]], path: Path) -> tuple[Path, Path]:
     """Frame time and what is left to the goal over the frames, of one method or several."""
-    chart, axes = style.figure(2, 1, (7.6, 4.8))
+    chart, axes = plot_style.figure(2, 1, (7.6, 4.8))
     above, below = axes[0][0], axes[1][0]
     for method, rows in drags.items():
         frame = [row.frame for row in rows]
@@ -163,4 +146,4 @@ def drag_chart(drags: Mapping[str, Sequence[DragFrameRow]], path: Path) -> tuple
     below.set_xlabel("frame")
     for axis in (above, below):
         axis.set_xlim(0, max(len(first) - 1, 1))
-    return style.save(chart, path)
+    return plot_style.save(chart, path)

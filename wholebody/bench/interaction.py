@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wholebody.bench import style
-from wholebody.bench.machine import sentence
-from wholebody.bench.tables import markdown
+from wholebody.bench import plot_style
+from wholebody.bench.report import render
 from wholebody.interaction.judging import IN_TIME, Judgement
 from wholebody.interaction.recording import Recording
 
@@ -159,7 +158,7 @@ def frame_rows(scene: str, recording: Recording, judged: Judgement) -> list[Fram
 
 def frame_chart(rows: Sequence[FrameRow], path: Path) -> tuple[Path, Path]:
     """Frame time over frames, as figures 7 and 8 of the paper; shaded where the tracked posture overlaps."""
-    chart, axes = style.figure(2, 1, (7.6, 4.4))
+    chart, axes = plot_style.figure(2, 1, (7.6, 4.4))
     frame = np.array([row.frame for row in rows])
     time = np.array([row.milliseconds for row in rows])
     above, below = axes[0][0], axes[1][0]
@@ -168,7 +167,7 @@ def frame_chart(rows: Sequence[FrameRow], path: Path) -> tuple[Path, Path]:
         axis.fill_between(frame, 0.0, 1.0, where=touching, step="mid", transform=axis.get_xaxis_transform(),
                           color="#e6eef5", linewidth=0.0)  # fmt: skip
         axis.set_xlim(0, max(len(rows) - 1, 1))
-    above.plot(frame, time, color=style.COLORS["wholebody/osqp"], linewidth=0.8, label="whole frame")
+    above.plot(frame, time, color=plot_style.COLORS["wholebody/osqp"], linewidth=0.8, label="whole frame")
     queries = [row.contact_ms for row in rows]
     above.plot(frame, queries, color="#d55e00", linewidth=0.8, label="collision queries")
     above.set_ylim(0.0, 1.25 * max(float(np.quantile(time, 0.995)), 1e-3))
@@ -181,61 +180,10 @@ def frame_chart(rows: Sequence[FrameRow], path: Path) -> tuple[Path, Path]:
     below.set_ylabel("deepest overlap [mm]")
     below.set_xlabel("frame (shaded: the tracked posture is inside of something)")
     below.legend(loc="upper right", frameon=False, ncols=2, fontsize=8)
-    return style.save(chart, path)
+    return plot_style.save(chart, path)
 
 
 def report(rows: Sequence[InteractionRow], facts: Mapping[str, str]) -> str:
     """Both tables beside the paper's, as Markdown."""
-    costs = [_costs(row) for row in rows]
-    columns = (
-        "scene", "overlap", "frames", "frame ms, mean", "p95", "p99", "max", "CPU mean", "CPU p99",
-        "joints/frame", "iter/frame", "IK %",
-        "pairs/frame", "collision queries %",
-    )  # fmt: skip
-    paper = [
-        (scene, "paper", frames, ms, "", "", "", "", "", joints, turns, ik, pairs, queries)
-        for scene, frames, ms, joints, turns, ik, pairs, queries in PAPER
-    ]
-    quality = (
-        "scene", "overlap", "deepest left mm", "tracked deepest mm", "frames that pass", "beyond limits rad",
-        "beyond cones rad", "joints off rad", "root off mm", "jerk, median", "tracked", "largest", "ends of contact",
-        "latest back, frames", "frames with a note", "missed",
-    )  # fmt: skip
-    return "\n\n".join(
-        [
-            markdown(columns, [*costs, *paper]),
-            markdown(quality, [_quality(row) for row in rows]),
-            "Joints and iterations are counted as the paper does: iterations are the goals of CCD, made anew each time "
-            "(or programs, or displacements of a rigid hand, which moves no joint) of frames in contact, and a joint "
-            "counts once for each iteration that moves it, so that a program counts all joints. The paper's frames "
-            "include rendering, ours do not; and its shares are shares of such frames. Pairs/frame are the overlapping "
-            "pairs of pieces of the tracked posture. \"Joints off\" is the root mean "
-            "square over the joints of the angle between shown and tracked posture, mean over the frames; jerk is the "
-            "third difference of the joint angles, rad/s³. CPU is time that the processor worked on a frame, on a "
-            "shared machine, and what is missed goes by it. Asked of every scene: mean frame under "
-            f"{GOAL_MEAN:g} ms, p99 under {GOAL_P99:g} ms, deepest overlap left {DEEPEST['qp']:g} mm with qp and "
-            f"{DEEPEST['ccd']:g} mm with ccd, no pair passed between frames, limits and cones kept, and back at the "
-            f"tracked posture to 1 mrad within {IN_TIME} frames after contact; all judged from the postures, every "
-            "pair by coal.",
-            sentence(facts),
-        ]
-    )  # fmt: skip
-
-
-def _costs(row: InteractionRow) -> tuple[str, ...]:
-    return (
-        row.scene.replace("_", " "), row.overlap, str(row.frames), f"{row.mean_ms:.2f}", f"{row.p95_ms:.2f}",
-        f"{row.p99_ms:.2f}", f"{row.max_ms:.1f}", f"{row.cpu_mean_ms:.2f}", f"{row.cpu_p99_ms:.2f}",
-        f"{row.joints:.0f}", f"{row.iterations:.1f}",
-        f"{row.ik_percent:.0f}", f"{row.tracked_pairs:.1f}", f"{row.query_percent:.0f}",
-    )  # fmt: skip
-
-
-def _quality(row: InteractionRow) -> tuple[str, ...]:
-    latest = "never" if row.latest < 0 else str(row.latest) if row.returns else ""
-    return (
-        row.scene.replace("_", " "), row.overlap, f"{row.depth_mm:.4f}", f"{row.tracked_depth_mm:.0f}",
-        str(row.passed), f"{row.limit_rad:.0e}", f"{row.cone_rad:.0e}", f"{row.distance_rad:.3f}",
-        f"{row.root_distance_mm:.1f}", f"{row.jerk:.0f}", f"{row.tracked_jerk:.0f}", f"{row.worst_jerk:.0f}",
-        str(row.returns), latest, str(row.noted), "; ".join(row.misses) or "nothing",
-    )  # fmt: skip
+    goals = {"mean": GOAL_MEAN, "p99": GOAL_P99, "deepest": DEEPEST, "back": IN_TIME}
+    return render("interaction.md", rows=rows, paper=PAPER, goals=goals, facts=facts)

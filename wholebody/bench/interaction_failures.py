@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wholebody.bench.interaction import DEEPEST, GOAL_MEAN, GOAL_P99, InteractionRow
-from wholebody.bench.tables import markdown
+from wholebody.bench.report import render
 from wholebody.interaction.judging import IN_TIME, Judgement
 from wholebody.interaction.recording import Recording
 
@@ -102,28 +102,4 @@ def failures(worst: Sequence[WorstFrames], pictures: Sequence[tuple[WorstFrames,
         worst: of every scene and method.
         pictures: those with a picture, and where it is, as seen from the page.
     """
-    columns = (
-        "scene", "overlap", "deepest left mm (frame)", "slowest ms (frame)", "farthest rad (frame)",
-        "jerk rad/s³ (frame)", "missed", "why",
-    )  # fmt: skip
-    rows = [
-        (
-            each.row.scene.replace("_", " "), each.row.overlap, f"{each.row.depth_mm:.4f} ({each.deepest})",
-            f"{each.milliseconds:.1f} ({each.slowest})", f"{each.distance_rad:.2f} ({each.farthest})",
-            f"{each.row.worst_jerk:.0f} ({each.sudden})", "; ".join(each.row.misses) or "nothing", each.why,
-        )
-        for each in worst
-    ]  # fmt: skip
-    note = (
-        "Times are the processor's. Farthest is the root mean square of the joints' angles between shown and tracked "
-        "posture: in contact it is meant to be there, and what counts is that it ends. Asked is what "
-        "[results](results.md#interaction-frame-by-frame) says; a largest jerk is not among it."
-    )
-    shown = [
-        f"![{each.row.scene.replace('_', ' ')} with {each.row.overlap}, frame {each.picture}: shown, and tracked as a "
-        f"ghost]({path})\n\n{each.row.scene.replace('_', ' ').capitalize()} with {each.row.overlap}, frame "
-        f"{each.picture}: {'; '.join(each.row.misses)}. {each.why[:1].upper()}{each.why[1:]}."
-        for each, path in pictures
-    ]
-    none = [] if shown else ["Every line that is asked of every scene holds with both methods, so there is no picture."]
-    return "\n\n".join([markdown(columns, rows), note, *shown, *none])
+    return render("interaction_failures.md", worst=worst, pictures=pictures)

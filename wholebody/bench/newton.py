@@ -11,11 +11,9 @@ from functools import partial
 
 import numpy as np
 
-from wholebody.bench.newton_drags import DragRow
-from wholebody.bench.newton_shapes import SHAPES
-from wholebody.bench.newton_solves import AgreementRow, SolveRow
-from wholebody.bench.newton_time import median_us
-from wholebody.bench.tables import markdown
+from wholebody.bench.newton_shapes import SHAPES, median_us
+from wholebody.bench.newton_solves import AgreementRow, DragRow, SolveRow
+from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
 from wholebody.methods.newton.linear_algebra.base import LinearSystem
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
@@ -104,99 +102,13 @@ def report(
     facts: Mapping[str, str],
 ) -> str:
     """Tables to read."""
-    parts = [
-        f"Measured on {facts.get('processor', 'this machine')}; OMP_NUM_THREADS "
-        f"{facts.get('OMP_NUM_THREADS', 'not set')}; numba {facts.get('numba', 'unknown')}. "
-        "Processor's time, medians.",
-        markdown(
-            (
-                "solve",
-                "variables",
-                "non-zeros",
-                "iterations",
-                "systems",
-                "ms",
-                "us a variable and system",
-                "last errors",
-            ),
-            (
-                (
-                    s.case,
-                    str(s.variables),
-                    str(s.nonzeros),
-                    f"{s.iterations:.0f}",
-                    f"{s.systems:.0f}",
-                    f"{s.ms:.2f}",
-                    f"{s.us_each:.2f}",
-                    s.errors,
-                )
-                for s in solves
-            ),
-        ),
-        markdown(
-            (
-                "the same problem by newton and by qp",
-                "newton ms",
-                "qp ms",
-                "joints apart [rad]",
-                "measures apart, relative",
-            ),
-            (
-                (a.case, f"{a.newton_ms:.0f}", f"{a.qp_ms:.0f}", f"{a.apart:.1e}", f"{a.measures_apart:.1e}")
-                for a in agreements
-            ),
-        ),
-        markdown(
-            (
-                "drag of the human's hand",
-                "frames",
-                "ms a frame",
-                "95 % below",
-                "Newton iterations",
-                "frames in contact",
-                "structures",
-                "ms each",
-                "greatest constraint error",
-                "deepest overlap [mm]",
-            ),
-            (
-                (
-                    d.case,
-                    str(d.frames),
-                    f"{d.ms:.2f}",
-                    f"{d.ms_95:.2f}",
-                    f"{d.iterations:.2f}",
-                    f"{100 * d.touching:.0f} %",
-                    str(d.structures),
-                    f"{d.structure_ms:.1f}",
-                    f"{d.drift:.1e}",
-                    f"{1e3 * d.deepest:.3f}",
-                )
-                for d in drags
-            ),
-        ),
-        _linear_table(linear),
-        markdown(
-            ("shape", *(f"exponent, {name}" for name in ALGEBRAS[:4])),
-            (
-                (
-                    shape,
-                    *("" if np.isnan(e) else f"{e:.2f}" for e in (exponent(linear, shape, a) for a in ALGEBRAS[:4])),
-                )
-                for shape in SHAPES
-            ),
-        ),
-    ]
-    return "\n\n".join(part.strip() for part in parts)
-
-
-def _linear_table(linear: Sequence[LinearRow]) -> str:
     by_place = {(row.shape, row.bodies, row.algebra): row for row in linear}
-    rows = []
-    for shape, bodies in dict.fromkeys((row.shape, row.bodies) for row in linear):
-        found = [by_place.get((shape, bodies, name)) for name in ALGEBRAS]
-        usual = next(row for row in found if row)
-        cells = [f"{row.solve_us:.0f} ({row.fill})" if row else "" for row in found]
-        rows.append((shape, str(bodies), str(usual.nonzeros), f"{1e-3 * usual.analyse_us:.1f}", *cells))
-    names = ("shape", "bodies", "nnz(J)", "ms a new structure", *(f"{name} us (nnz(L))" for name in ALGEBRAS))
-    return markdown(names, rows)
+    sizes = [
+        (place, [by_place.get((*place, name)) for name in ALGEBRAS])
+        for place in dict.fromkeys((row.shape, row.bodies) for row in linear)
+    ]
+    exponents = [(shape, [exponent(linear, shape, name) for name in ALGEBRAS[:4]]) for shape in SHAPES]
+    return render(
+        "newton.md", solves=solves, agreements=agreements, drags=drags, facts=facts, algebras=ALGEBRAS, sizes=sizes,
+        exponents=exponents,
+    )  # fmt: skip

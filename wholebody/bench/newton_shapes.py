@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -90,3 +91,14 @@ def three_bar() -> Assembly:
 
 
 SHAPES: dict[str, Callable[[int], Assembly]] = {"chain": chain, "tree": tree, "ring": ring, "star": star}
+
+
+def median_us(call: Callable[[], object], repeats: int) -> float:
+    """Median time of a call [us]; one before is not counted."""
+    call()
+    times = []
+    for _ in range(repeats):
+        began = time.process_time()
+        call()
+        times.append(time.process_time() - began)
+    return 1e6 * float(np.median(times))

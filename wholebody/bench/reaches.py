@@ -7,15 +7,16 @@ the standing one. The witness holds both feet and keeps the clearance, so whoeve
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench.problem_sets.bodies import TIPS
-from wholebody.bench.problem_sets.clutter import reach_among
+from wholebody.bench.problem_sets.bodies import CLEARANCE, TIPS
+from wholebody.bench.problem_sets.clutter import THINGS, reach_among
+from wholebody.bench.report import render
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,11 @@ class ReachRow:
     constraint_violation: float
     measure: float
     witness_measure: float
+
+    @property
+    def effort_ratio(self) -> float:
+        """Effort of the answer over that of the witness."""
+        return self.measure / self.witness_measure
 
 
 def reach(seed: int, figure: wb.Figure | None = None) -> Reach:
@@ -108,3 +114,8 @@ def run(seeds: range, solver: str, jobs: int = 1) -> Iterator[ReachRow]:
 
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         yield from pool.map(solve_reach, seeds, [solver] * len(seeds), chunksize=4)
+
+
+def reaches_report(rows: Sequence[ReachRow], facts: Mapping[str, str], jobs: int) -> str:
+    """Table of the random reaches, and what was not solved."""
+    return render("reaches.md", rows=rows, facts=facts, jobs=jobs, things=THINGS, clearance=CLEARANCE)

@@ -6,13 +6,14 @@ import gc
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 import wholebody as wb
+from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
 from wholebody.files import Scratch
 
@@ -142,3 +143,8 @@ def both(task: Path, solvers: tuple[str, ...], count: int, say: Callable[[str], 
         for row in rows[-2:]:
             say(f"{row.task}, {row.solver}, {row.way}: {row.median_ms:.1f} ms, p95 {row.p95_ms:.1f} ms, {row.status}")
     return rows
+
+
+def solve_report(rows: Sequence[SolveRow], peak: MemoryRow, facts: Mapping[str, str]) -> str:
+    """Table of the whole solves, and the memory."""
+    return render("solve.md", rows=rows, peak=peak, facts=facts)

@@ -5,16 +5,18 @@ from __future__ import annotations
 import gc
 import logging
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
 from wholebody.arrays import Array
+from wholebody.bench import track as setting
+from wholebody.bench.adapters import make_tool
+from wholebody.bench.adapters.base import Tool
 from wholebody.bench.judge import Verdict, judge
-from wholebody.bench.tools import make_tool
-from wholebody.bench.tools.base import Tool
+from wholebody.bench.report import render
 from wholebody.bench.track import CLEARANCE, Track
 
 REFERENCE = "placo"
@@ -241,3 +243,22 @@ def goal_lines(rows: Sequence[StepRow]) -> list[str]:
             parts.append(f"least distance {share:.2f} of the clearance (at least 0.9: {met})")
         lines.append(f"{row.tool}, {row.reach}: " + ("; ".join(parts) or "nothing to compare with") + ".")
     return lines
+
+
+def step_report(
+    rows: Sequence[StepRow], facts: Mapping[str, str], differences: Mapping[str, Sequence[str]],
+    profile: Mapping[str, tuple[float, float]],
+) -> str:  # fmt: skip
+    """Tables of the tracking steps.
+
+    Args:
+        rows: of all tools and reaches.
+        facts: of the machine.
+        differences: tool -> what it cannot express.
+        profile: reach -> median of a whole step and of its linearisation [us].
+    """
+    tools = dict.fromkeys(row.tool for row in rows)
+    stated = [line for name in tools for line in differences.get(name, ())]
+    return render(
+        "step.md", rows=rows, facts=facts, stated=stated, profile=profile, goals=goal_lines(rows), track=setting
+    )

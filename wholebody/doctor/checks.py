@@ -1,24 +1,19 @@
 """Whether packages, QP solvers and methods work: each is used for real, in another process.
 
-A binary package of the wrong version can crash the process that imports it. So a child tries one name after the other
-and reports each; when it dies, the name it was at is what killed it, and a new child goes on with the rest.
+A binary package of the wrong version can crash the process that imports it. So a child tries one name after the other;
+when it dies, the name it was at is what killed it, and a new child goes on with the rest.
 """
 
 from __future__ import annotations
 
-import json
-import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
-TIMEOUT = 300.0
-"""Seconds for one child; a check takes one or two, on a machine that is busy more, and the first compiles the loops."""
+from wholebody.runner import Child, EndedError
 
-_CHILD = "import sys; sys.path[:1] = []; sys.path.append({root!r}); from wholebody.doctor.checks import child; child()"
+TIMEOUT = 300.0
+"""Seconds for a check; it takes one or two, on a machine that is busy more, and the first compiles the loops."""
 
 
 class Outcome(NamedTuple):
@@ -110,46 +105,30 @@ def run(kind: str, names: Sequence[str], timeout: float = TIMEOUT) -> dict[str, 
     Args:
         kind: a key of `CHECKS`.
         names: what to try.
-        timeout: seconds after which a child is ended.
+        timeout: seconds after which a check is ended.
 
     Returns:
         An outcome for every name.
     """
-    left = list(dict.fromkeys(names))
-    outcomes: dict[str, Outcome] = {}
-    while left:
-        reported, end = _run_child(kind, left, timeout)
-        outcomes.update(reported)
-        left = [name for name in left if name not in reported]
-        if left:
-            outcomes[left.pop(0)] = Outcome(False, end)
-    return {name: outcomes[name] for name in names}
-
-
-def child() -> None:
-    """Try what standard input lists, and write a line for each."""
-    kind, names = json.load(sys.stdin)
-    reports = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # whatever the packages print is not a report
-    for name in names:
-        try:
-            outcome = Outcome(True, CHECKS[kind](name))
-        except Exception as error:  # any failure at all is what is being looked for
-            outcome = Outcome(False, f"{type(error).__name__}: {error}".strip().splitlines()[0])
-        print(json.dumps([name, outcome]), file=reports, flush=True)
-
-
-def _run_child(kind: str, names: Sequence[str], timeout: float) -> tuple[dict[str, Outcome], str]:
-    """Outcomes up to the child's end, and how it ended."""
-    command = [sys.executable, "-c", _CHILD.format(root=str(Path(__file__).resolve().parents[2]))]
+    child, outcomes = Child(), dict[str, Outcome]()
     try:
-        done = subprocess.run(
-            command, input=json.dumps([kind, list(names)]), capture_output=True, text=True, timeout=timeout, check=False
-        )
-        output, errors = done.stdout, done.stderr.strip().splitlines()
-        end = f"ended the process (code {done.returncode}){': ' + errors[-1] if errors else ''}"
-    except subprocess.TimeoutExpired as expired:
-        output = expired.stdout.decode() if isinstance(expired.stdout, bytes) else expired.stdout or ""
-        end = f"no answer within {timeout:.0f} s"
-    reports = [json.loads(line) for line in output.splitlines() if line.endswith("]]")]
-    return {name: Outcome(*outcome) for name, outcome in reports}, end
+        for name in names:
+            try:
+                outcomes[name] = Outcome(*child.call(attempt, kind, name, seconds=timeout))
+            except EndedError as error:
+                said = f": {error.said}" if error.said else ""
+                end = (
+                    f"no answer within {timeout:.0f} s" if error.overtime else f"ended the process ({error.how}){said}"
+                )
+                outcomes[name] = Outcome(False, end)
+    finally:
+        child.close()
+    return outcomes
+
+
+def attempt(kind: str, name: str) -> tuple[bool, str]:
+    """Try a name in this process: whether it works, and what was found or why it failed."""
+    try:
+        return True, CHECKS[kind](name)
+    except Exception as error:  # any failure at all is what is being looked for
+        return False, f"{type(error).__name__}: {error}".strip().splitlines()[0]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -19,12 +18,11 @@ from wholebody.arrays import Array
 from wholebody.assessment import assess
 from wholebody.checks import array, function, instance, numbers
 from wholebody.errors import InputError
-from wholebody.geometry.continuous.sweep import Sweep
-from wholebody.interaction.judging import jerk
 from wholebody.interaction.scripts import FRAME
 from wholebody.methods.base import Method
 from wholebody.methods.drag import Drag
 from wholebody.methods.moving_goals import copied, moving_goal, retarget
+from wholebody.motion_assessment import deepened, jerk
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point
@@ -34,9 +32,6 @@ Counts = NDArray[np.intp]
 SETTLED = 1e-3  # m, rad: a goal that is left by less than this when it has come to its end is met at once
 GAIN = 1e-4  # m, rad: a figure that nears it by less in a frame has come to rest
 SETTLING = 120  # most frames that are added for one that lags behind
-
-DEPTHS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
-"""Depths, metres, that are tried in turn as a bound on what a way goes in by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +70,7 @@ class DragJudgement:
         error: (n,) what was left to the moving goal's target in each frame, metres, or radians where that is more.
         depth: (n + 2,) deepest overlap of any pair, metres; 0 where there is none.
         between: (n + 1,) a bound on how much deeper any pair gets on the way to the next posture than at the deeper end
-            of that way, metres, one of `DEPTHS`; inf where it is more than the last of them.
+            of that way, metres, one of `motion_assessment.DEPTHS`; inf where it is more than the last of them.
         constraint_violation: (n + 2,) how far the worst constraint is from holding, metres or radians.
         limit_violation: how far the worst joint of any posture is out of its limits, radians.
         jerk: (n - 1,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
@@ -173,7 +168,7 @@ def _lags(left: list[float], late: int) -> bool:
 
 def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudgement:
     """Judge a drag of a problem's goal."""
-    own, model = copied(problem), problem.scene.model
+    own = copied(problem)
     instance(dragged, Dragged, "judge_drag: dragged", "make one with drag_along(problem, places)")
     moving_goal(problem, goal)
     errors, judged = [], []
@@ -182,25 +177,14 @@ def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudg
         retarget(own, goal, _aim(problem, goal, place))
         judged.append(assess(own, q))
         errors.append(judged[-1].goal_errors[goal])
-    sweep = Sweep(model, problem.scene.geometry)
     return DragJudgement(
         error=np.array(errors[1:-1]),
         depth=np.array([one.penetration for one in judged]),
-        between=np.array([_deepened(sweep, *way) for way in pairwise(dragged.q)]),
+        between=deepened(problem.scene, dragged.q),
         constraint_violation=np.array([one.constraint_violation for one in judged]),
         limit_violation=max(one.limit_violation for one in judged),
-        jerk=jerk(model, dragged.q, dragged.dt),
+        jerk=jerk(problem.scene.model, dragged.q, dragged.dt),
     )
-
-
-def _deepened(sweep: Sweep, before: Array, after: Array) -> float:
-    """The least of `DEPTHS` by which nothing gets deeper on a way, from either end; inf where it is by all of them."""
-    for depth in DEPTHS:
-        if sweep.first_contact(before, after, tolerance=depth) is None:
-            return depth
-        if sweep.first_contact(after, before, tolerance=depth) is None:
-            return depth
-    return np.inf
 
 
 def _aim(problem: Problem, goal: int, place: Array) -> Array | pin.SE3:

@@ -1,12 +1,8 @@
-"""What a recording is judged by, computed from its postures alone.
-
-All pairs are asked at every frame, without culling and on data of its own, as `wholebody.assess` does for one posture.
-"""
+"""What a recording of the frame loop is judged by: the motion itself, and how far it is from what was tracked."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -14,18 +10,15 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.checks import instance
-from wholebody.figures.state import State
-from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.interaction.recording import Recording
+from wholebody.motion_assessment import OVERLAPS, assess_motion, cone_violation, passed, root_mean_square
 from wholebody.scene import Scene
-from wholebody.tasks import ReachCones
 
 Counts = NDArray[np.intp]
 
 PASSING = {"qp": 1e-4, "ccd": 1e-3}
 """Depth on the way between two frames that counts as passing, metres: what may be left in the frames themselves."""
 
-OVERLAPS = 1e-5  # m: deeper than this a tracked posture counts as in contact
 BACK = 1e-3  # rad, m: nearer than this to the tracked posture the shown one is back
 IN_TIME = 30  # frames after the end of contact in which it should be back
 
@@ -66,63 +59,24 @@ def judge(scene: Scene, recording: Recording) -> Judgement:
     """Judge a recording of a scene."""
     instance(scene, Scene, "judge: scene", "make one with wb.Scene(figure)")
     instance(recording, Recording, "judge: recording", "make one with follow(scene, track)")
-    depth, _ = overlaps(scene, recording.q)
-    tracked_depth, tracked_pairs = overlaps(scene, recording.tracked)
-    model = scene.model
+    shown, tracked = (assess_motion(scene, q, recording.dt) for q in (recording.q, recording.tracked))
+    model, free = scene.model, scene.figure.root == "free"
     each = [pin.difference(model, *pair) for pair in zip(recording.tracked, recording.q, strict=True)]
     apart = np.array(each)
-    joints = slice(6 if scene.figure.root == "free" else 0, None)
-    limits = scene.figure.limits
-    values = recording.q[:, limits.idx_q]
-    sweep = Sweep(model, scene.geometry)
-    ways, passing = enumerate(pairwise(recording.q), start=1), PASSING[recording.overlap]
+    places = np.linalg.norm(recording.q[:, :3] - recording.tracked[:, :3], axis=1)
     return Judgement(
-        depth=depth,
-        tracked_depth=tracked_depth,
-        tracked_pairs=tracked_pairs,
-        limit_violation=float(np.maximum(limits.lower - values, values - limits.upper).max(initial=0.0)),
-        cone_violation=_cone_violation(scene, recording.q),
-        passed=tuple(frame for frame, (a, b) in ways if sweep.first_contact(a, b, tolerance=passing) is not None),
-        distance=_root_mean_square(apart[:, joints]),
-        root_distance=np.linalg.norm(recording.q[:, :3] - recording.tracked[:, :3], axis=1)
-        if scene.figure.root == "free"
-        else np.zeros(len(recording)),
-        jerk=jerk(model, recording.q, recording.dt),
-        tracked_jerk=jerk(model, recording.tracked, recording.dt),
-        returns=_returns(tracked_depth > OVERLAPS, np.abs(apart).max(axis=1)),
+        depth=shown.depth,
+        tracked_depth=tracked.depth,
+        tracked_pairs=tracked.overlapping,
+        limit_violation=shown.limit_violation,
+        cone_violation=cone_violation(scene, recording.q),
+        passed=passed(scene, recording.q, PASSING[recording.overlap]),
+        distance=root_mean_square(apart[:, 6 if free else 0 :]),
+        root_distance=places if free else np.zeros(len(recording)),
+        jerk=shown.jerk,
+        tracked_jerk=tracked.jerk,
+        returns=_returns(tracked.depth > OVERLAPS, np.abs(apart).max(axis=1)),
     )
-
-
-def overlaps(scene: Scene, postures: Array) -> tuple[Array, Counts]:
-    """Depth of the deepest overlap and number of overlapping pairs at each posture, (n, nq), by all pairs."""
-    model, geometry = scene.model, scene.geometry
-    data, results = model.createData(), pin.GeometryData(geometry)
-    depth, count = np.zeros(len(postures)), np.zeros(len(postures), dtype=np.intp)
-    for frame, q in enumerate(postures):
-        pin.updateGeometryPlacements(model, data, geometry, results, np.asarray(q))
-        pin.computeDistances(geometry, results)
-        distance = np.array([result.min_distance for result in results.distanceResults])
-        depth[frame] = max(0.0, -float(distance.min(initial=np.inf)))
-        count[frame] = int((distance < -OVERLAPS).sum())
-    return depth, count
-
-
-def _cone_violation(scene: Scene, postures: Array) -> float:
-    if not scene.figure.cones:
-        return 0.0
-    cones, state = ReachCones().resolve(scene, postures[0]), State(scene.model)
-    return max(0.0, *(-float(cones.value(state.update(q)).min()) for q in postures))
-
-
-def jerk(model: pin.Model, q: Array, dt: float) -> Array:
-    """(n - 3,) root of the mean square of the third difference of the joint angles, rad/s^3."""
-    velocity = np.array([pin.difference(model, *pair) for pair in pairwise(q)]) / dt
-    joints = slice(6 if model.nq != model.nv else 0, None)
-    return _root_mean_square(np.diff(velocity[:, joints], n=2, axis=0) / dt**2) if len(q) > 3 else np.zeros(0)
-
-
-def _root_mean_square(values: Array) -> Array:
-    return np.asarray(np.sqrt((values**2).mean(axis=1)))
 
 
 def _returns(touching: NDArray[np.bool_], apart: Array) -> tuple[tuple[int, int], ...]:

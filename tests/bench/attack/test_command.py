@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.bench.attack.counting import Row
+from wholebody.bench.attack.report import Row
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import add_to
 from wholebody.errors import InputError, UnknownNameError

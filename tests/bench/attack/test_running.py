@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wholebody.bench.attack import child, running
+from wholebody.bench.attack import running
 from wholebody.bench.attack.arguments import CALLS, called
 from wholebody.bench.attack.case import KINDS, PATTERN, SCRIPT, Case, Verdict, Written, kind_of
-from wholebody.bench.attack.counting import Row, percentiles
 from wholebody.bench.attack.mutations import mutated
-from wholebody.bench.attack.report import keep, report, signature
+from wholebody.bench.attack.report import Row, keep, percentiles, report, signature
 from wholebody.bench.attack.running import Ended, attack
 from wholebody.bench.attack.writing import write
 from wholebody.bench.intervals import wilson
 from wholebody.errors import UnknownNameError
+from wholebody.runner import Child
 
 RIGHT = 'from wholebody.bench.attack.case import Verdict\nverdict = Verdict("right", "as it should be")\n'
 SCRIPTS = {
@@ -61,10 +60,9 @@ def test_mutations_change_text_and_keep_to_their_seed() -> None:
 @pytest.fixture
 def scripted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let children run what `SCRIPTS` says in place of real cases; forked, they have this from their parent."""
-    fork = multiprocessing.get_context("fork")
-    monkeypatch.setattr(running.multiprocessing, "get_context", lambda _: fork)
-    monkeypatch.setattr(child, "write", lambda case: Written(SCRIPTS[case.number], {"note.txt": b"beside it"}))
-    monkeypatch.setattr(child, "_warm", lambda: None)
+    monkeypatch.setattr(running, "Child", lambda environment: Child(environment, forked=True))
+    monkeypatch.setattr(running, "write", lambda case: Written(SCRIPTS[case.number], {"note.txt": b"beside it"}))
+    monkeypatch.setattr(running, "_prepare", lambda: None)
 
 
 def cases() -> Iterator[Case]:
@@ -136,5 +134,5 @@ def test_alike_failures_have_one_signature() -> None:
 def test_calls_that_are_made_odd_are_right_as_they_stand(name: str, given: tuple[tuple[str, str], ...]) -> None:
     if name == "wb.ReachCones":
         pytest.skip("the small robot has none")
-    found = child.run(called(name, dict(given)))
+    found = running.run(called(name, dict(given)))
     assert found.outcome == "right", found.words

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.bench.entrants.base import Entrant
+from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
 from wholebody.errors import InputError
 
@@ -89,7 +89,7 @@ def _fake(does: str, tolerance: float, iterations: int | None) -> Fake:
     return Fake(does, tolerance)
 
 
-def entrant(does: str) -> Entrant:
+def adapter(does: str) -> Adapter:
     """Return a fake as it takes part."""
     ladder = ((1e-2, None), (1e-4, None), (1e-6, None))
-    return Entrant(does, partial(_fake, does), ladder, f"a fake that {does}", (f"it {does}",))
+    return Adapter(does, partial(_fake, does), ladder, f"a fake that {does}", (f"it {does}",))

@@ -26,7 +26,7 @@ def test_two_methods_on_one_problem(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "report.html" in capsys.readouterr().out
     facts, rows = read_rows(tmp_path / "solves.csv", Record)
     assert facts["cases beside each other"] == "1 on this machine"
-    assert {row.entrant for row in rows} == {"qp/daqp", "dls"}
+    assert {row.method for row in rows} == {"qp/daqp", "dls"}
     assert "Robot arm" in (tmp_path / "report.html").read_text()
     with pytest.raises(InputError, match="holds a run with seed = 0, and 3 is asked for"):
         bench(*words, "--seed", "3")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wholebody.bench.compare.advice import advice, choices, standings
-from wholebody.bench.compare.curves import curve, profile
+from wholebody.bench.compare.charts import curve, profile
 from wholebody.bench.compare.front import OURS, front, fronts, time_to
 from wholebody.bench.compare.record import ANSWERED, FAILED, REFUSED, Record
 from wholebody.bench.compare.results import QUANTITIES, Results
@@ -19,20 +19,20 @@ CASES = range(5)
 
 
 def record(
-    entrant: str, number: int, tolerance: float, seconds: float, error: float, *, family: str = "s",
+    adapter: str, number: int, tolerance: float, seconds: float, error: float, *, family: str = "s",
     penetration: float = 0.0, outcome: str = ANSWERED, measure: float = 1.0, status: str = "solved",
 ) -> Record:  # fmt: skip
     return Record(
-        family, number, entrant, tolerance, 0, outcome, status, "", seconds, seconds, goal_error=error, goal_angle=0.0,
+        family, number, adapter, tolerance, 0, outcome, status, "", seconds, seconds, goal_error=error, goal_angle=0.0,
         penetration=penetration, clearance_lack=penetration, limit_violation=0.0, constraint_violation=0.0,
         measure=measure, optimality=0.0, best=1.0,
     )  # fmt: skip
 
 
-def curve_of(entrant: str, *points: tuple[float, float, float]) -> list[Record]:
+def curve_of(adapter: str, *points: tuple[float, float, float]) -> list[Record]:
     """Points of (tolerance, seconds, error); cases differ by a factor about the middle one, which is the median."""
     return [
-        record(entrant, number, tolerance, seconds * 2.0 ** (number - 2), error * 2.0 ** (number - 2))
+        record(adapter, number, tolerance, seconds * 2.0 ** (number - 2), error * 2.0 ** (number - 2))
         for tolerance, seconds, error in points
         for number in CASES
     ]
@@ -40,7 +40,7 @@ def curve_of(entrant: str, *points: tuple[float, float, float]) -> list[Record]:
 
 def results(*records: list[Record]) -> Results:
     flat = [one for some in records for one in some]
-    return Results(flat, ["s"], list(dict.fromkeys(one.entrant for one in flat)))
+    return Results(flat, ["s"], list(dict.fromkeys(one.method for one in flat)))
 
 
 OURS_CURVE = curve_of(OURS, (1e-2, 0.010, 1e-2), (1e-4, 0.020, 2e-4), (1e-6, 0.030, 2e-6))
@@ -167,17 +167,17 @@ def test_advice_names_the_dependable_and_the_fast() -> None:
     rows = summaries(made)
     (choice,) = choices(made, rows)
     assert (choice.fastest, choice.exact) == (("quick",), ("slow",))
-    assert [standing.entrant for standing in standings(made, rows)] == ["quick", "slow", "fast"]
+    assert [standing.method for standing in standings(made, rows)] == ["quick", "slow", "fast"]
     said = advice(made, rows)
     assert "`quick`" in said[0]
     assert any("`fast` alone is not enough" in sentence and "80 %" in sentence for sentence in said)
 
 
-def noisy(entrant: str, share: float, error: float, seed: int) -> list[Record]:
+def noisy(adapter: str, share: float, error: float, seed: int) -> list[Record]:
     """Solves of 20 problems whose times are off by some 20 % each, at random."""
     rng = np.random.default_rng(seed)
     return [
-        record(entrant, number, 1e-4, share * 0.01 * (number + 1) * float(np.exp(0.2 * rng.normal())), error)
+        record(adapter, number, 1e-4, share * 0.01 * (number + 1) * float(np.exp(0.2 * rng.normal())), error)
         for number in range(20)
     ]
 
@@ -191,7 +191,7 @@ def test_advice_names_no_winner_among_solvers_of_one_method() -> None:
     said = advice(made, rows)
     assert said[0].startswith("**If in doubt, take `qp` (any of ")
     assert "cannot be told apart" in said[0]
-    times = {standing.entrant: standing.slowness for standing in standings(made, rows)}
+    times = {standing.method: standing.slowness for standing in standings(made, rows)}
     assert times["qp/daqp"].low < 1.0 < times["qp/daqp"].high
     assert 1.0 < times["slow"].low < 3.0 < times["slow"].high
 
@@ -208,7 +208,7 @@ def test_methods_are_not_compared_over_different_problems() -> None:
     easy = [one for one in noisy("quick", 1.0, 1e-6, 0) if one.number < 10]  # it was given the short ones
     hard = [one for one in noisy("other", 1.0, 1e-6, 1) if one.number >= 10]
     made = results(noisy("qp/osqp", 1.0, 1e-6, 2), easy, hard)
-    found = {standing.entrant: standing.slowness for standing in standings(made, summaries(made))}
+    found = {standing.method: standing.slowness for standing in standings(made, summaries(made))}
     assert (found["quick"].cases, found["other"].cases) == (10, 10)
     assert all(0.8 < each.value < 1.25 for each in found.values())
 

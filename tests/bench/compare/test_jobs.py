@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from wholebody.bench.compare.jobs import Task, work
-from wholebody.bench.compare.worker import own_worker
+from wholebody.bench.compare.jobs import Task, own_child, work
 
 
 def test_what_a_method_compiles_is_not_taken_for_what_its_solves_cost(fakes: ModuleType) -> None:
     """Or it would be given a handful of problems."""
-    solves = tuple((fakes.entrant(does), ()) for does in ("compiles", "sleeps", "dies"))
+    solves = tuple((fakes.adapter(does), ()) for does in ("compiles", "sleeps", "dies"))
     try:
         chunk = work(Task(fakes.SET, 0, 0, solves, cap=10.0, most=1.0))
     finally:
-        own_worker().close()
+        own_child().close()
     assert chunk.spent["sleeps"] >= 0.4
     assert chunk.spent["compiles"] < 1.5  # which it takes to compile
     assert [record.outcome for record in chunk.records] == ["answered", "answered", "failed"]

@@ -53,20 +53,20 @@ def test_costs_that_are_not_known_yet_bound_nothing() -> None:
 
 
 def test_one_slow_start_does_not_end_a_set_but_slow_building_does(fakes: ModuleType) -> None:
-    plan = Plan(Settings((fakes.SET,), (fakes.entrant("solves"),), 100, 0, minutes=1.0), jobs=1)
+    plan = Plan(Settings((fakes.SET,), (fakes.adapter("solves"),), 100, 0, minutes=1.0), jobs=1)
     plan.note(Chunk("arm", 0, (), building=50.0))
     assert plan.cases("arm") == 100
     for number in range(1, FIRST + 2):
         plan.note(Chunk("arm", number, (), building=0.01))
     assert plan.cases("arm") == 100
-    slow = Plan(Settings((fakes.SET,), (fakes.entrant("solves"),), 100, 0, minutes=1.0), jobs=1)
+    slow = Plan(Settings((fakes.SET,), (fakes.adapter("solves"),), 100, 0, minutes=1.0), jobs=1)
     for number in range(FIRST):
         slow.note(Chunk("arm", number, (), building=2.0))
     assert slow.cases("arm") == 9  # of sixty seconds 30 % for building
 
 
 def test_the_case_for_which_everything_was_compiled_does_not_end_the_run(fakes: ModuleType) -> None:
-    plan = Plan(Settings((fakes.SET, fakes.MOVING), (fakes.entrant("solves"),), 20, 0, minutes=1.0), jobs=1)
+    plan = Plan(Settings((fakes.SET, fakes.MOVING), (fakes.adapter("solves"),), 20, 0, minutes=1.0), jobs=1)
     plan.note(Chunk("arm", 0, (), {"solves": 0.01}, building=50.0))
     for number in range(FIRST):
         plan.note(Chunk("moving", number, (), {"solves": 0.01}, building=0.01))

@@ -10,15 +10,13 @@ from types import ModuleType
 import pytest
 
 from wholebody.bench.compare import publish as publishing
-from wholebody.bench.compare.cases import Shown, chosen
-from wholebody.bench.compare.charts import BAND, lowest
-from wholebody.bench.compare.curves import Point
-from wholebody.bench.compare.looks import look
+from wholebody.bench.compare.charts import BAND, Point, lowest
 from wholebody.bench.compare.record import ANSWERED, OVERTIME, REFUSED, Record
 from wholebody.bench.compare.results import Results
-from wholebody.bench.compare.scenes import CLOSING, OPENING, Scene, draw
+from wholebody.bench.compare.scenes import CLOSING, OPENING, Scene, Shown, chosen, draw
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk, Store
+from wholebody.bench.plot_style import look
 from wholebody.bench.tables import read_rows
 from wholebody.errors import InputError
 
@@ -29,9 +27,9 @@ FETCHED = re.compile(
 )
 
 
-def record(entrant: str, number: int, tolerance: float, seconds: float, error: float) -> Record:
+def record(adapter: str, number: int, tolerance: float, seconds: float, error: float) -> Record:
     return Record(
-        "arm", number, entrant, tolerance, 0, ANSWERED, "solved", "", seconds, seconds, goal_error=error,
+        "arm", number, adapter, tolerance, 0, ANSWERED, "solved", "", seconds, seconds, goal_error=error,
         goal_angle=0.0, penetration=0.0, clearance_lack=0.0, limit_violation=0.0, constraint_violation=0.0,
         measure=1.0, optimality=0.0, best=1.0,
     )  # fmt: skip
@@ -39,7 +37,7 @@ def record(entrant: str, number: int, tolerance: float, seconds: float, error: f
 
 @pytest.fixture(scope="module")
 def asked(fakes: ModuleType) -> Settings:
-    return Settings((fakes.SET,), tuple(fakes.entrant(name) for name in ("solves", "lies", "refuses", "hangs")), 9, 2)
+    return Settings((fakes.SET,), tuple(fakes.adapter(name) for name in ("solves", "lies", "refuses", "hangs")), 9, 2)
 
 
 @pytest.fixture(scope="module")
@@ -65,8 +63,8 @@ def test_every_solve_is_in_the_table(folder: Path) -> None:
     facts, rows = read_rows(folder / "out" / "solves.csv", Record)
     assert facts["processor"] == "a fast one"
     assert len(rows) == 16
-    assert [row.worst for row in rows if row.entrant == "refuses"] == [inf, inf]
-    assert {row.entrant for row in rows if row.false_claim} == {"lies"}
+    assert [row.worst for row in rows if row.method == "refuses"] == [inf, inf]
+    assert {row.method for row in rows if row.false_claim} == {"lies"}
 
 
 def test_charts_are_there_in_both_kinds(folder: Path) -> None:
@@ -102,7 +100,7 @@ def test_the_report_says_what_was_left_out_and_why(folder: Path) -> None:
 def test_the_report_has_the_scene_of_a_false_answer(folder: Path) -> None:
     page = (folder / "out" / publishing.PAGE).read_text()
     assert page.count("<iframe") == 1
-    assert "lies says &#x27;solved&#x27; and misses the goals by 400 mm" in page
+    assert "lies says &#39;solved&#39; and misses the goals by 400 mm" in page
 
 
 def test_the_page_of_results_gets_its_part(folder: Path) -> None:
@@ -116,12 +114,12 @@ def test_the_page_of_results_gets_its_part(folder: Path) -> None:
 
 def test_a_scene_is_drawn_again_from_its_seed(fakes: ModuleType) -> None:
     shown = Shown("arm", 1, "solves", "lies", "why")
-    families, entrants = {"arm": fakes.SET}, {name: fakes.entrant(name) for name in ("solves", "lies", "hangs")}
-    (scene,) = draw([shown], families, entrants, 0, 20.0)
+    families, adapters = {"arm": fakes.SET}, {name: fakes.adapter(name) for name in ("solves", "lies", "hangs")}
+    (scene,) = draw([shown], families, adapters, 0, 20.0)
     assert isinstance(scene, Scene)
     assert OPENING + CLOSING in scene.shell
     assert len(scene.picture) > 1000
-    assert draw([shown._replace(bad="hangs")], families, entrants, 0, 0.5) == []
+    assert draw([shown._replace(bad="hangs")], families, adapters, 0, 0.5) == []
 
 
 def test_the_worst_failure_of_a_set_is_chosen() -> None:
@@ -159,6 +157,6 @@ def test_principal_methods_have_colours_of_their_own() -> None:
 
 def test_settings_are_checked(fakes: ModuleType) -> None:
     with pytest.raises(InputError, match="cases is 0"):
-        Settings((fakes.SET,), (fakes.entrant("solves"),), cases=0)
+        Settings((fakes.SET,), (fakes.adapter("solves"),), cases=0)
     with pytest.raises(InputError, match="at least one of each"):
-        Settings((), (fakes.entrant("solves"),))
+        Settings((), (fakes.adapter("solves"),))

@@ -24,7 +24,7 @@ CAP = 5.0  # s: much more than a solve takes on a machine with other things to d
 
 
 def settings(fakes: ModuleType, *does: str, cases: int = 1, sweep: int = 1, cap: float = 5.0) -> Settings:
-    return Settings((fakes.SET,), tuple(fakes.entrant(name) for name in does), cases, sweep, cap=cap, minutes=3.0)
+    return Settings((fakes.SET,), tuple(fakes.adapter(name) for name in does), cases, sweep, cap=cap, minutes=3.0)
 
 
 def timeless(records: list[Record]) -> list[dict[str, object]]:
@@ -36,7 +36,7 @@ def misbehaved(fakes: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> d
     """Return records by method of a run with every fault there is."""
     does = ("solves", "raises", "refuses", "hangs", "spins", "dies", "nan", "lies")
     store = run(settings(fakes, *does, cap=CAP), tmp_path_factory.mktemp("run"))
-    return {name: [record for record in store.records if record.entrant == name] for name in does}
+    return {name: [record for record in store.records if record.method == name] for name in does}
 
 
 def test_a_method_that_solves_is_judged_at_every_budget(misbehaved: dict[str, list[Record]]) -> None:
@@ -85,12 +85,12 @@ def test_the_same_seed_gives_the_same_and_another_gives_others(fakes: ModuleType
     asked = settings(fakes, "solves", cases=2, sweep=0)
     first, again = (run(asked, tmp_path / name) for name in ("a", "b"))
     assert timeless(first.records) == timeless(again.records)
-    other = Settings(asked.sets, asked.entrants, 2, 0, seed=1, minutes=3.0)
+    other = Settings(asked.sets, asked.adapters, 2, 0, seed=1, minutes=3.0)
     assert timeless(run(other, tmp_path / "c").records) != timeless(first.records)
 
 
 def test_goals_that_move_are_followed_frame_by_frame(fakes: ModuleType, tmp_path: Path) -> None:
-    asked = Settings((fakes.MOVING,), (fakes.entrant("solves"),), 1, 0, minutes=3.0)
+    asked = Settings((fakes.MOVING,), (fakes.adapter("solves"),), 1, 0, minutes=3.0)
     (record,) = run(asked, tmp_path).records
     assert record.frames == 5
     assert record.worst < 1e-3
@@ -106,8 +106,8 @@ cloudpickle.register_pickle_by_value(fakes)
 from wholebody.bench.compare.run import run
 from wholebody.bench.compare.settings import Settings
 if __name__ == "__main__":
-    entrants = (fakes.entrant("solves"), fakes.entrant("sleeps"))
-    run(Settings((fakes.SET,), entrants, 6, 1, cap=5.0, minutes=3.0), Path(sys.argv[2]), jobs=2)
+    adapters = (fakes.adapter("solves"), fakes.adapter("sleeps"))
+    run(Settings((fakes.SET,), adapters, 6, 1, cap=5.0, minutes=3.0), Path(sys.argv[2]), jobs=2)
 """
 
 
@@ -144,7 +144,7 @@ def test_a_finished_run_is_not_run_again(fakes: ModuleType, tmp_path: Path) -> N
 
 
 def test_a_set_that_cannot_be_built_is_an_error_with_its_reason(fakes: ModuleType, tmp_path: Path) -> None:
-    asked = Settings((fakes.BROKEN,), (fakes.entrant("solves"),), 1, 0, minutes=3.0)
+    asked = Settings((fakes.BROKEN,), (fakes.adapter("solves"),), 1, 0, minutes=3.0)
     with pytest.raises(WholebodyError, match="RuntimeError: the set is broken"):
         run(asked, tmp_path)
 

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from wholebody.assessment import assess
-from wholebody.bench.entrants.base import Entrant
+from wholebody.bench.adapters.base import Adapter
 from wholebody.problem import Problem
 from wholebody.solution import Solution, Status
 
@@ -30,10 +30,10 @@ class Fake:
 
 
 @pytest.fixture
-def fake() -> Callable[..., Entrant]:
-    """Return a function: an answer to a problem, and a status -> an entrant."""
+def fake() -> Callable[..., Adapter]:
+    """Return a function: an answer to a problem, and a status -> an adapter."""
 
-    def made(answer: Callable[[Problem], Array], status: Status = "stalled") -> Entrant:
-        return Entrant("fake", lambda tolerance, iterations: Fake(answer, status), (), "made up")
+    def made(answer: Callable[[Problem], Array], status: Status = "stalled") -> Adapter:
+        return Adapter("fake", lambda tolerance, iterations: Fake(answer, status), (), "made up")
 
     return made

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wholebody.assessment import assess
-from wholebody.bench.entrants import entrants
+from wholebody.bench.adapters import adapters
 from wholebody.bench.stability.case import HardCase, Nonsense, Posed, Stream
 from wholebody.bench.stability.catalogue import QUICK, cases, names
 from wholebody.bench.stability.rows import result
@@ -48,7 +48,7 @@ def test_names_are_unique_and_unknown_ones_are_refused() -> None:
 
 
 def test_every_nonsense_is_refused_by_what_states_problems() -> None:
-    qp = entrants(["qp/osqp"])[0]
+    qp = adapters(["qp/osqp"])[0]
     question = cases(["not-a-number"])[0].question()
     assert isinstance(question, Nonsense)
     for attempt in question.attempts.values():
@@ -76,7 +76,7 @@ def test_best_answers_that_are_known_are_possible() -> None:
 
 
 def test_qp_is_never_wrong() -> None:
-    qp = entrants(["qp/osqp"])
+    qp = adapters(["qp/osqp"])
     chosen = cases(FAST)
     found = result(chosen, ["qp/osqp"], list(run(chosen, qp, jobs=2)))
     wrong = {key: verdict.figure for key, verdict in found.verdicts.items() if verdict.kind == "wrong"}

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from wholebody.bench.entrants import entrants
+from wholebody.bench.adapters import adapters
 from wholebody.bench.stability import page
 from wholebody.bench.stability.catalogue import cases
 from wholebody.bench.stability.rows import Result, StabilityRow, result
@@ -52,13 +52,13 @@ def test_a_page_is_whole_or_not_begun(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def found() -> Result:
-    chosen, asked = cases(CASES[:2]), entrants(METHODS)
+    chosen, asked = cases(CASES[:2]), adapters(METHODS)
     return result(chosen, METHODS, list(run(chosen, asked)))
 
 
 def test_the_page_tells_every_case_with_its_picture_and_verdicts(found: Result) -> None:
     drawn = {"edge-on-edge": [(Path("x/edge-on-edge.jpg"), "The answer of qp/osqp; transparent, the start.")]}
-    text = page.page(found, entrants(METHODS), {"wholebody": "1"}, drawn, "assets/stability")
+    text = page.page(found, adapters(METHODS), {"wholebody": "1"}, drawn, "assets/stability")
     for case in found.cases:
         assert f"### {case.title}\n\n{case.why}\n\n*Acceptable.* {case.acceptable}" in text
     assert "(assets/stability/edge-on-edge.jpg)" in text

@@ -11,24 +11,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wholebody.bench.entrants.base import Entrant
+from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.stability.answering import NOTHING, Answer
-from wholebody.bench.stability.audit import ALONE, audited
 from wholebody.bench.stability.case import Stream
 from wholebody.bench.stability.catalogue import cases
 from wholebody.bench.stability.judging import Judged, judge
 from wholebody.bench.stability.rows import result
 from wholebody.bench.stability.running import run
-from wholebody.bench.stability.verdict import Verdict, decide, length
+from wholebody.bench.stability.verdict import ALONE, Verdict, audited, decide, length
 from wholebody.errors import InputError
 from wholebody.problem import Problem
 
-Fakes = Callable[..., Entrant]
+Fakes = Callable[..., Adapter]
 
 
-def verdict(name: str, entrant: Entrant, cap: float = 20.0) -> Verdict:
+def verdict(name: str, adapter: Adapter, cap: float = 20.0) -> Verdict:
     chosen = cases([name])
-    return result(chosen, [entrant.name], list(run(chosen, [entrant], cap=cap))).verdicts[name, entrant.name]
+    return result(chosen, [adapter.name], list(run(chosen, [adapter], cap=cap))).verdicts[name, adapter.name]
 
 
 def at(*values: float) -> Callable[[Problem], np.ndarray]:

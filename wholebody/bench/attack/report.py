@@ -1,18 +1,21 @@
-"""The counts of an attack as text, and its failures as folders with scripts that repeat them."""
+"""The counts of an attack, as rows and as text, and its failures as folders with scripts that repeat them."""
 
 from __future__ import annotations
 
+import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from wholebody.bench.attack.case import KINDS, SCRIPT, Case
-from wholebody.bench.attack.child import put
-from wholebody.bench.attack.counting import SLOW, Row, counted, is_slow, percentiles
-from wholebody.bench.attack.running import Ended
+import numpy as np
+
+from wholebody.bench.attack.case import KINDS, SCRIPT, Case, Outcome
+from wholebody.bench.attack.running import Ended, put
 from wholebody.bench.intervals import wilson
-from wholebody.bench.machine import sentence
-from wholebody.bench.tables import markdown, write_text
+from wholebody.bench.report import render
+from wholebody.bench.tables import write_text
 
 ATTACKED = {
     "solve": "solves, judged by coal over all pairs and by Pinocchio",
@@ -35,35 +38,18 @@ _QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"|\([^)]*\)")
 
 def report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:
     """Return the counts as Markdown."""
-    lines = []
+    kinds = []
     for kind in KINDS:
         found = counted(rows, kind)
-        total = sum(found.values())
-        if total:
-            most = 100.0 * wilson(found["wrong"], total)[1]
-            counts = [str(found[name]) for name in ("right", "refused", "gave up")]
-            lines.append([ATTACKED[kind], str(total), *counts, _strong(found["wrong"]), f"{most:.2g} %"])
-    head = ["attacked", "cases", "right", "refused", "gave up", "wrong", "wrong at most"]
-    parts = [markdown(head, lines)]
-    if any(one.kind == "solve" for one in rows):
-        parts += [_times(rows), f"Solves that took more than {SLOW:g} s: {_strong(sum(map(is_slow, rows)))}."]
-    seeds = ", ".join(str(seed) for seed in sorted({one.seed for one in rows}))
-    return "\n\n".join([*parts, f"Seed {seeds}. {sentence(facts)}"])
-
-
-def _times(rows: Sequence[Row]) -> str:
+        if found.total():
+            kinds.append((ATTACKED[kind], found, wilson(found["wrong"], found.total())[1]))
     statuses: list[str | None] = ["solved", "unreachable", "infeasible", "stalled", None]
-    lines = []
-    for status in statuses:
-        count, middle, high, most = percentiles(rows, status)
-        if count:
-            times = [f"{1e3 * value:.3g}" for value in (middle, high, most)]
-            lines.append([f"`{status}`" if status else "all", str(count), *times])
-    return markdown(["solves that end", "count", "p50 [ms]", "p95 [ms]", "longest [ms]"], lines)
-
-
-def _strong(count: int) -> str:
-    return f"**{count}**" if count else "0"
+    solves = [(status, count, times) for status in statuses for count, *times in [percentiles(rows, status)] if count]
+    asked = any(one.kind == "solve" for one in rows)
+    return render(
+        "attack.md", kinds=kinds, asked=asked, solves=solves, slow=SLOW, late=sum(map(is_slow, rows)),
+        seeds=sorted({one.seed for one in rows}), facts=facts,
+    )  # fmt: skip
 
 
 def keep(ended: Ended, folder: Path) -> None:
@@ -87,14 +73,62 @@ def index(rows: Sequence[Row], folder: Path) -> None:
         late = is_slow(one) and one.outcome != "wrong"
         if one.outcome == "wrong" or late:
             alike.setdefault((one.kind, f"slow: {one.status}" if late else signature(one.words)), []).append(one)
-    lines = ["# Failures", "", f"Each folder has a {SCRIPT} that repeats its failure: `python FOLDER/{SCRIPT}`.", ""]
     order = sorted(alike.items(), key=lambda item: (list(KINDS).index(item[0][0]), -len(item[1])))
-    for (kind, _), found in order:
-        lines.append(f"- **{kind}**, {len(found)} times: {found[0].words} ({found[0].seconds:.2f} s)")
-        lines += [f"    - {Case(one.seed, one.number, one.kind).name}" for one in found[:5]]
-    write_text(folder / INDEX, "\n".join(lines) + "\n")
+    listed = [
+        (kind, found, [Case(one.seed, one.number, one.kind).name for one in found[:5]]) for (kind, _), found in order
+    ]
+    write_text(folder / INDEX, render("attack_failures.md", script=SCRIPT, alike=listed) + "\n")
 
 
 def signature(words: str) -> str:
     """Return words without their numbers and names, by which alike failures are found."""
     return _NUMBER.sub("#", _QUOTED.sub("...", words.partition(";")[0]))[:120]
+
+
+SLOW = 5.0  # s: of CPU time for a solve
+
+
+@dataclass(frozen=True)
+class Row:
+    """One case, as it is written down.
+
+    Attributes:
+        kind, seed, number: which case.
+        outcome: what came of it.
+        status: what the answer says of itself.
+        seconds: CPU time of the call under attack.
+        words: what was found.
+    """
+
+    kind: str
+    seed: int
+    number: int
+    outcome: str
+    status: str
+    seconds: float
+    words: str
+
+
+def row(ended: Ended) -> Row:
+    """Return the line of a case."""
+    case, verdict = ended.case, ended.verdict
+    words = " ".join(verdict.words.split()).encode("ascii", errors="backslashreplace").decode()
+    return Row(case.kind, case.seed, case.number, verdict.outcome, verdict.status, verdict.seconds, words)
+
+
+def counted(rows: Sequence[Row], kind: str) -> Counter[Outcome]:
+    """Return how many cases of a kind came to what."""
+    return Counter(one.outcome for one in rows if one.kind == kind)  # type: ignore[misc]
+
+
+def is_slow(one: Row) -> bool:
+    """Whether a solve took longer than `SLOW`."""
+    return one.kind == "solve" and one.seconds > SLOW
+
+
+def percentiles(rows: Sequence[Row], status: str | None = None) -> tuple[int, float, float, float]:
+    """Return how many solves there are with a status (None for any), and their p50, p95 and longest, seconds."""
+    times = [one.seconds for one in rows if one.kind == "solve" and one.status and status in (None, one.status)]
+    if not times:
+        return 0, math.nan, math.nan, math.nan
+    return len(times), float(np.median(times)), float(np.quantile(times, 0.95)), max(times)

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import signal
+import resource
 import time
+import traceback
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from typing import Any
+from functools import cache
+from pathlib import Path
 
-from wholebody.bench.attack.case import Case, Verdict, Written
-from wholebody.bench.attack.child import serve
+from wholebody.bench.attack.case import SCRIPT, Case, Verdict, Written
+from wholebody.bench.attack.writing import write
+from wholebody.errors import WholebodyError
+from wholebody.files import Scratch
+from wholebody.runner import ONE_THREAD, Child, EndedError, Job, allow, run_jobs, tell
 
 DEADLINE = 60.0  # s: a case that takes longer, twice, hangs
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-"""Set to 1 in the processes: CPU time of one thread is what a call takes on an idle machine."""
+WRITING = 300.0  # s: to write a case
+WARMING = 1800.0  # s: to compile everything on a machine that has other things to do
+MEMORY = 4 << 30  # bytes: a file that asks for more is no reason to bring the machine down
 
 
 @dataclass(frozen=True)
@@ -34,105 +39,104 @@ class Ended:
     verdict: Verdict
 
 
-def attack(
-    number_of: Iterator[Case], jobs: int, going: Callable[[], bool], deadline: float = DEADLINE
-) -> Iterator[Ended]:
+def attack(cases: Iterator[Case], jobs: int, going: Callable[[], bool], deadline: float = DEADLINE) -> Iterator[Ended]:
     """Run cases, and return them as they end.
 
     Args:
-        number_of: the cases.
-        jobs: processes at a time.
+        cases: what is run.
+        jobs: processes at a time. Their libraries have one thread, whose CPU time is what a call takes on an idle
+            machine.
         going: asked before each case; no more are begun once it says no.
         deadline: seconds for a case.
     """
-    children = [_Child(deadline) for _ in range(jobs)]
+    again: deque[Case] = deque()
+    repeated: set[Case] = set()
+
+    def next_job() -> Job | None:
+        case = again.popleft() if again else next(cases, None) if going() else None
+        return None if case is None else Job(case, _attacked, (case, deadline), WARMING)
+
+    for outcome in run_jobs(next_job, [Child(ONE_THREAD) for _ in range(jobs)]):
+        case = outcome.job.name
+        written = outcome.notes[0] if outcome.notes else None
+        error = outcome.error
+        if error is None:
+            yield Ended(case, written, outcome.answer)
+        elif error.overtime and case not in repeated:  # a machine that stood still is no fault of the case
+            repeated.add(case)
+            again.append(case)
+        else:
+            yield Ended(case, written, _died(error, written, deadline))
+
+
+def _died(error: EndedError, written: Written | None, deadline: float) -> Verdict:
+    when = "the case" if written else "the writing of the case"
+    if error.overtime:
+        return Verdict("wrong", f"hangs: {when} had not ended after {deadline:g} s", deadline)
+    return Verdict("wrong", f"the process died over {when}: {error.how}")
+
+
+def _attacked(case: Case, deadline: float) -> Verdict:
+    """Write a case, tell it, and run it, in a process of its own."""
+    _prepare()
+    allow(WRITING)
     try:
-        for child in children:
-            child.begin(number_of, going)
-        while busy := [child for child in children if child.case is not None]:
-            for ear in wait([child.ear for child in busy]):
-                child = next(child for child in busy if child.ear is ear)
-                ended = child.listen()
-                if ended is not None:
-                    child.begin(number_of, going)
-                    yield ended
-    finally:
-        for child in children:
-            child.end()
+        prepared = write(case)
+    except WholebodyError as error:
+        return Verdict("refused", str(error)[:300])
+    except Exception as error:
+        return Verdict("wrong", f"while it was written: {_said(error)}")
+    tell(prepared)
+    allow(deadline)
+    return run(prepared)
 
 
-class _Child:
-    """A process that runs cases."""
-
-    def __init__(self, deadline: float) -> None:
-        self._deadline = deadline
-        self.case: Case | None = None
-        self._written: Written | None = None
-        self._again = self._hung = False
-        self._start()
-
-    def _start(self) -> None:
-        context: Any = multiprocessing.get_context("spawn")
-        self.ear: Connection
-        self.ear, theirs = context.Pipe()
-        before = {name: os.environ.get(name) for name in THREADS}
-        os.environ.update(dict.fromkeys(THREADS, "1"))
+def run(prepared: Written) -> Verdict:
+    """Run a case in a folder of its own, and return its verdict: "wrong" for an error that is none of ours."""
+    with Scratch() as folder:
+        put(prepared, folder)
+        began = time.process_time()
+        known: dict[str, object] = {"__name__": "__main__", "__file__": str(folder / SCRIPT)}
         try:
-            self._process = context.Process(target=serve, args=(theirs, self._deadline), daemon=True)
-            self._process.start()
-        finally:
-            for name, value in before.items():
-                if value is None:
-                    del os.environ[name]
-                else:
-                    os.environ[name] = value
-        theirs.close()
+            exec(compile(prepared.script, SCRIPT, "exec"), known)
+        except WholebodyError as error:
+            return Verdict("refused", str(error)[:300], time.process_time() - began)
+        except Exception as error:
+            return Verdict("wrong", _said(error), time.process_time() - began)
+    verdict = known["verdict"]
+    assert isinstance(verdict, Verdict)
+    return verdict
 
-    def begin(self, cases: Iterator[Case], going: Callable[[], bool]) -> None:
-        """Begin the next case, if there is to be one."""
-        self.case = next(cases, None) if going() else None
-        self._again = False
-        self._send()
 
-    def _send(self) -> None:
-        self._written = None
-        if self.case is not None:
-            self.ear.send(self.case)
+def put(prepared: Written, folder: Path) -> None:
+    """Write a case's files into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / SCRIPT).write_text(prepared.script, encoding="utf-8")
+    for name, contents in prepared.files.items():
+        (folder / name).write_bytes(contents)
 
-    def listen(self) -> Ended | None:
-        """The case's end, if that is what was heard."""
-        assert self.case is not None
-        try:
-            heard = self.ear.recv()
-        except (EOFError, ConnectionResetError):
-            ended = Ended(self.case, self._written, self._died())
-            self._start()
-            if self._hung and not self._again:  # a machine that stood still is no fault of the case
-                self._again = True
-                self._send()
-                return None
-            return ended
-        if isinstance(heard, Written):
-            self._written = heard
-            return None
-        return Ended(self.case, self._written, heard)
 
-    def _died(self) -> Verdict:
-        self._process.join()
-        code = self._process.exitcode or 0
-        self._hung = code == -signal.SIGALRM
-        self.ear.close()
-        when = "the case" if self._written else "the writing of the case"
-        if self._hung:
-            return Verdict("wrong", f"hangs: {when} had not ended after {self._deadline:g} s", self._deadline)
-        how = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-        return Verdict("wrong", f"the process died over {when}: {how}")
+def _said(error: Exception) -> str:
+    """The error with the place in the package that raised it."""
+    frames = traceback.extract_tb(error.__traceback__)
+    ours = [frame for frame in frames if f"{os.sep}wholebody{os.sep}" in frame.filename] or list(frames)
+    place = f"{Path(ours[-1].filename).name}, {ours[-1].name}" if ours else "unknown place"
+    words = str(error).strip().splitlines()
+    return f"{type(error).__name__} in {place}: {words[0][:200] if words else ''}"
 
-    def end(self) -> None:
-        """End the process."""
-        self._process.kill()
-        self._process.join()
-        self.ear.close()
+
+@cache
+def _prepare() -> None:
+    """Bound the memory of this process; compile and import what cases need, so that none is timed with it."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    import wholebody as wb
+    from wholebody.methods import installed_methods
+
+    scene = wb.Scene(wb.load("avatar")).add(wb.HalfSpace(), name="floor")
+    problem = wb.Problem(scene, goals=[wb.Point(scene.figure.frames[0], (0.3, 0.0, 1.0))])
+    for method in installed_methods():
+        wb.solve(problem, method=method)
+    scene.sweep(problem.start, scene.figure.neutral)
 
 
 def for_seconds(seconds: float) -> Callable[[], bool]:

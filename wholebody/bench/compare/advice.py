@@ -13,6 +13,7 @@ from wholebody.bench.compare.record import FLOOR
 from wholebody.bench.compare.results import EFFORT_FLOOR, Results, middle
 from wholebody.bench.compare.summary import GOOD, Summary
 from wholebody.bench.intervals import wilson
+from wholebody.bench.report import words
 
 NOTHING = Ratio(nan, 0.0, inf, 0)
 
@@ -43,7 +44,7 @@ class Standing(NamedTuple):
     """A method over all sets.
 
     Attributes:
-        entrant: its name.
+        adapter: its name.
         taken: sets of which it takes every case.
         dependable: sets of which it solves at least 98 %.
         worst_set, worst_share: where it solves least of what it takes.
@@ -52,7 +53,7 @@ class Standing(NamedTuple):
         deepest_mm: deepest overlap of all answers.
     """
 
-    entrant: str
+    method: str
     taken: int
     dependable: int
     worst_set: str
@@ -68,10 +69,10 @@ def choices(results: Results, rows: Sequence[Summary]) -> list[Choice]:
 
 
 def _choice(results: Results, family: str, rows: Sequence[Summary]) -> Choice:
-    good = [row.entrant for row in rows if row.dependable]
+    good = [row.method for row in rows if row.dependable]
     given = max((row.cases for row in rows), default=0)  # others had easier or harder problems
     shares = {
-        row.entrant: row.success * (row.cases - row.refused) / row.cases
+        row.method: row.success * (row.cases - row.refused) / row.cases
         for row in rows
         if row.refused < row.cases == given
     }
@@ -84,7 +85,7 @@ def _choice(results: Results, family: str, rows: Sequence[Summary]) -> Choice:
     cheap = paired.best(efforts)
     return Choice(
         family,
-        fast, next((row.median_ms for row in rows if fast and row.entrant == fast[0]), nan),
+        fast, next((row.median_ms for row in rows if fast and row.method == fast[0]), nan),
         exact, middle(list(errors[exact[0]].values())) if exact else nan,
         cheap, middle(list(efforts[cheap[0]].values())) if cheap else nan,
         leading, most,
@@ -93,27 +94,27 @@ def _choice(results: Results, family: str, rows: Sequence[Summary]) -> Choice:
 
 def reference(results: Results) -> str:
     """The method that others' times are compared with: our default, or the first where it did not take part."""
-    return OURS if OURS in results.entrants else next(iter(results.entrants), "")
+    return OURS if OURS in results.adapters else next(iter(results.adapters), "")
 
 
 def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
     """All methods, the most dependable first, and of equal ones the fastest."""
     base = paired.times(results, results.sets, reference(results))
     found = []
-    for entrant in results.entrants:
-        mine = [row for row in rows if row.entrant == entrant]
+    for adapter in results.adapters:
+        mine = [row for row in rows if row.method == adapter]
         if not mine:
             continue
         judged = [row for row in mine if row.refused < row.cases]
         worst = min(judged, key=lambda row: row.success, default=None)
         found.append(
             Standing(
-                entrant,
+                adapter,
                 sum(not row.refused for row in mine),
                 sum(row.dependable for row in mine),
                 worst.set if worst else "",
                 worst.success if worst else nan,
-                paired.ratio(paired.times(results, results.sets, entrant), base) if base else NOTHING,
+                paired.ratio(paired.times(results, results.sets, adapter), base) if base else NOTHING,
                 sum(row.false_claims for row in mine),
                 max((row.deepest_mm for row in judged if isfinite(row.deepest_mm)), default=nan),
             )
@@ -157,7 +158,7 @@ def _in_doubt(results: Results, ranked: Sequence[Standing]) -> str:
     most = max((one.dependable for one in ranked), default=0)
     if not most:
         return f"**No method solves {100 * GOOD:.0f} % of any set.** Look at each set before choosing."
-    names = [one.entrant for one in ranked if one.dependable == most]
+    names = [one.method for one in ranked if one.dependable == most]
     alike = paired.best({name: paired.times(results, results.sets, name) for name in names})
     apart = "" if len(alike) == 1 else " Their times cannot be told apart." if len(paired.algorithms(alike)) > 1 else ""
     if not apart and len(alike) > 1:
@@ -171,7 +172,7 @@ def _in_doubt(results: Results, ranked: Sequence[Standing]) -> str:
 
 def _warning(standing: Standing, rows: Sequence[Summary]) -> list[str]:
     """That a method is not enough, if in no set so many problems that it might be dependable after all are solved."""
-    mine = [row for row in rows if row.entrant == standing.entrant and row.refused < row.cases]
+    mine = [row for row in rows if row.method == standing.method and row.refused < row.cases]
     for row in mine:
         count = row.cases - row.refused
         if not row.refused and wilson(round(row.success * count), count)[1] >= GOOD:
@@ -179,7 +180,7 @@ def _warning(standing: Standing, rows: Sequence[Summary]) -> list[str]:
     best = max(mine, key=lambda row: row.success)
     deep = f", and ends up to {standing.deepest_mm:.0f} mm inside of things" if standing.deepest_mm > 1.0 else ""
     return [
-        f"**`{standing.entrant}` alone is not enough:** of what it takes it solves at most {100 * best.success:.0f} % "
+        f"**`{standing.method}` alone is not enough:** of what it takes it solves at most {100 * best.success:.0f} % "
         f"({words(best.set)}) and in {words(standing.worst_set)} {100 * standing.worst_share:.0f} %{deep}."
     ]
 
@@ -199,8 +200,3 @@ def slowness(found: Ratio) -> str:
     if not isfinite(found.value):
         return ""
     return f"× {found.value:.2g} [{found.low:.2g}, {found.high:.2g}]"
-
-
-def words(name: str) -> str:
-    """The name of a set as one reads it."""
-    return name.replace("_", " ")

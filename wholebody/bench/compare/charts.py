@@ -1,17 +1,19 @@
-"""The charts of a comparison: speed against accuracy by set and quantity, and the share solved within a time."""
+"""The charts of a comparison: curves of speed against accuracy, a point a budget; the share solved within a time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from wholebody.bench import style
-from wholebody.bench.compare.curves import Point, curve, profile
-from wholebody.bench.compare.looks import look
+import numpy as np
+
+from wholebody.bench import plot_style
+from wholebody.bench.adapters.base import Budget
 from wholebody.bench.compare.record import COARSE, FINE
-from wholebody.bench.compare.results import Quantity, Results
+from wholebody.bench.compare.results import Quantity, Results, middle
+from wholebody.bench.plot_style import look
 
 BAND = 30.0  # where points are drawn whose median is no answer: above all values, which are metres, radians, shares
 GREY = "#666666"
@@ -26,24 +28,24 @@ def speed_accuracy(results: Results, family: str, title: str, path: Path) -> tup
     quantities = results.quantities(family)
     columns = 2
     rows = -(-len(quantities) // columns)
-    chart, axes = style.figure(rows, columns, (11.0, 3.9 * rows + 0.7))
+    chart, axes = plot_style.figure(rows, columns, (11.0, 3.9 * rows + 0.7))
     panels = [axes[place // columns][place % columns] for place in range(rows * columns)]
     for panel in panels[len(quantities) :]:
         panel.set_visible(False)
     drawn: dict[str, Any] = {}
     for panel, quantity in zip(panels, quantities, strict=False):
-        for entrant in reversed(results.entrants):
-            points = curve(results, family, entrant, quantity)
+        for adapter in reversed(results.adapters):
+            points = curve(results, family, adapter, quantity)
             if points:
-                drawn[entrant] = _draw(panel, points, entrant, quantity)
+                drawn[adapter] = _draw(panel, points, adapter, quantity)
         _dress(panel, quantity, "a frame" if results.moving(family) else "a solve")
     chart.suptitle(title, x=0.01, ha="left", fontsize=13)
     _legend(chart, results, drawn)
-    return style.save(chart, path)
+    return plot_style.save(chart, path)
 
 
-def _draw(panel: Any, points: list[Point], entrant: str, quantity: Quantity) -> Any:
-    seen = look(entrant)
+def _draw(panel: Any, points: list[Point], adapter: str, quantity: Quantity) -> Any:
+    seen = look(adapter)
     order = 3 if seen.principal else 2
     width, size = (1.8, 6.0) if seen.principal else (0.9, 4.0)
     x = [MS * point.seconds for point in points]
@@ -81,7 +83,7 @@ def lowest(points: list[Point]) -> list[Point]:
 def _dress(panel: Any, quantity: Quantity, what: str) -> None:
     from matplotlib.ticker import LogLocator, NullLocator
 
-    _time_axis(panel)
+    plot_style.plain_log(panel)
     panel.set_yscale("log")
     panel.yaxis.set_minor_locator(NullLocator())  # ten decades have a hundred, and each is laid out
     panel.yaxis.set_major_locator(LogLocator(numticks=12))
@@ -96,24 +98,24 @@ def _dress(panel: Any, quantity: Quantity, what: str) -> None:
 
 def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Path, Path]:
     """Share of the cases solved within a time at the default budget, to a millimetre and to a tenth of one."""
-    chart, axes = style.figure(1, 2, (11.0, 4.6))
+    chart, axes = plot_style.figure(1, 2, (11.0, 4.6))
     drawn: dict[str, Any] = {}
-    known = [time for entrant in results.entrants for time in profile(results, family, entrant, COARSE)[0]]
+    known = [time for adapter in results.adapters for time in profile(results, family, adapter, COARSE)[0]]
     start, end = 0.7 * MS * min(known, default=1.0), 1.5 * MS * max(known, default=1.0)
     for panel, tolerance in zip(axes[0], (COARSE, FINE), strict=True):
-        for entrant in reversed(results.entrants):
-            times, cases = profile(results, family, entrant, tolerance)
+        for adapter in reversed(results.adapters):
+            times, cases = profile(results, family, adapter, tolerance)
             if not cases:
                 continue
-            seen = look(entrant)
+            seen = look(adapter)
             shares = [100.0 * (place + 1) / cases for place in range(len(times))]
             x = [MS * time for time in times]
-            (drawn[entrant],) = panel.step(
+            (drawn[adapter],) = panel.step(
                 [start, *x, end], [0.0, *shares, shares[-1] if shares else 0.0], where="post",
                 color=seen.color, linewidth=1.9 if seen.principal else 0.9, zorder=3 if seen.principal else 2,
             )  # fmt: skip
         panel.axhline(98.0, color=GREY, linewidth=0.9, linestyle="--", zorder=1)
-        _time_axis(panel)
+        plot_style.plain_log(panel)
         panel.set_xlim(start, end)
         panel.set_ylim(0.0, 103.0)
         panel.set_title(f"solved to {tolerance:g} m and rad", loc="left", fontsize=10)
@@ -121,20 +123,11 @@ def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Pat
         panel.set_ylabel("cases solved within the time [%]")
     chart.suptitle(title, x=0.01, ha="left", fontsize=13)
     _legend(chart, results, drawn)
-    return style.save(chart, path)
-
-
-def _time_axis(panel: Any) -> None:
-    from matplotlib.ticker import LogLocator, NullLocator
-
-    panel.set_xscale("log")
-    panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    panel.xaxis.set_major_formatter("{x:g}")
-    panel.xaxis.set_minor_locator(NullLocator())
+    return plot_style.save(chart, path)
 
 
 def _legend(chart: Any, results: Results, drawn: dict[str, Any]) -> None:
-    names = [entrant for entrant in results.entrants if entrant in drawn]
+    names = [adapter for adapter in results.adapters if adapter in drawn]
     if names:
         chart.legend(
             [drawn[name] for name in names], names, loc="outside lower center", ncols=min(len(names), 6),
@@ -158,3 +151,43 @@ def draw_all(results: Results, titles: Iterable[tuple[str, str]], folder: Path) 
         drawn[f"compare-{name}"] = speed_accuracy(results, family, title, folder / f"compare-{name}")
         drawn[f"compare-{name}-profile"] = profiles(results, family, title, folder / f"compare-{name}-profile")
     return drawn
+
+
+class Point(NamedTuple):
+    """One method at one budget.
+
+    Attributes:
+        level: the budget.
+        cases: how many it stands for.
+        seconds, seconds_p95: median, and 95 %, of the call [s].
+        value: median; infinite where more than half of the answers are none.
+        low, high: quartiles.
+    """
+
+    level: Budget
+    cases: int
+    seconds: float
+    seconds_p95: float
+    value: float
+    low: float
+    high: float
+
+
+def curve(results: Results, family: str, adapter: str, quantity: Quantity) -> list[Point]:
+    """Points of a method in a set, from the fastest budget to the slowest."""
+    cases = results.swept(family, adapter)
+    points = []
+    for level in results.levels(family, adapter):
+        seconds, values = results.values(family, adapter, level, quantity, cases)
+        spent = seconds[np.isfinite(seconds)]
+        if not len(spent):
+            continue
+        quartiles = [middle(values, share) for share in (0.5, 0.25, 0.75)]
+        points.append(Point(level, len(cases), middle(spent), middle(spent, 0.95), *quartiles))
+    return points
+
+
+def profile(results: Results, family: str, adapter: str, tolerance: float) -> tuple[list[float], int]:
+    """Times of the cases that a method solved at its default budget, sorted, and how many it took."""
+    mine = results.taken(family, adapter)
+    return sorted(record.seconds for record in mine if record.success(tolerance)), len(mine)

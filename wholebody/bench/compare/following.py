@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
 from wholebody.bench.compare.record import ANSWERED, Record
 from wholebody.bench.problem_sets.case import Case
 from wholebody.methods.base import SolvedStep, Tracker
+from wholebody.motion_assessment import third_differences
 from wholebody.problem import Problem
 
 Array = NDArray[np.float64]
@@ -92,10 +91,8 @@ def _summary(frames: list[_Frame], case: Case, empty: Record) -> Record:
 
 def jerk(model: Any, postures: list[Array], dt: float) -> float:
     """Root mean square over frames and degrees of freedom of the third difference of postures [rad/s^3, m/s^3]."""
-    steps = np.array([pin.difference(model, a, b) for a, b in pairwise(postures)])
-    if len(steps) < 3:
-        return 0.0
-    return float(np.sqrt(np.mean(np.diff(steps, 2, axis=0) ** 2))) / dt**3
+    found = third_differences(model, np.array(postures), dt)
+    return float(np.sqrt(np.mean(found**2))) if len(found) else 0.0
 
 
 def turns(gaps: Array) -> int:

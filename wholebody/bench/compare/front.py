@@ -63,7 +63,7 @@ class Rival:
 def time_to(
     results: Results,
     family: str,
-    entrant: str,
+    adapter: str,
     quantity: Quantity,
     accuracy: float,
     cases: frozenset[int],
@@ -71,8 +71,8 @@ def time_to(
 ) -> float:
     """Seconds of a method to an accuracy; infinite where it gets there in less than that share of the cases."""
     times = [inf]
-    for level in results.levels(family, entrant):
-        seconds, values = results.values(family, entrant, level, quantity, cases)
+    for level in results.levels(family, adapter):
+        seconds, values = results.values(family, adapter, level, quantity, cases)
         times.append(middle(np.where(values <= accuracy, seconds, inf), share) if len(seconds) else inf)
     return min(times)
 
@@ -83,7 +83,7 @@ def front(results: Results, family: str, quantity: Quantity, ours: str = OURS, s
     if not own:
         return None
     worst: Rival | None = None
-    for other in results.entrants:
+    for other in results.adapters:
         if other == ours or other.startswith(FAMILY):
             continue
         cases = own & results.swept(family, other)

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from typing import Any
 
-from wholebody.bench.compare.messages import Build, Solve, Warm
+from wholebody.bench.adapters.base import FIRST_FIT, Adapter, Budget
 from wholebody.bench.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Record
+from wholebody.bench.compare.solving import BUILDING, Which, built, solved, warmed
 from wholebody.bench.compare.store import Chunk
-from wholebody.bench.compare.worker import EndedError, Worker, own_worker
-from wholebody.bench.entrants.base import FIRST_FIT, Budget, Entrant
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.errors import MissingPackageError, WholebodyError
+from wholebody.runner import ONE_THREAD, Child, EndedError
+
+ORPHANED = 1.0  # s: how often a process looks whether its parent is still there
+
+_local = threading.local()
 
 
 @dataclass(frozen=True)
@@ -31,17 +38,18 @@ class Task:
     family: ProblemSet
     number: int
     seed: int
-    solves: tuple[tuple[Entrant, tuple[Budget, ...]], ...]
+    solves: tuple[tuple[Adapter, tuple[Budget, ...]], ...]
     cap: float
     most: float
 
 
 def work(task: Task) -> Chunk:
     """Build a case and let every method solve it, one after the other in a process of their own."""
-    worker = own_worker()
+    child, which = own_child(), Which(task.family, task.number, task.seed)
+    child.close_if_full()
     began = time.perf_counter()
     try:
-        fault = worker.build(Build(task.family, task.number, task.seed))
+        fault = child.call(built, which, seconds=BUILDING)
     except EndedError as error:
         fault = str(error)
     building = time.perf_counter() - began
@@ -49,21 +57,21 @@ def work(task: Task) -> Chunk:
         return Chunk(task.family.name, task.number, (), building=building, fault=fault)
     records: list[Record] = []
     spent, swept = {}, {}
-    for entrant, ladder in task.solves:
-        worker.warm(Warm(entrant, task.cap))  # seconds of compiling, which say nothing of what its solves cost
+    for adapter, ladder in task.solves:
+        _warm_up(child, which, adapter, task.cap)  # seconds of compiling, which say nothing of what its solves cost
         began = time.perf_counter()
-        first, ended = _solve(worker, entrant, DEFAULT, task)
+        first, ended = _solve(child, adapter, DEFAULT, task)
         records.append(first)
         between = time.perf_counter()
-        spent[entrant.name] = between - began
-        if ladder and spent[entrant.name] * len(ladder) <= task.most:
-            records += _sweep(worker, entrant, ladder, task, first, ended)
-            swept[entrant.name] = time.perf_counter() - between
+        spent[adapter.name] = between - began
+        if ladder and spent[adapter.name] * len(ladder) <= task.most:
+            records += _sweep(child, adapter, ladder, task, first, ended)
+            swept[adapter.name] = time.perf_counter() - between
     return Chunk(task.family.name, task.number, tuple(records), spent, swept, building)
 
 
 def _sweep(
-    worker: Worker, entrant: Entrant, ladder: Iterable[Budget], task: Task, first: Record, ended: bool
+    child: Child, adapter: Adapter, ladder: Iterable[Budget], task: Task, first: Record, ended: bool
 ) -> list[Record]:
     """All further budgets; where the process has ended over one, the rest count as what they would have been.
 
@@ -77,23 +85,51 @@ def _sweep(
         kind = level[1] == FIRST_FIT
         record, over = last[kind]
         if not over:
-            last[kind] = record, over = _solve(worker, entrant, level, task)
+            last[kind] = record, over = _solve(child, adapter, level, task)
             records.append(record)
         else:
             records.append(replace(record, tolerance=level[0], budget=level[1] or 0))
     return records
 
 
-def _solve(worker: Worker, entrant: Entrant, level: Budget, task: Task) -> tuple[Record, bool]:
+def _solve(child: Child, adapter: Adapter, level: Budget, task: Task) -> tuple[Record, bool]:
     """What came of a solve, and whether the process has ended over it."""
     try:
-        record: Record = worker.solve(Solve(entrant, level, task.cap))
+        which = Which(task.family, task.number, task.seed)
+        record: Record = child.call(solved, which, adapter, level, task.cap, seconds=BUILDING)
     except EndedError as error:
-        empty = Record(task.family.name, task.number, entrant.name, level[0], level[1] or 0, FAILED)
+        empty = Record(task.family.name, task.number, adapter.name, level[0], level[1] or 0, FAILED)
         if error.overtime:
             return replace(empty, outcome=OVERTIME, said=f"ended after {task.cap:g} s"), True
         return replace(empty, said=str(error)), True
     return record, False
+
+
+def _warm_up(child: Child, which: Which, adapter: Adapter, cap: float) -> None:
+    """Let a method import and compile what it needs. What goes wrong over it will do so again in its solve."""
+    if adapter.name in _local.hopeless:
+        return
+    try:
+        child.call(warmed, which, adapter, cap, seconds=BUILDING)
+    except EndedError:
+        _local.hopeless.add(adapter.name)
+
+
+def own_child() -> Child:
+    """The process in which this thread's methods run; it lives as long as this process."""
+    if not hasattr(_local, "child"):
+        _local.child, _local.hopeless = Child(ONE_THREAD), set[str]()
+        if multiprocessing.current_process().name.startswith("LokyProcess"):
+            threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+    child: Child = _local.child
+    return child
+
+
+def _end_with(parent: int) -> None:
+    """End this process, and with it its child, when its parent was killed; joblib's would wait for minutes."""
+    while os.getppid() == parent:
+        time.sleep(ORPHANED)
+    os._exit(1)
 
 
 def compute(tasks: Iterator[Task], jobs: int, cluster: str | None = None) -> Iterator[Chunk]:

@@ -63,47 +63,47 @@ def best(found: Mapping[str, Figures]) -> tuple[str, ...]:
     return tuple(order[:1])
 
 
-def times(results: Results, families: Sequence[str], entrant: str) -> Figures:
+def times(results: Results, families: Sequence[str], adapter: str) -> Figures:
     """Return the seconds of a method for every problem of some sets that it solves at the default budget."""
     return {
         (family, record.number): max(getattr(record, results.clock), 1e-9)
         for family in families
-        for record in results.taken(family, entrant)
+        for record in results.taken(family, adapter)
         if record.success(COARSE)
     }
 
 
-def efforts(results: Results, family: str, entrant: str) -> Figures:
+def efforts(results: Results, family: str, adapter: str) -> Figures:
     """Return the effort above the best known, as a share, for every problem that a method solves."""
     found = {
         (family, record.number): effort_excess(record, results.best(record))
-        for record in results.default(family, entrant)
+        for record in results.default(family, adapter)
         if record.answered
     }
     return {key: value for key, value in found.items() if isfinite(value)}
 
 
-def errors(results: Results, family: str, entrant: str) -> Figures:
+def errors(results: Results, family: str, adapter: str) -> Figures:
     """Return the worst errors of a method at the budget where their median is least, on what it solved at all."""
-    cases = results.swept(family, entrant)
+    cases = results.swept(family, adapter)
     chosen: dict[tuple[str, int], float] = {}
     least = inf
-    for level in results.levels(family, entrant):
-        _, values = results.values(family, entrant, level, WORST, cases)
+    for level in results.levels(family, adapter):
+        _, values = results.values(family, adapter, level, WORST, cases)
         if len(values) and middle(values) < least:
             least = middle(values)
             chosen = {(family, number): float(value) for number, value in zip(sorted(cases), values, strict=True)}
     return {key: max(value, FLOOR) if isfinite(value) else 1.0 for key, value in chosen.items()}
 
 
-def named(entrants: Sequence[str]) -> str:
+def named(adapters: Sequence[str]) -> str:
     """Return methods in words, with the solvers of one method that cannot be told apart."""
-    ours = [name.removeprefix(FAMILY) for name in entrants if name.startswith(FAMILY)]
+    ours = [name.removeprefix(FAMILY) for name in adapters if name.startswith(FAMILY)]
     solvers = f" (any of {', '.join(ours)})" if len(ours) > 1 else ""
-    return ", ".join(f"`{name}`{solvers if name == FAMILY[:-1] else ''}" for name in algorithms(entrants))
+    return ", ".join(f"`{name}`{solvers if name == FAMILY[:-1] else ''}" for name in algorithms(adapters))
 
 
-def algorithms(entrants: Sequence[str]) -> list[str]:
+def algorithms(adapters: Sequence[str]) -> list[str]:
     """Return the names of methods; several solvers of one method have the name of the method."""
-    several = sum(name.startswith(FAMILY) for name in entrants) > 1
-    return list(dict.fromkeys(FAMILY[:-1] if several and name.startswith(FAMILY) else name for name in entrants))
+    several = sum(name.startswith(FAMILY) for name in adapters) > 1
+    return list(dict.fromkeys(FAMILY[:-1] if several and name.startswith(FAMILY) else name for name in adapters))

@@ -35,13 +35,13 @@ class Plan:
     def __init__(self, settings: Settings, jobs: int) -> None:
         self._settings = settings
         self._total = 60.0 * settings.minutes * jobs
-        self._keys = [(family.name, entrant.name) for family in settings.sets for entrant in settings.entrants]
+        self._keys = [(family.name, adapter.name) for family in settings.sets for adapter in settings.adapters]
         self._place = {key: place for place, key in enumerate(self._keys)}
         count = len(self._keys)
         self._spent, self._cases = np.zeros(count), np.zeros(count)
         self._swept, self._sweeps = np.zeros(count), np.zeros(count)
         self._levels = np.array(
-            [len(settings.ladder(entrant, family.moving)) for family in settings.sets for entrant in settings.entrants]
+            [len(settings.ladder(adapter, family.moving)) for family in settings.sets for adapter in settings.adapters]
         )
         self._asked = {family.name: settings.asked(family) for family in settings.sets}
         self._building: dict[str, list[float]] = {family.name: [] for family in settings.sets}
@@ -49,12 +49,12 @@ class Plan:
     def note(self, chunk: Chunk) -> None:
         """Take a finished chunk into account."""
         self._building[chunk.set].append(chunk.building)
-        for entrant, seconds in chunk.spent.items():
-            place = self._place[chunk.set, entrant]
+        for adapter, seconds in chunk.spent.items():
+            place = self._place[chunk.set, adapter]
             self._spent[place] += seconds
             self._cases[place] += 1
-        for entrant, seconds in chunk.swept.items():
-            place = self._place[chunk.set, entrant]
+        for adapter, seconds in chunk.swept.items():
+            place = self._place[chunk.set, adapter]
             self._swept[place] += seconds
             self._sweeps[place] += 1
 

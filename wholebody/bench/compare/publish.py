@@ -7,13 +7,10 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from wholebody.bench.compare import blocks as kinds
 from wholebody.bench.compare import report
-from wholebody.bench.compare.cases import chosen
 from wholebody.bench.compare.charts import draw_all
 from wholebody.bench.compare.front import fronts
-from wholebody.bench.compare.html import write_html
-from wholebody.bench.compare.scenes import draw
+from wholebody.bench.compare.scenes import chosen, draw
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Store
 from wholebody.bench.tables import replace_section, write_rows, write_text
@@ -52,18 +49,18 @@ def publish(
         write_rows(folder / "front.csv", facts, front)
     say("charts and scenes")
     families = {family.name: family for family in settings.sets}
-    methods = {entrant.name: entrant for entrant in settings.entrants}
+    methods = {adapter.name: adapter for adapter in settings.adapters}
     with ThreadPoolExecutor(1) as pool:  # scenes are drawn in a process of their own, charts in this one
         drawn = pool.submit(draw, chosen(given.results), families, methods, settings.seed, settings.cap)
         titles = [(family.name, family.title) for family in settings.sets]
         charts = draw_all(given.results, titles, folder / "charts")
         scenes = drawn.result()
     say("report")
-    subtitle = f"{len(settings.sets)} problem sets, {len(settings.entrants)} methods, {len(store.records)} solves. " + (
+    subtitle = f"{len(settings.sets)} problem sets, {len(settings.adapters)} methods, {len(store.records)} solves. " + (
         f"Measured {facts.get('date', '')} with wholebody {facts.get('wholebody', '')} on {facts.get('processor', '')}."
     )
-    write_text(folder / PAGE, write_html(report.blocks(given), charts, scenes, subtitle))
-    short = kinds.as_markdown(report.short(given))
+    write_text(folder / PAGE, report.as_page(given, charts, scenes, subtitle) + "\n")
+    short = report.as_markdown(given, False, "assets/bench")
     write_text(folder / "compare.md", short + "\n")
     if docs is not None:
         replace_section(docs / "results.md", "compare", short)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
-from wholebody.bench.entrants.base import Budget
+from wholebody.bench.adapters.base import Budget
 
 DEFAULT: Budget = (1e-4, None)
 """The budget at which all cases are solved: a tenth of a millimetre and of a milliradian, iterations as they come."""
@@ -24,7 +24,7 @@ class Record:
 
     Attributes:
         set, number: which case.
-        entrant: which method.
+        adapter: which method.
         tolerance, budget: of this solve; a budget of 0 iterations is the method's own, one of -1 is
             `FIRST_FIT`.
         outcome: "answered", "refused", "failed" or "overtime".
@@ -46,7 +46,7 @@ class Record:
 
     set: str
     number: int
-    entrant: str
+    method: str
     tolerance: float
     budget: int
     outcome: str
@@ -72,7 +72,7 @@ class Record:
 
     @property
     def level(self) -> Budget:
-        """Tolerance, and iterations or None, as entrants take them."""
+        """Tolerance, and iterations or None, as adapters take them."""
         return self.tolerance, self.budget or None
 
     @property

@@ -10,8 +10,8 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.bench.adapters.base import Budget
 from wholebody.bench.compare.record import COARSE, DEFAULT, FLOOR, REFUSED, Record
-from wholebody.bench.entrants.base import Budget
 
 Array = NDArray[np.float64]
 
@@ -68,17 +68,17 @@ class Results:
     """All records of a comparison.
 
     Attributes:
-        sets, entrants: names, in the order of reports.
+        sets, adapters: names, in the order of reports.
         clock: "seconds" for wall time, "cpu_seconds" for the processor's.
     """
 
-    def __init__(self, records: Iterable[Record], sets: Sequence[str], entrants: Sequence[str]) -> None:
-        self.sets, self.entrants = tuple(sets), tuple(entrants)
+    def __init__(self, records: Iterable[Record], sets: Sequence[str], adapters: Sequence[str]) -> None:
+        self.sets, self.adapters = tuple(sets), tuple(adapters)
         self.clock = "seconds"
         self._cells: dict[tuple[str, str], dict[Budget, dict[int, Record]]] = {}
         self._best: dict[tuple[str, int], float] = {}
         for record in records:
-            cell = self._cells.setdefault((record.set, record.entrant), {})
+            cell = self._cells.setdefault((record.set, record.method), {})
             cell.setdefault(record.level, {})[record.number] = record
             self._note(record)
 
@@ -97,52 +97,52 @@ class Results:
         """Least measure known for the case of a record: of the witness, and of all answers exact to `EXACT`."""
         return self._best[record.set, record.number]
 
-    def default(self, family: str, entrant: str) -> list[Record]:
+    def default(self, family: str, adapter: str) -> list[Record]:
         """Records at the default budget, refusals too, in the order of cases."""
-        return [record for _, record in sorted(self._cell(family, entrant).get(DEFAULT, {}).items())]
+        return [record for _, record in sorted(self._cell(family, adapter).get(DEFAULT, {}).items())]
 
-    def refuses(self, family: str, entrant: str) -> bool:
+    def refuses(self, family: str, adapter: str) -> bool:
         """Whether a method takes no case of a set."""
-        mine = self.default(family, entrant)
+        mine = self.default(family, adapter)
         return bool(mine) and all(record.outcome == REFUSED for record in mine)
 
-    def taken(self, family: str, entrant: str) -> list[Record]:
+    def taken(self, family: str, adapter: str) -> list[Record]:
         """Records at the default budget of the cases that a method did not refuse."""
-        return [record for record in self.default(family, entrant) if record.outcome != REFUSED]
+        return [record for record in self.default(family, adapter) if record.outcome != REFUSED]
 
-    def levels(self, family: str, entrant: str) -> list[Budget]:
+    def levels(self, family: str, adapter: str) -> list[Budget]:
         """Budgets with which a set was swept, from cheap to exact: by their median time."""
-        cell = self._cell(family, entrant)
-        cases = self.swept(family, entrant)
+        cell = self._cell(family, adapter)
+        cases = self.swept(family, adapter)
         listed = [level for level, row in cell.items() if cases and cases <= row.keys()]
         return sorted(listed, key=lambda level: middle([getattr(cell[level][number], self.clock) for number in cases]))
 
-    def swept(self, family: str, entrant: str) -> frozenset[int]:
+    def swept(self, family: str, adapter: str) -> frozenset[int]:
         """Cases that a method solved at all its budgets; at the default one where it was not swept at all."""
-        cell = self._cell(family, entrant)
+        cell = self._cell(family, adapter)
         others = [frozenset(row) for level, row in cell.items() if level != DEFAULT]
-        first = frozenset(record.number for record in self.taken(family, entrant))
+        first = frozenset(record.number for record in self.taken(family, adapter))
         return first.intersection(*others) if others else first
 
     def values(
-        self, family: str, entrant: str, level: Budget, quantity: Quantity, cases: Iterable[int]
+        self, family: str, adapter: str, level: Budget, quantity: Quantity, cases: Iterable[int]
     ) -> tuple[Array, Array]:
         """Seconds (n,) and values (n,) of some cases at one budget."""
-        row = self._cell(family, entrant)[level]
+        row = self._cell(family, adapter)[level]
         records = [row[number] for number in sorted(cases)]
         seconds = np.array([getattr(record, self.clock) for record in records])
         return seconds, np.array([quantity.of(record, self.best(record)) for record in records])
 
     def moving(self, family: str) -> bool:
         """Whether the goals of a set move."""
-        return any(record.frames for entrant in self.entrants for record in self.default(family, entrant))
+        return any(record.frames for adapter in self.adapters for record in self.default(family, adapter))
 
     def quantities(self, family: str) -> tuple[Quantity, ...]:
         """What is charted of a set; efforts are not compared while goals move."""
         return QUANTITIES[:3] if self.moving(family) else QUANTITIES
 
-    def _cell(self, family: str, entrant: str) -> Mapping[Budget, Mapping[int, Record]]:
-        return self._cells.get((family, entrant), {})
+    def _cell(self, family: str, adapter: str) -> Mapping[Budget, Mapping[int, Record]]:
+        return self._cells.get((family, adapter), {})
 
 
 def middle(values: Sequence[float] | Array, share: float = 0.5) -> float:

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.jobs import Task, compute
 from wholebody.bench.compare.plan import Plan
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk, Store
-from wholebody.bench.entrants.base import Entrant
 from wholebody.errors import WholebodyError
 
 SPARE = 3.0  # times its equal share that a method's sweep of one case may take: others leave something over
@@ -75,19 +75,19 @@ def _tasks(settings: Settings, plan: Plan, done: set[tuple[str, int]], end: floa
                 continue
             allowed = plan.allowed()
             solves = tuple(
-                (entrant, tuple(settings.ladder(entrant, family.moving)) if number < given.sweep else ())
-                for entrant in turned(settings.entrants, number)
-                if number < (given := allowed[family.name, entrant.name]).cases
+                (adapter, tuple(settings.ladder(adapter, family.moving)) if number < given.sweep else ())
+                for adapter in turned(settings.adapters, number)
+                if number < (given := allowed[family.name, adapter.name]).cases
             )
             if solves:
                 most = SPARE * plan.share
                 yield Task(family, number, settings.seed, solves, settings.cap, most)
 
 
-def turned(entrants: tuple[Entrant, ...], number: int) -> tuple[Entrant, ...]:
+def turned(adapters: tuple[Adapter, ...], number: int) -> tuple[Adapter, ...]:
     """The methods in another order for every case: nobody is always the first to wake a cold cache."""
-    first = TURN * number % len(entrants)
-    return entrants[first:] + entrants[:first]
+    first = TURN * number % len(adapters)
+    return adapters[first:] + adapters[:first]
 
 
 def _seconds(chunk: Chunk) -> float:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from wholebody.bench.adapters.base import FIRST_FIT, Adapter, Budget
 from wholebody.bench.compare.record import DEFAULT
-from wholebody.bench.entrants.base import FIRST_FIT, Budget, Entrant
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.errors import InputError
 from wholebody.version import __version__
@@ -20,7 +20,7 @@ class Settings:
     """What is compared, and how much of it.
 
     Attributes:
-        sets, entrants: problem sets and methods.
+        sets, adapters: problem sets and methods.
         cases: of every set at the default budget.
         sweep: of these, the first so many at every budget.
         levels: most budgets beside the default one.
@@ -30,7 +30,7 @@ class Settings:
     """
 
     sets: tuple[ProblemSet, ...]
-    entrants: tuple[Entrant, ...]
+    adapters: tuple[Adapter, ...]
     cases: int = 200
     sweep: int = 40
     levels: int = 99
@@ -47,7 +47,7 @@ class Settings:
         for name, least in (("cases", 1), ("sweep", 0), ("levels", 1), ("seed", 0)):
             if getattr(self, name) < least:
                 raise InputError(f"{name} is {getattr(self, name)}; give {least} or more")
-        if not self.sets or not self.entrants:
+        if not self.sets or not self.adapters:
             raise InputError("a comparison needs a problem set and a method; name at least one of each")
 
     def described(self) -> dict[str, Any]:
@@ -55,10 +55,10 @@ class Settings:
         return {
             "wholebody": __version__,
             "sets": [family.name for family in self.sets],
-            "methods": [entrant.name for entrant in self.entrants],
+            "methods": [adapter.name for adapter in self.adapters],
             "cases": self.cases,
             "sweep": self.sweep,
-            "levels": {entrant.name: [list(level) for level in self.ladder(entrant)] for entrant in self.entrants},
+            "levels": {adapter.name: [list(level) for level in self.ladder(adapter)] for adapter in self.adapters},
             "seed": self.seed,
             "cap": self.cap,
             "minutes": self.minutes,
@@ -70,9 +70,9 @@ class Settings:
             return max(1, self.cases // MOVING), self.sweep // MOVING
         return self.cases, self.sweep
 
-    def ladder(self, entrant: Entrant, moving: bool = False) -> list[Budget]:
+    def ladder(self, adapter: Adapter, moving: bool = False) -> list[Budget]:
         """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`."""
-        listed = [level for level in entrant.loose if level != DEFAULT and not (moving and level[1] == FIRST_FIT)]
+        listed = [level for level in adapter.loose if level != DEFAULT and not (moving and level[1] == FIRST_FIT)]
         most = min(self.levels, MOVING_LEVELS) if moving else self.levels
         if len(listed) <= most:
             return listed

@@ -1,4 +1,8 @@
-"""One solve of one case, timed, and judged by `assess` alone."""
+"""One solve of one case, timed, and judged by `assess` alone.
+
+`built`, `warmed` and `solved` are jobs of a process of `wholebody.runner`, which keeps the last case and knows
+which methods have run in it.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +10,30 @@ import copy
 import gc
 import time
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.assessment import Assessment, assess
-from wholebody.bench.compare.record import ANSWERED, FAILED, REFUSED, Record
-from wholebody.bench.entrants.base import Budget, Entrant, set_up
+from wholebody.bench.adapters.base import Adapter, Budget, set_up
+from wholebody.bench.compare.record import ANSWERED, DEFAULT, FAILED, REFUSED, Record
 from wholebody.bench.problem_sets.case import Case, ProblemSet
 from wholebody.compiled import compile_all
 from wholebody.errors import WholebodyError
 from wholebody.problem import Problem
+from wholebody.runner import allow
+
+BUILDING = 120.0  # s: to build a case and what belongs to its scene; compiling once included
+FRAME_CAP = 0.1  # s: most for a frame, on the average, where goals move; slower than that nobody drags
+GLIMPSE = 3  # frames of a moving case that a method sees before it is timed
+
+
+class Which(NamedTuple):
+    """A case of a set."""
+
+    family: ProblemSet
+    number: int
+    seed: int
 
 
 @dataclass(frozen=True)
@@ -32,6 +49,48 @@ class Ready:
     best: float
 
 
+_kept: dict[tuple[str, int, int], Ready] = {}  # the last case of this process
+_warm: set[tuple[str, bool]] = set()  # methods that have run in this process, on cases that stand still or move
+
+
+def built(which: Which) -> str | None:
+    """Build a case; return what went wrong, if anything."""
+    try:
+        case_of(which)
+    except Exception as error:
+        return f"{type(error).__name__}: {sentence(error)}"
+    return None
+
+
+def warmed(which: Which, adapter: Adapter, cap: float) -> None:
+    """Let a method import and compile what it needs, before it is timed for the first time in this process."""
+    made = case_of(which)
+    key = (adapter.name, bool(made.case.frames))
+    if key not in _warm:
+        _warm.add(key)
+        allow(cap)
+        solve(adapter, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:GLIMPSE])))
+
+
+def solved(which: Which, adapter: Adapter, level: Budget, cap: float) -> Record:
+    """Solve a case; the process ends where that takes longer than it may."""
+    warmed(which, adapter, cap)
+    made = case_of(which)
+    allow(max(cap, FRAME_CAP * len(made.case.frames)))
+    return solve(adapter, level, made)
+
+
+def case_of(which: Which) -> Ready:
+    """The case, built where it is not the last one of this process."""
+    key = (which.family.name, which.number, which.seed)
+    if key not in _kept:
+        _kept.clear()
+        gc.collect()
+        allow(BUILDING)
+        _kept[key] = ready(*which)
+    return _kept[key]
+
+
 def ready(family: ProblemSet, number: int, seed: int) -> Ready:
     """Build a case; what is built at first use by whoever asks first is built here, in nobody's time."""
     compile_all()  # seconds at the first time on a machine, more than the quick comparison gives a solve
@@ -42,13 +101,13 @@ def ready(family: ProblemSet, number: int, seed: int) -> Ready:
     return Ready(case, assess(case.problem, case.witness).measure)
 
 
-def solve(entrant: Entrant, level: Budget, made: Ready) -> Record:
+def solve(adapter: Adapter, level: Budget, made: Ready) -> Record:
     """Solve a case with a fresh method. Whatever the method does, this returns what came of it."""
     from wholebody.bench.compare.following import follow
 
-    empty = blank(entrant, level, made.case.set, made.case.number)
+    empty = blank(adapter, level, made.case.set, made.case.number)
     try:
-        method = entrant.make(*level)
+        method = adapter.make(*level)
         moving = bool(made.case.frames)
         problem = copy.copy(made.case.problem) if moving else made.case.problem  # each moves the goals of its own copy
         began = time.perf_counter()
@@ -66,10 +125,10 @@ def solve(entrant: Entrant, level: Budget, made: Ready) -> Record:
         gc.enable()
 
 
-def blank(entrant: Entrant, level: Budget, family: str, number: int) -> Record:
+def blank(adapter: Adapter, level: Budget, family: str, number: int) -> Record:
     """A record without an answer."""
     tolerance, iterations = level
-    return Record(family, number, entrant.name, tolerance, iterations or 0, FAILED)
+    return Record(family, number, adapter.name, tolerance, iterations or 0, FAILED)
 
 
 def sentence(error: BaseException) -> str:

@@ -16,7 +16,7 @@ class Summary:
     """One method in one set.
 
     Attributes:
-        set, entrant: which.
+        set, adapter: which.
         cases: given to it; fewer than asked for where it is too slow for the time there is.
         swept: of these, solved at all its budgets.
         refused, failed, overtime: cases without an answer: said so, broke, or took too long.
@@ -34,7 +34,7 @@ class Summary:
     """
 
     set: str
-    entrant: str
+    method: str
     cases: int
     swept: int
     refused: int
@@ -66,15 +66,15 @@ class Summary:
 def summaries(results: Results) -> list[Summary]:
     """All rows, of methods that were given a case."""
     return [
-        _summary(results, family, entrant)
+        _summary(results, family, adapter)
         for family in results.sets
-        for entrant in results.entrants
-        if results.default(family, entrant)
+        for adapter in results.adapters
+        if results.default(family, adapter)
     ]
 
 
-def _summary(results: Results, family: str, entrant: str) -> Summary:
-    mine, taken = results.default(family, entrant), results.taken(family, entrant)
+def _summary(results: Results, family: str, adapter: str) -> Summary:
+    mine, taken = results.default(family, adapter), results.taken(family, adapter)
     answered = [record for record in mine if record.answered]
     efforts = [value for record in answered if (value := effort_excess(record, results.best(record))) < inf]
     silent = [record for record in mine if not record.answered]
@@ -87,9 +87,9 @@ def _summary(results: Results, family: str, entrant: str) -> Summary:
 
     return Summary(
         set=family,
-        entrant=entrant,
+        method=adapter,
         cases=len(mine),
-        swept=len(results.swept(family, entrant)),
+        swept=len(results.swept(family, adapter)),
         refused=count(REFUSED),
         failed=count(FAILED),
         overtime=count(OVERTIME),

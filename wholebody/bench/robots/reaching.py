@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-import sys
 import time
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -61,6 +59,16 @@ class Loaded:
     solved: int = 0
     times: tuple[float, ...] = ()
     statuses: tuple[str, ...] = ()
+
+    @property
+    def whole(self) -> bool:
+        """Whether all reaches were solved."""
+        return self.solved == len(self.times)
+
+    @property
+    def median(self) -> float:
+        """Median of the reaches' times."""
+        return float(np.median(self.times))
 
 
 def examine(path: str, reaches: int) -> Loaded:
@@ -133,14 +141,3 @@ def tip_targets(figure: Figure, scene: Scene, count: int) -> list[tuple[str, Arr
         pin.framesForwardKinematics(figure.model, data, q)
         found.append((tip, np.array(data.oMf[figure.frame_id(tip)].translation)))
     return found
-
-
-def main(argv: list[str]) -> int:
-    """Examine one description and print the outcome as JSON: path, number of reaches."""
-    found: dict[str, Any] = asdict(examine(argv[0], int(argv[1])))
-    print(json.dumps(found))  # noqa: T201
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

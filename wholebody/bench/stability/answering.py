@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.bench.entrants.base import Entrant
+from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.stability.case import HardCase, Nonsense, Posed, Stream
 from wholebody.errors import WholebodyError
 from wholebody.methods.drag import Drag
@@ -47,23 +47,23 @@ class Answer:
 NOTHING = np.zeros((0, 0))
 
 
-def ask(case: HardCase, entrant: Entrant, alive: Callable[[], None] = lambda: None) -> Answer:
+def ask(case: HardCase, adapter: Adapter, alive: Callable[[], None] = lambda: None) -> Answer:
     """Ask; exceptions of any kind become part of the answer. After each frame of a stream `alive` is called."""
     began = time.perf_counter()
     try:
         question = case.question()
         if isinstance(question, Nonsense):
-            return _nonsense(question, entrant)
+            return _nonsense(question, adapter)
         began = time.perf_counter()
-        return _posed(question, entrant) if isinstance(question, Posed) else _stream(question, entrant, alive)
+        return _posed(question, adapter) if isinstance(question, Posed) else _stream(question, adapter, alive)
     except WholebodyError as error:
         return Answer(NOTHING, refusal=str(error), seconds=time.perf_counter() - began)
     except Exception as error:  # whatever a method throws is what is looked for here
         return Answer(NOTHING, failure=_named(error), seconds=time.perf_counter() - began)
 
 
-def _posed(question: Posed, entrant: Entrant) -> Answer:
-    method = entrant.make(ASKED, question.iterations)
+def _posed(question: Posed, adapter: Adapter) -> Answer:
+    method = adapter.make(ASKED, question.iterations)
     if question.adjust is not None:
         method = question.adjust(method)
     solution = method.solve(question.problem)
@@ -74,8 +74,8 @@ def _posed(question: Posed, entrant: Entrant) -> Answer:
     )  # fmt: skip
 
 
-def _stream(question: Stream, entrant: Entrant, alive: Callable[[], None]) -> Answer:
-    drag = Drag(question.problem, entrant.make(ASKED, None), dt=question.dt)
+def _stream(question: Stream, adapter: Adapter, alive: Callable[[], None]) -> Answer:
+    drag = Drag(question.problem, adapter.make(ASKED, None), dt=question.dt)
     postures, left = [], []
     began = time.perf_counter()
     for frame in question.frames:
@@ -88,12 +88,12 @@ def _stream(question: Stream, entrant: Entrant, alive: Callable[[], None]) -> An
     return Answer(np.array(postures), left=tuple(left), seconds=time.perf_counter() - began)
 
 
-def _nonsense(question: Nonsense, entrant: Entrant) -> Answer:
+def _nonsense(question: Nonsense, adapter: Adapter) -> Answer:
     began = time.perf_counter()
     refusals, taken = [], []
     for what, attempt in question.attempts.items():
         try:
-            attempt(entrant)
+            attempt(adapter)
             taken.append(what)
         except WholebodyError as error:
             refusals.append(str(error))

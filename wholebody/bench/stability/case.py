@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.bench.entrants.base import Entrant
+from wholebody.bench.adapters.base import Adapter
 from wholebody.problem import Problem
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ class Nonsense:
         problem: the same with sense in it, for a picture.
     """
 
-    attempts: Mapping[str, Callable[[Entrant], object]]
+    attempts: Mapping[str, Callable[[Adapter], object]]
     problem: Problem
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
 from wholebody.bench.stability.answering import Answer
 from wholebody.bench.stability.case import HardCase, Nonsense, Posed, Stream
+from wholebody.motion_assessment import dip, velocities
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 
@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 
 INSIDE = 1e-4  # m: deeper than this is inside
 DIP = 1e-3  # m: by which the straight way between two postures may go in deeper than its ends
-PARTS = 41  # places on it where the depth is measured
 
 
 @dataclass(frozen=True)
@@ -82,20 +81,19 @@ def _stream(question: Stream, answer: Answer) -> Judged:
     first = problem.goals[0]
     assert isinstance(first, Point)
     found: list[Assessment] = []
-    passed, dip, through, excess, misreported = "", 0.0, 0, 0.0, 0.0
+    passed, deepest_way, through, excess, misreported = "", 0.0, 0, 0.0, 0.0
     before = scene.figure.clamp(problem.start)
-    allowed = question.speed * question.dt
     for number, (frame, q) in enumerate(zip(question.frames, answer.postures, strict=True)):
         for name, place in frame.moved.items():
             scene.move(name, at=place)
-        depth, owners = _dip(problem, before, q)
-        if depth > dip:
-            passed, dip, through = f"{owners}, frame {number}", depth, number
+        depth, owners = dip(scene, before, q, DIP)
+        if depth > deepest_way:
+            passed, deepest_way, through = f"{owners}, frame {number}", depth, number
         problem.retarget([Point(first.frame, frame.target)])
         found.append(assess(problem, q))
         misreported = max(misreported, abs(_left(found[-1]) - answer.left[number]))
-        step = np.abs(pin.difference(scene.model, before, q)).max()
-        excess = max(excess, float(step / allowed - 1.0))
+        speed = np.abs(velocities(scene.model, np.array([before, q]), question.dt)).max()
+        excess = max(excess, float(speed / question.speed - 1.0))
         before = q
     deepest = int(np.argmax([each.penetration for each in found]))
     inside = found[deepest].penetration > INSIDE
@@ -106,26 +104,10 @@ def _stream(question: Stream, answer: Answer) -> Judged:
         constraint_violation=max(each.constraint_violation for each in found),
         speed_excess=excess,
         passed=passed,
-        dip=dip,
+        dip=deepest_way,
         misreported=misreported,
         worst=through if passed else deepest if inside else len(found) - 1,
     )
-
-
-def _dip(problem: Problem, before: Array, q: Array) -> tuple[float, str]:
-    """How deep the straight way to a frame goes into something [m], and into what; things are where the frame has them.
-
-    The sweep sees whether it does, however thin the thing; the depth is that of parts of the way.
-    """
-    scene = problem.scene
-    contact = scene.sweep(before, q, DIP)
-    if contact is None or not contact.certain:
-        return 0.0, ""
-    depth = DIP
-    for share in np.linspace(0.0, 1.0, PARTS):
-        found = scene.contacts(np.asarray(pin.interpolate(scene.model, before, q, float(share))), within=0.0)
-        depth = max(depth, float(-found.distance.min(initial=0.0)))
-    return depth, " and ".join(scene.piece_owner[piece] for piece in contact.pair)
 
 
 def _left(found: Assessment) -> float:

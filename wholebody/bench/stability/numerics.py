@@ -7,11 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.bench.entrants.base import Entrant
+from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.stability.bodies import planar_arm, spatial_arm
 from wholebody.bench.stability.case import HardCase, Kind, Nonsense, Posed
 from wholebody.geometry.shapes import Box
 from wholebody.methods.drag import Drag
+from wholebody.methods.qp.active_set import guess_active_set
+from wholebody.methods.qp.method import QP
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.fallback import GUESS_TOLERANCE
+from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver, _Workspace
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import Point
@@ -108,13 +114,13 @@ class NotNumbers(HardCase):
         """A start, a goal, a goal in the middle of a drag, a thing's place, and the method's own tolerance."""
         return Nonsense(
             {
-                "NaN in the start": lambda entrant: _solve(entrant, start=NAN),
-                "NaN in a goal": lambda entrant: _solve(entrant, goal=NAN),
-                "infinity in a goal": lambda entrant: _solve(entrant, goal=INFINITE),
-                "NaN in a thing's place": lambda entrant: _solve(entrant, box=NAN),
-                "NaN in a drag": lambda entrant: Drag(_reach(), entrant.make(1e-5, None)).to((NAN, 0.0, 0.5)),
+                "NaN in the start": lambda adapter: _solve(adapter, start=NAN),
+                "NaN in a goal": lambda adapter: _solve(adapter, goal=NAN),
+                "infinity in a goal": lambda adapter: _solve(adapter, goal=INFINITE),
+                "NaN in a thing's place": lambda adapter: _solve(adapter, box=NAN),
+                "NaN in a drag": lambda adapter: Drag(_reach(), adapter.make(1e-5, None)).to((NAN, 0.0, 0.5)),
                 "NaN in where a drag is": _drag_from_nowhere,
-                "NaN as tolerance": lambda entrant: entrant.make(NAN, None).solve(_reach()),
+                "NaN as tolerance": lambda adapter: adapter.make(NAN, None).solve(_reach()),
             },
             _reach(),
         )
@@ -129,12 +135,12 @@ def _reach(start: float = 0.5, goal: float = 0.5, box: float = 0.0) -> Problem:
     return problem
 
 
-def _solve(entrant: Entrant, **changed: float) -> object:
-    return entrant.make(1e-5, None).solve(_reach(**changed))
+def _solve(adapter: Adapter, **changed: float) -> object:
+    return adapter.make(1e-5, None).solve(_reach(**changed))
 
 
-def _drag_from_nowhere(entrant: Entrant) -> object:
-    drag = Drag(_reach(), entrant.make(1e-5, None))
+def _drag_from_nowhere(adapter: Adapter) -> object:
+    drag = Drag(_reach(), adapter.make(1e-5, None))
     drag.q = np.array([-0.6, NAN, 0.5])
     return drag.to((0.7, 0.0, 0.4))
 
@@ -178,7 +184,6 @@ class QPLimit(HardCase):
 
 def unfinished(method: Any) -> Any:
     """The method with quadratic programs that `Unfinished` solves; one without any gets one iteration itself."""
-    from wholebody.bench.stability.unfinished import UnfinishedQP
     from wholebody.methods.qp.method import QP
 
     if isinstance(method, QP):
@@ -196,3 +201,33 @@ def _across() -> Problem:
 
 
 CASES = (Small, Large, TinyDifference, TinyWeight, NotNumbers, FewIterations, QPLimit)
+
+
+LIMIT = 5  # iterations: OSQP takes 25 to some hundreds for programs of a reach
+
+
+class Unfinished(OSQPSolver):
+    """OSQP that is stopped early, without the active sets and the fallback that make its answers exact."""
+
+    name = "osqp, unfinished"
+
+    def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
+        """Minimise, not quite; a guess is not used."""
+        return self.solve_cold(program)
+
+    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
+        """What some iterations lead to, inside the box of the program."""
+        if self._workspace is None or not self._workspace.fits(program):
+            self._workspace = _Workspace(program, self._workspace)
+        self._workspace.load(program)
+        x, used = self._workspace.run(LIMIT, 1e-3)
+        x = x.clip(program.lower, program.upper)
+        return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, used, self.name)
+
+
+class UnfinishedQP(QP):
+    """The QP method with such a solver."""
+
+    def _qp_solver(self) -> QPSolver:
+        """One that never finishes."""
+        return Unfinished()

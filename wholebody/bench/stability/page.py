@@ -1,143 +1,110 @@
-"""The page "Where methods fail": case by case, with pictures, what is asked and what came of it."""
+"""The page "Where methods fail" and its matrix of cases and methods: what is asked, and what came of it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from wholebody.bench.entrants.base import Entrant
-from wholebody.bench.machine import sentence
-from wholebody.bench.stability.case import HardCase, Kind
+from wholebody.bench import plot_style
+from wholebody.bench.adapters.base import Adapter
+from wholebody.bench.report import render
+from wholebody.bench.stability.case import Kind
 from wholebody.bench.stability.pictures import Drawn
 from wholebody.bench.stability.rows import Result
-from wholebody.bench.stability.verdict import WORDS
-from wholebody.bench.tables import markdown
+from wholebody.bench.stability.verdict import SYMBOLS, WORDS, Verdict
 
 CHART = "stability.svg"
-FAULT = (
-    "In these cells the answer was bad, but the tool alone, without our adapter, does better on the same case. "
-    "They say something about our adapter and nothing about the tool."
-)
 
 
 def report(result: Result, facts: Mapping[str, str]) -> str:
     """The result in short: the counts, the cases by methods, and every wrong cell."""
-    return "\n\n".join(
-        [
-            _counts(result),
-            _matrix(result),
-            _cells(result, "wrong", "No answer was wrong."),
-            *_adapters(result),
-            sentence(facts),
-        ]
-    )
+    return render("stability.md", page=False, result=result, kinds=WORDS, facts=facts)
 
 
-def page(result: Result, entrants: Sequence[Entrant], facts: Mapping[str, str], drawn: Drawn, folder: str) -> str:
+def page(result: Result, adapters: Sequence[Adapter], facts: Mapping[str, str], drawn: Drawn, folder: str) -> str:
     """The section of the page that is written by the command.
 
     Args:
         result: all cells.
-        entrants: who was asked.
+        adapters: who was asked.
         facts: of the machine.
         drawn: pictures by case.
         folder: of the pictures, relative to the page.
     """
-    parts = [
-        f"![{len(result.cases)} cases by {len(result.methods)} methods: a colour and a sign a cell]({folder}/{CHART})",
-        _counts(result),
-        _setups(entrants),
-    ]
+    return render(
+        "stability.md", page=True, result=result, kinds=WORDS, facts=facts, adapters=adapters, drawn=drawn,
+        folder=folder, chart=CHART,
+    )  # fmt: skip
+
+
+COLORS: dict[Kind, str] = {
+    "solved": "#8fd0b5", "honest": "#f6ec9c", "refusal": "#d9d9d9", "adapter": "#b9c7e8", "wrong": "#e8794a",
+}  # fmt: skip
+"""Told apart by people with any colour vision, and by their signs in print."""
+
+PALE = "#fbf7d9"  # an honest answer where a better one was possible
+CELL = (0.92, 0.27)  # inches
+LEAST = 8.0  # inches, that the legend needs
+MARGIN = (3.1, 1.5)  # inches, for the names and the legend
+
+
+def matrix(result: Result, path: Path) -> tuple[Path, Path]:
+    """Draw all verdicts; return the paths of the SVG and the PNG."""
+    lines = _lines(result)
+    width = max(LEAST, MARGIN[0] + CELL[0] * len(result.methods))
+    chart, axes = plot_style.figure(1, 1, (width, MARGIN[1] + CELL[1] * len(lines)))
+    axis = axes[0][0]
+    for row, (case, title) in enumerate(lines):
+        if case is None:
+            axis.text(-0.5, row + 0.15, title, fontsize=9, fontweight="bold", va="center", ha="left", color="#333333")
+            continue
+        for column, method in enumerate(result.methods):
+            _cell(axis, row, column, result.verdicts[case, method])
+    axis.set_xlim(-0.5, len(result.methods) - 0.5)
+    axis.set_ylim(len(lines) - 0.5, -0.5)
+    axis.set_xticks(range(len(result.methods)), [name.replace("/", "\n") for name in result.methods], fontsize=8.5)
+    axis.xaxis.tick_top()
+    rows = [number for number, (case, _) in enumerate(lines) if case is not None]
+    axis.set_yticks(rows, [title for case, title in lines if case is not None], fontsize=8.5)
+    axis.tick_params(length=0)
+    axis.grid(visible=False)
+    for side in axis.spines.values():
+        side.set_visible(False)
+    _legend(chart)
+    return plot_style.save(chart, path)
+
+
+def _lines(result: Result) -> list[tuple[str | None, str]]:
+    """Case's name and title by line; None and the group's name where a group begins."""
+    lines: list[tuple[str | None, str]] = []
     group = ""
     for case in result.cases:
         if case.group != group:
             group = case.group
-            parts.append(f"## {group}")
-        parts += _case(case, result, drawn.get(case.name, []), folder)
-    parts += [
-        "## Every wrong answer",
-        _cells(result, "wrong", "No answer was wrong."),
-        *_adapters(result),
-        sentence(facts),
+            lines.append((None, group))
+        lines.append((case.name, case.title))
+    return lines
+
+
+def _cell(axis: Any, row: int, column: int, verdict: Verdict) -> None:
+    from matplotlib.patches import Rectangle
+
+    color = PALE if verdict.kind == "honest" and not verdict.acceptable else COLORS[verdict.kind]
+    axis.add_patch(Rectangle((column - 0.48, row - 0.45), 0.96, 0.9, facecolor=color, edgecolor="none"))
+    brief = "" if verdict.brief == "best known" else verdict.brief
+    weight = "bold" if verdict.kind == "wrong" else "normal"
+    text = f"{verdict.symbol} {brief}".strip()
+    axis.text(column, row, text, fontsize=7.5, ha="center", va="center", color="#111111", fontweight=weight)
+
+
+def _legend(chart: Any) -> None:
+    from matplotlib.patches import Patch
+
+    handles = [Patch(facecolor=COLORS[kind], label=f"{SYMBOLS[kind]}  {WORDS[kind]}") for kind in ("solved", "refusal")]
+    handles[1:1] = [
+        Patch(facecolor=COLORS["honest"], label="●  honest, as good as can be"),
+        Patch(facecolor=PALE, edgecolor="#bbbbbb", label="○  honest, a better answer exists"),
     ]
-    return "\n\n".join(parts)
-
-
-def _counts(result: Result) -> str:
-    rows = [
-        [
-            f"`{method}`",
-            *(str(result.count(method, kind)) for kind in ("solved", "honest", "refusal", "adapter")),
-            _strong(result.count(method, "wrong")),
-            str(result.acceptable(method)),
-        ]
-        for method in result.methods
-    ]
-    columns = ["method", *WORDS.values(), "acceptable"]
-    return markdown(columns, rows) + f"\n\nOf {len(result.cases)} cases each."
-
-
-def _strong(count: int) -> str:
-    return f"**{count}**" if count else "0"
-
-
-def _matrix(result: Result) -> str:
-    rows = [[case.name, *(_brief(result, case.name, method) for method in result.methods)] for case in result.cases]
-    return markdown(["case", *result.methods], rows)
-
-
-def _brief(result: Result, case: str, method: str) -> str:
-    verdict = result.verdicts[case, method]
-    return f"{verdict.symbol} {verdict.brief}".strip()
-
-
-def _adapters(result: Result) -> list[str]:
-    """The cells in which our adapter is at fault, and what the tool alone does; nothing where there are none."""
-    found = _cells(result, "adapter", "")
-    return ["## Where our adapters are at fault", FAULT, found] if found else []
-
-
-def _cells(result: Result, kind: Kind, none: str) -> str:
-    """All cells of a kind, one a line, or what is said where there are none."""
-    rows = [
-        [f"`{method}`", f"`{case.name}`", result.verdicts[case.name, method].figure]
-        for method in result.methods
-        for case in result.cases
-        if result.verdicts[case.name, method].kind == kind
-    ]
-    if not rows:
-        return none
-    head = ["method", "case", "what is wrong"]
-    lines = [head, ["---", "---", "---"], *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def _setups(entrants: Sequence[Entrant]) -> str:
-    lines = [
-        "How each method was set up; the others are called by adapters of this project, and may do better alone:",
-        "",
-    ]
-    for entrant in entrants:
-        differences = "; ".join(entrant.differences)
-        lines.append(f"- `{entrant.name}`: {entrant.setup}" + (f" Besides: {differences}." if differences else ""))
-    return "\n".join(lines)
-
-
-def _case(case: HardCase, result: Result, pictures: Sequence[tuple[Path, str]], folder: str) -> list[str]:
-    parts = [f"### {case.title}", case.why, f"*Acceptable.* {case.acceptable}"]
-    parts += [f"![{case.title}: {caption}]({folder}/{path.name})\n*{caption}*" for path, caption in pictures]
-    rows = []
-    for symbol, words, methods in _alike(case, result):
-        rows.append([f"{symbol} {words}", ", ".join(f"`{method}`" for method in methods)])
-    lines = [["verdict", "methods"], ["---", "---"], *rows]
-    return [*parts, "\n".join("| " + " | ".join(line) + " |" for line in lines)]
-
-
-def _alike(case: HardCase, result: Result) -> list[tuple[str, str, list[str]]]:
-    """Methods with the same verdict in one line, in the order in which they were asked."""
-    found: dict[tuple[str, str], list[str]] = {}
-    for method in result.methods:
-        verdict = result.verdicts[case.name, method]
-        words = WORDS[verdict.kind] + (f": {verdict.figure}" if verdict.figure else "")
-        found.setdefault((verdict.symbol, words), []).append(method)
-    return [(symbol, words, methods) for (symbol, words), methods in found.items()]
+    handles += [Patch(facecolor=COLORS[kind], label=f"{SYMBOLS[kind]}  {WORDS[kind]}") for kind in ("adapter", "wrong")]
+    chart.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8.5)

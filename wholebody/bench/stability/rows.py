@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from wholebody.bench.stability.audit import audited
 from wholebody.bench.stability.case import HardCase, Kind
 from wholebody.bench.stability.judging import INSIDE
 from wholebody.bench.stability.running import Cell
-from wholebody.bench.stability.verdict import Verdict, decide
+from wholebody.bench.stability.verdict import WORDS, Verdict, audited, decide
 
 
 @dataclass(frozen=True)
@@ -74,6 +73,20 @@ class Result:
     def acceptable(self, method: str) -> int:
         """How many of a method's answers are acceptable."""
         return sum(self.verdicts[case.name, method].acceptable for case in self.cases)
+
+    def of_kind(self, kind: Kind) -> list[tuple[str, HardCase, Verdict]]:
+        """All verdicts of a kind: method, case and verdict, method by method."""
+        found = [(method, case, self.verdicts[case.name, method]) for method in self.methods for case in self.cases]
+        return [one for one in found if one[2].kind == kind]
+
+    def alike(self, case: HardCase) -> list[tuple[str, list[str]]]:
+        """The verdicts on a case in words, and the methods that have each, in the order in which they were asked."""
+        found: dict[str, list[str]] = {}
+        for method in self.methods:
+            verdict = self.verdicts[case.name, method]
+            words = f"{verdict.symbol} {WORDS[verdict.kind]}" + (f": {verdict.figure}" if verdict.figure else "")
+            found.setdefault(words, []).append(method)
+        return list(found.items())
 
     def rows(self) -> list[StabilityRow]:
         """One a cell, case by case."""

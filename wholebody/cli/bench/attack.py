@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from wholebody.bench.attack.case import Case
-    from wholebody.bench.attack.counting import Row
+    from wholebody.bench.attack.report import Row
 
 PAGE = "reliability.md"
 DESCRIPTION = """\
@@ -46,7 +46,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 def run(arguments: argparse.Namespace) -> int:
     """Attack; 1 where something was wrong."""
     from wholebody.bench.attack import report
-    from wholebody.bench.attack.counting import is_slow
+    from wholebody.bench.attack.report import is_slow
     from wholebody.bench.attack.running import attack, for_seconds
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import replace_section, write_rows, write_text
@@ -103,7 +103,7 @@ def _cases(arguments: argparse.Namespace) -> Iterator[Case]:
 
 def _teller(rows: list[Row]) -> Callable[..., Row]:
     """Return what adds a case to the rows, and prints a line where it was wrong, and now and then how far it is."""
-    from wholebody.bench.attack.counting import row
+    from wholebody.bench.attack.report import row
 
     def tell(ended: object) -> Row:
         line = row(ended)  # type: ignore[arg-type]

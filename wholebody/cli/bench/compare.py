@@ -47,10 +47,10 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+    from wholebody.bench.adapters import missing
     from wholebody.bench.compare import run as comparison
     from wholebody.bench.compare.advice import advice
     from wholebody.bench.compare.publish import PAGE, publish
-    from wholebody.bench.entrants import missing
 
     jobs = _jobs(arguments)
     settings = _settings(arguments)
@@ -80,8 +80,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _settings(arguments: argparse.Namespace) -> Settings:
+    from wholebody.bench.adapters import adapters
     from wholebody.bench.compare.settings import QUICK, Settings
-    from wholebody.bench.entrants import entrants
     from wholebody.bench.problem_sets.registry import CASES, SETS, problem_set
 
     sets = tuple(problem_set(name) for name in dict.fromkeys(arguments.sets or SETS))
@@ -90,7 +90,7 @@ def _settings(arguments: argparse.Namespace) -> Settings:
     if arguments.cases is not None:
         check_count(arguments.cases, "--cases")
         amounts["cases"] = arguments.cases
-    return Settings(sets, entrants(chosen), seed=arguments.seed, **amounts)
+    return Settings(sets, adapters(chosen), seed=arguments.seed, **amounts)
 
 
 def _jobs(arguments: argparse.Namespace) -> int:

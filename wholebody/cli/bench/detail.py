@@ -25,7 +25,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, judge, draw."""
-    from wholebody.bench import detail, detail_report
+    from wholebody.bench import detail
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_rows
 
@@ -40,6 +40,6 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             rows.append(row)
     write_rows(arguments.out / "detail.csv", facts, rows)
-    charts = {"detail": detail_report.chart(rows, arguments.out / "detail")}
-    publish("detail", detail_report.report(rows, refused, facts), charts, {"detail": CAPTION}, arguments)
+    charts = {"detail": detail.chart(rows, arguments.out / "detail")}
+    publish("detail", detail.report(rows, refused, facts), charts, {"detail": CAPTION}, arguments)
     return 0

@@ -24,7 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Measure sparse Newton."""
     from wholebody.bench import newton, newton_solves
     from wholebody.bench.machine import machine
-    from wholebody.bench.newton_drags import drag_row
+    from wholebody.bench.newton_solves import drag_row
     from wholebody.bench.tables import write_rows
 
     repeats, sizes, frames = (3, (10, 30), 20) if arguments.quick else (arguments.repeats, newton.SIZES, 1000)

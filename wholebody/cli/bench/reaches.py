@@ -26,8 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Measure random reaches."""
     from wholebody.bench import charts
     from wholebody.bench.machine import machine
-    from wholebody.bench.reaches import run
-    from wholebody.bench.report import reaches_report
+    from wholebody.bench.reaches import reaches_report, run
     from wholebody.bench.tables import write_rows
     from wholebody.methods.qp.solvers.registry import make_solver
 

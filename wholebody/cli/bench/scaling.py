@@ -26,7 +26,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, fit, draw."""
-    from wholebody.bench import scaling, scaling_report
+    from wholebody.bench import scaling
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_rows
 
@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         bodies = sizes["joints"] if arguments.quick else scaling.ASSEMBLIES
         rows += scaling.assembly_rows(bodies, repeats)
     write_rows(arguments.out / "scaling.csv", facts, rows)
-    charts = {"scaling": scaling_report.chart(rows, arguments.out / "scaling")}
+    charts = {"scaling": scaling.chart(rows, arguments.out / "scaling")}
     left_out = [line for line in lines if "left out" in line]
-    publish("scaling", scaling_report.report(rows, left_out, facts), charts, {"scaling": CAPTION}, arguments)
+    publish("scaling", scaling.report(rows, left_out, facts), charts, {"scaling": CAPTION}, arguments)
     return 0

@@ -28,7 +28,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Measure whole solves."""
     from wholebody.bench import solve
     from wholebody.bench.machine import machine
-    from wholebody.bench.report import solve_report
     from wholebody.bench.tables import write_rows
     from wholebody.cli.demo import packaged_tasks
 
@@ -40,5 +39,5 @@ def run(arguments: argparse.Namespace) -> int:
     peak = solve.memory(task)
     write_rows(arguments.out / "solve.csv", facts, rows)
     write_rows(arguments.out / "memory.csv", facts, [peak])
-    publish("solve", solve_report(rows, peak, facts), {}, {}, arguments)
+    publish("solve", solve.solve_report(rows, peak, facts), {}, {}, arguments)
     return 0

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rich.progress import Progress
 
-    from wholebody.bench.entrants import Entrant
+    from wholebody.bench.adapters import Adapter
     from wholebody.bench.stability.case import HardCase
     from wholebody.bench.stability.pictures import Drawn
     from wholebody.bench.stability.rows import Result
@@ -43,21 +43,21 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def run(arguments: argparse.Namespace) -> int:
     """Ask, judge, and write it down; 0 whatever the verdicts are."""
-    from wholebody.bench.entrants import entrants
+    from wholebody.bench.adapters import adapters
     from wholebody.bench.machine import machine
-    from wholebody.bench.stability import catalogue, chart, page
+    from wholebody.bench.stability import catalogue, page
     from wholebody.bench.tables import write_rows, write_text
 
     check_count(arguments.jobs, "--jobs")
     _check_page(arguments)
-    asked = entrants(arguments.methods)
+    asked = adapters(arguments.methods)
     chosen = catalogue.cases(arguments.cases or (catalogue.QUICK if arguments.quick else None))
     facts = machine()
     result = _asked(chosen, asked, arguments.jobs)
     write_rows(arguments.out / "stability.csv", facts, result.rows())
     report = page.report(result, facts)
     write_text(arguments.out / "stability.md", report + "\n")
-    svg, _ = chart.matrix(result, arguments.out / "stability.svg")
+    svg, _ = page.matrix(result, arguments.out / "stability.svg")
     _print(result)
     print(f"wrote {arguments.out}")
     if arguments.update_docs is not None:
@@ -78,17 +78,17 @@ def _check_page(arguments: argparse.Namespace) -> None:
         raise InputError(f"{docs / PAGE}: there is no such page; give the folder of the documentation")
 
 
-def _asked(cases: Sequence[HardCase], entrants: Sequence[Entrant], jobs: int) -> Result:
+def _asked(cases: Sequence[HardCase], adapters: Sequence[Adapter], jobs: int) -> Result:
     from wholebody.bench.stability.rows import result
     from wholebody.bench.stability.running import run as ask_all
 
     cells = []
     with _bar() as bar:
-        work = bar.add_task("asking", total=len(cases) * len(entrants))
-        for cell in ask_all(cases, entrants, jobs):
+        work = bar.add_task("asking", total=len(cases) * len(adapters))
+        for cell in ask_all(cases, adapters, jobs):
             cells.append(cell)
             bar.update(work, advance=1, description=f"{cell.case.name}, {cell.method}", refresh=True)
-    return result(cases, [entrant.name for entrant in entrants], cells)
+    return result(cases, [adapter.name for adapter in adapters], cells)
 
 
 def _drawn(result: Result, docs: Path) -> Drawn:

@@ -115,8 +115,8 @@ class QPTracker:
         """
         self.problem = check_problem(problem, "tracker: problem")
         self.dt = time_step(dt, "dt")
-        solver.load()  # not in the middle of a drag
         self._method, self._minimising = method, minimising
+        solver.load()  # not in the middle of a drag
         self._working_set = WorkingSet(solver)
         self._within = LEAST_WITHIN
         self._alone = OneAtATime("tracker")

@@ -1,0 +1,61 @@
+"""What templates are filled in with, and that every template of the package can be read."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import inf, nan
+from pathlib import Path
+from types import SimpleNamespace
+
+import jinja2
+import pytest
+
+from wholebody.bench import report
+from wholebody.bench.report import TEMPLATES, formatted, groups, quantile, render, scaled, strong, upfirst, words
+
+
+@pytest.mark.parametrize("path", sorted(TEMPLATES.iterdir()), ids=lambda path: path.name)
+def test_every_template_can_be_read(path: Path) -> None:
+    report._environment().get_template(path.name)
+
+
+@pytest.mark.parametrize("path", sorted(TEMPLATES.glob("*.md.jinja")), ids=lambda path: path.name)
+def test_a_table_has_a_rule_for_every_column(path: Path) -> None:
+    lines = path.read_text().splitlines()
+    for head, rule in pairwise(lines):
+        if rule.startswith("| ---") and "{" not in head + rule:
+            assert head.count("|") == rule.count("|"), head
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(report, "TEMPLATES", tmp_path)
+    monkeypatch.setattr(report, "_environment", report._environment.__wrapped__)
+    return tmp_path
+
+
+def test_empty_lines_beside_each_other_become_one(folder: Path) -> None:
+    (folder / "some.md.jinja").write_text("\n\n{% for k in counts %}\n- {{ k }}\n{% endfor %}\n\n\n\n{{ text }}  \n\n")
+    assert render("some.md", counts=[1, 2], text="end") == "- 1\n- 2\n\nend"
+
+
+def test_a_name_without_a_value_is_an_error_and_pages_are_escaped(folder: Path) -> None:
+    (folder / "some.html.jinja").write_text("<p>{{ text }}</p>")
+    assert render("some.html", text="<goals>") == "<p>&lt;goals&gt;</p>"
+    with pytest.raises(jinja2.UndefinedError, match="text"):
+        render("some.html")
+
+
+def test_numbers_that_are_not_finite_are_left_out() -> None:
+    assert formatted(1.234, ".1f", " %") == "1.2 %"
+    assert formatted(nan, ".1f", " %") == ""
+    assert formatted(inf, ".1f", none="never") == "never"
+    assert [scaled(value) for value in (0.123, 12.3, nan)] == ["0.12", "12", ""]
+    assert quantile([1.0, 2.0, 4.0], 0.5) == 2.0
+    assert str(quantile([], 0.5)) == "nan"
+    assert (strong(0), strong(2), upfirst("a b"), words("a_b")) == ("0", "**2**", "A b", "a b")
+
+
+def test_rows_are_grouped_in_the_order_in_which_they_come() -> None:
+    rows = [SimpleNamespace(name=name, number=number) for number, name in enumerate("baba")]
+    assert [[row.number for row in found] for found in groups(rows, "name")] == [[0, 2], [1, 3]]

@@ -1,0 +1,29 @@
+"""The methods and tools that are set beside each other: one file a tool, which solves and follows a reach by steps."""
+
+from wholebody.bench.adapters.base import Adapter, Budget, Prepared, Tool, set_up
+from wholebody.bench.adapters.registry import (
+    STEPPING,
+    adapters,
+    chosen_tools,
+    differences,
+    installed_tools,
+    make_tool,
+    missing,
+    names,
+)
+
+__all__ = [
+    "STEPPING",
+    "Adapter",
+    "Budget",
+    "Prepared",
+    "Tool",
+    "adapters",
+    "chosen_tools",
+    "differences",
+    "installed_tools",
+    "make_tool",
+    "missing",
+    "names",
+    "set_up",
+]

@@ -1,0 +1,340 @@
+"""mink: `solve_ik` with its tasks and limits on a MuJoCo model made from ours; the QPs are solved by DAQP.
+
+To solve a problem it is iterated; a reach is followed with one call a step.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
+from wholebody.bench.adapters.loop import GAIN, NEAR, STEP, Loop, StepError, Stepper, kept_apart, pulls
+from wholebody.bench.adapters.mjcf import ROOT, mjcf
+from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
+from wholebody.problem import Problem
+from wholebody.tasks import (
+    Axis,
+    CenterOfMass,
+    Displacement,
+    Effort,
+    Frame,
+    Freeze,
+    Hold,
+    Orientation,
+    Point,
+    Posture,
+    Relative,
+    StepLimit,
+)
+from wholebody.tasks.inputs import Place
+from wholebody.tasks.residuals import PlacementResidual
+
+COLLISION_GAIN = 0.5 * DT  # half of what is free of a gap may be used up in one step of a reach; see `MinkTool`
+
+
+def mink_adapter() -> Adapter:
+    """The kinematics of mink in our loop."""
+    return Adapter(
+        name="mink",
+        make=MinkLoop,
+        loose=(*few(5, 10, 20), *LADDER),
+        setup="mink.solve_ik on a MuJoCo model made from ours, with DAQP: FrameTask, RelativeFrameTask, AxisAlignTask, "
+        "LookAtTask, ComTask and PostureTask (posture and measures, with a weight that fades) as soft tasks, whole "
+        "holds and DofFreezingTask as hard ones, ConfigurationLimit, VelocityLimit and FreeJointVelocityLimit of "
+        f"{STEP} rad or m a step, a CollisionAvoidanceLimit for every clearance that occurs, within {NEAR} m, gain "
+        f"{GAIN} a step; one start, at most 200 steps, the loop of our adapter to placo. Building its model is set-up.",
+        differences=(
+            "mink drops pairs of a body and its parent body, and the root against all that is fixed to the world",
+            "pairs that hard tasks keep in place are left out, since their rows leave mink no solution",
+            "mink has no Balance, Plane or ReachCones, and holds whole frames only",
+            "mink minimises Effort and Displacement only",
+            "its model is written for free roots, turning and sliding joints, and for all shapes but ellipsoids",
+        ),
+        package="mink",
+    )
+
+
+class MinkLoop(Loop):
+    """Steps of mink."""
+
+    name = "mink"
+
+    def takes(self, term: Any) -> str | None:
+        """What mink has a task for."""
+        if isinstance(term, Hold):
+            return None if term.orientation else "its hard tasks hold whole frames"
+        kinds = (Point, Frame, Orientation, Axis, CenterOfMass, Posture, Relative, Freeze, StepLimit, Effort)
+        return None if isinstance(term, (*kinds, Displacement)) else ""
+
+    def build(self, problem: Problem) -> Stepper:
+        """Write the model."""
+        return _MinkStepper(problem)
+
+
+class _MinkStepper(Stepper):
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._sites: dict[str, tuple[int, Any]] = {}
+        for term in (*problem.goals, *problem.constraints):
+            if isinstance(term, Point):
+                self._site(term.place, term.resolved_offset)
+            elif isinstance(term, Axis):
+                self._site(term.place)
+            elif isinstance(term, (Frame, Orientation, Relative, Hold)):
+                self._site(term.residual.place)
+                self._site(term.residual.base)
+        self._compile()
+
+    def begin(self) -> None:
+        """Make the tasks anew, and the model where objects moved since it was made."""
+        import mink
+
+        problem, scene = self._problem, self._problem.scene
+        if not np.array_equal(self._places(), self._placed):
+            self._compile()
+        model = self._mujoco
+        self._points: list[tuple[Any, str, Array]] = []
+        self._tasks = [self._goal(goal) for goal in problem.goals]
+        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, Hold)]
+        frozen = [bound for bound in problem.bounds if isinstance(bound, Freeze)]
+        if frozen:
+            dofs = {self._dof[dof] for bound in frozen for dof in scene.figure.dofs(bound.joints).tolist()}
+            self._hard.append(mink.DofFreezingTask(model, sorted(dofs)))
+        self._comfort = []
+        for pull in pulls(problem):
+            self._comfort.append((self._joints(pull.reference), self._spread(np.sqrt(pull.weights))))
+
+    def step(self, q: Array, weight: float, damping: float) -> Array:
+        """One `solve_ik`, with a time step of one second."""
+        import mink
+
+        configuration = self._configuration
+        configuration.update(self._theirs(q))
+        for task, site, place in self._points:
+            turn = configuration.get_transform_frame_to_world(site, "site").rotation()
+            task.set_target(mink.SE3.from_rotation_and_translation(turn, place))
+        for task, share in self._comfort:
+            task.set_cost(weight**0.5 * share)
+        try:
+            velocity = mink.solve_ik(
+                configuration, [*self._tasks, *(task for task, _ in self._comfort)], 1.0, solver="daqp",
+                damping=damping, limits=self._limits, constraints=self._hard or None,
+            )  # fmt: skip
+        except mink.NoSolutionFound as error:
+            raise StepError(f"{type(error).__name__}: its program has no solution") from None
+        return np.asarray(velocity, dtype=float)[self._dof]
+
+    def _compile(self) -> None:
+        import mink
+        import mujoco
+
+        self._mujoco = mujoco.MjModel.from_xml_string(self._text())
+        self._configuration = mink.Configuration(self._mujoco)
+        self._limits, self._placed = self._made_limits(), self._places()
+
+    def _places(self) -> Array:
+        """Placements (n, 4, 4) of all pieces in what carries them."""
+        return np.array([piece.placement.homogeneous for piece in self._problem.scene.geometry.geometryObjects])
+
+    def _site(self, place: Place, offset: Array | None = None) -> str:
+        """Name of the site of a frame, or of a point in it; noted, so that the model gets it."""
+        frame = self._problem.scene.model.frames[place.frame]
+        there = frame.placement if offset is None else frame.placement * pin.SE3(np.eye(3), offset)
+        name = f"{place.frame} {there.translation.tolist()}"
+        self._sites[name] = (place.joint, there)
+        return name
+
+    def _text(self) -> str:
+        """MJCF of the scene with the sites."""
+        top = ElementTree.fromstring(mjcf(self._problem.scene))
+        bodies = {body.attrib["name"]: body for body in top.iter("body")}
+        for name, (joint, there) in self._sites.items():
+            body = bodies[self._problem.scene.model.names[joint]] if joint else top.find("worldbody")
+            assert body is not None
+            x, y, z, w = pin.Quaternion(there.rotation).coeffs()
+            texts = {"pos": there.translation, "quat": (w, x, y, z)}
+            place = {key: " ".join(repr(float(value)) for value in values) for key, values in texts.items()}
+            ElementTree.SubElement(body, "site", {"name": name} | place)
+        return ElementTree.tostring(top, encoding="unicode")
+
+    def _made_limits(self) -> list[Any]:
+        import mink
+
+        problem, model = self._problem, self._mujoco
+        figure = problem.scene.figure
+        joints = [(model.joint(name), figure.model.joints[figure.joint_id(name)]) for name in figure.joints]
+        self._addresses = [(int(theirs.qposadr[0]), ours) for theirs, ours in joints]
+        self._dof = np.arange(figure.model.nv)
+        for theirs, ours in joints:
+            self._dof[ours.idx_v] = int(theirs.dofadr[0])
+        limits = [
+            mink.ConfigurationLimit(model, gain=1.0),
+            mink.VelocityLimit(model, dict.fromkeys(figure.joints, STEP)),
+        ]
+        if figure.root == "free":
+            limits.append(mink.FreeJointVelocityLimit(model, STEP, STEP, joint_name=ROOT))
+        names = [piece.name for piece in problem.scene.geometry.geometryObjects]
+        groups: dict[float, list[Any]] = {}
+        for first, second, clearance in kept_apart(problem):
+            groups.setdefault(clearance, []).append(([names[first]], [names[second]]))
+        for clearance, pairs in groups.items():
+            apart = mink.CollisionAvoidanceLimit(
+                model,
+                pairs,
+                gain=GAIN,
+                minimum_distance_from_collisions=clearance,
+                collision_detection_distance=clearance + NEAR,
+            )
+            limits.append(apart)
+        return limits
+
+    def _theirs(self, q: Array) -> Array:
+        """Posture in MuJoCo's order, from ours (nq,)."""
+        theirs = np.zeros(self._mujoco.nq)
+        if self._problem.scene.figure.root == "free":
+            theirs[:3], theirs[3], theirs[4:7] = q[:3], q[6], q[3:6]
+        for address, joint in self._addresses:
+            part = q[joint.idx_q : joint.idx_q + joint.nq]
+            theirs[address] = part[0] if joint.nq == 1 else np.arctan2(part[1], part[0])
+        return theirs
+
+    def _spread(self, ours: Array) -> Array:
+        """Values (nv,) by degree of freedom, in MuJoCo's order."""
+        theirs = np.zeros(self._mujoco.nv)
+        theirs[self._dof] = ours
+        return theirs
+
+    def _goal(self, goal: Any) -> Any:
+        import mink
+
+        cost = goal.weight**0.5
+        if isinstance(goal, Point):
+            site = self._site(goal.place, goal.resolved_offset)
+            task = mink.FrameTask(site, "site", position_cost=cost, orientation_cost=0.0)
+            self._points.append((task, site, np.array(goal.resolved_target)))
+        elif isinstance(goal, Axis):
+            kind = mink.AxisAlignTask if goal.toward is None else mink.LookAtTask
+            task = kind(self._site(goal.place), "site", axis=np.array(goal.basis[2]), cost=cost)
+            task.set_target(np.array(goal.resolved_target))
+        elif isinstance(goal, CenterOfMass):
+            task = mink.ComTask(cost=np.array([cost, cost, cost if goal.axes == "xyz" else 0.0]))
+            task.set_target(np.array((*goal.resolved_target, 0.0)[:3]))
+        elif isinstance(goal, Posture):
+            task = self._joints(goal.resolved_target)
+            costs = np.zeros(self._mujoco.nv)
+            costs[self._dof[np.asarray(goal.dofs)]] = cost
+            task.set_cost(costs)
+        else:
+            task = self._placement(goal.residual, cost)
+        return task
+
+    def _placement(self, residual: PlacementResidual, cost: float) -> Any:
+        import mink
+
+        costs = {"position_cost": cost * residual.position, "orientation_cost": cost * residual.orientation}
+        target = mink.SE3.from_matrix(residual.placement.homogeneous)
+        site = self._site(residual.place)
+        if residual.base.frame:
+            task = mink.RelativeFrameTask(site, "site", self._site(residual.base), "site", **costs)
+        else:
+            task = mink.FrameTask(site, "site", **costs)
+        task.set_target(target)
+        return task
+
+    def _joints(self, reference: Array) -> Any:
+        import mink
+
+        task = mink.PostureTask(self._mujoco, cost=0.0)
+        task.set_target(self._theirs(reference))
+        return task
+
+
+class MinkTool(Tool):
+    """One `solve_ik` and `integrate_inplace` a step."""
+
+    name = "mink"
+    differences: ClassVar[tuple[str, ...]] = (
+        "mink bounds a displacement by gain × gap ÷ dt, which is a velocity; its gain is given here times dt, so that "
+        "half of a gap may be used up in a step, as its documentation means it (as written, it stops only inside)",
+        "mink drops pairs of a body and its parent body, and the root against all that is fixed to the world",
+    )
+
+    def __init__(self, track: Track) -> None:
+        """Set the model and the tasks up."""
+        import mink
+        import mujoco
+
+        self._mink = mink
+        model = self._mujoco_model = mujoco.MjModel.from_xml_string(mjcf(track.scene, (track.tip, *track.feet)))
+        figure = track.scene.figure
+        self._order = [(int(model.joint(name).qposadr[0]), figure.model.joints[figure.joint_id(name)].idx_q)
+                       for name in figure.joints]  # fmt: skip
+        self._size = figure.model.nq
+        self.reset(track.start)
+        self._reach = self._task(track.tip, REACH_COST, 0.0)
+        self._at = np.eye(4)
+        posture = mink.PostureTask(model, cost=POSTURE_COST)
+        posture.set_target(self._configuration.q)
+        self._tasks = [self._reach, posture]
+        self._feet = [self._task(foot, 1.0, 1.0) for foot in track.feet]
+        for task in self._feet:
+            task.set_target_from_configuration(self._configuration)
+        geometry = track.scene.geometry
+        names = [piece.name for piece in geometry.geometryObjects]
+        apart = mink.CollisionAvoidanceLimit(
+            model,
+            [([names[pair.first]], [names[pair.second]]) for pair in geometry.collisionPairs],
+            gain=COLLISION_GAIN,
+            minimum_distance_from_collisions=CLEARANCE,
+            collision_detection_distance=WITHIN,
+        )
+        self.pairs = len(apart.geom_id_pairs)
+        self._limits = [
+            mink.ConfigurationLimit(model),
+            mink.VelocityLimit(model, dict.fromkeys(figure.joints, JOINT_SPEED)),
+            mink.FreeJointVelocityLimit(model, ROOT_SPEED, ROOT_TURN, joint_name=ROOT),
+            apart,
+        ]
+
+    def _task(self, frame: str, position: float, orientation: float) -> Any:
+        return self._mink.FrameTask(frame, "site", position_cost=position, orientation_cost=orientation)
+
+    def reset(self, q: Array) -> None:
+        """Go to a posture."""
+        there = np.zeros(self._mujoco_model.nq)
+        there[:3], there[3], there[4:7] = q[:3], q[6], q[3:6]
+        for theirs, ours in self._order:
+            there[theirs] = q[ours]
+        self._configuration = self._mink.Configuration(self._mujoco_model, q=there)
+        self.failures = 0
+
+    def step(self, target: Array) -> None:
+        """Move one step."""
+        self._reach.set_target(self._mink.SE3.from_translation(target))
+        try:
+            velocity = self._mink.solve_ik(
+                self._configuration, self._tasks, DT, solver="daqp", damping=POSTURE_COST**2,
+                limits=self._limits, constraints=self._feet,
+            )  # fmt: skip
+        except self._mink.NoSolutionFound:
+            self.failures += 1
+            return
+        self._configuration.integrate_inplace(velocity, DT)
+
+    def posture(self) -> Array:
+        """Where it is."""
+        there = self._configuration.q
+        q = np.empty(self._size)
+        q[:3], q[3:6], q[6] = there[:3], there[4:7], there[3]
+        for theirs, ours in self._order:
+            q[ours] = there[theirs]
+        return q
+
+    def remarks(self) -> dict[str, float]:
+        """How many pairs it looks at."""
+        return {"pairs": float(self.pairs)}

@@ -1,0 +1,195 @@
+"""Our own methods as they take part: qp with every QP solver, newton in three ways, ccd and dls."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+import wholebody as wb
+from wholebody.bench.adapters.base import FIRST_FIT, LADDER, Adapter, Budget, Tool, few
+from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Array, Track
+from wholebody.figures.state import State, Wrench
+from wholebody.methods.base import Method
+from wholebody.tasks.base import Goal, Surroundings, filled
+
+_QP_BUDGETS: tuple[Budget, ...] = (
+    *((tolerance, FIRST_FIT) for tolerance in (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),
+    *LADDER[1:],
+)
+
+NEWTONS: dict[str, dict[str, Any]] = {
+    "slack": {"inequalities": "slack"},
+    "barrier": {"inequalities": "barrier"},
+    "kkt": {"inequalities": "slack", "algebra": "kkt"},
+}
+"""The ways of newton, as arguments of `Newton`."""
+
+_NEWTON_SETUPS = {
+    "slack": "squared slacks, and the factorisation that it chooses itself",
+    "barrier": "a logarithmic barrier, and the factorisation that it chooses itself",
+    "kkt": "squared slacks, and LDL^T of the symmetric saddle-point system in place of the normal equations",
+}
+
+
+def qp_adapter(solver: str, package: str | None = None) -> Adapter:
+    """The QP method with one of its solvers."""
+    return Adapter(
+        name=f"qp/{solver}",
+        make=partial(_qp, solver),
+        loose=_QP_BUDGETS,
+        setup=f"wb.QP(solver={solver!r}), all else as it comes: stages and seeded starts follow where the first "
+        "descent does not reach the goals. Budgets of first fit are wb.QP(measures=False), those of "
+        "few iterations have one descent only.",
+        package=package,
+    )
+
+
+def ccd_adapter() -> Adapter:
+    """Cyclic coordinate descent."""
+    return Adapter(
+        name="ccd",
+        make=_ccd,
+        loose=(*few(2, 5, 20), *LADDER[:8]),
+        setup="wb.CCD(), all else as it comes: 400 sweeps from one start and at most 12 further starts. A budget of "
+        "few iterations has no further starts.",
+        differences=(
+            "ccd minimises nothing: it stops at the first posture that serves",
+            "ccd takes Point, Frame and Orientation goals, holds that the reaching joints do not move, Freeze and "
+            "ReachCones; the root of the figure stays",
+        ),
+    )
+
+
+def dls_adapter() -> Adapter:
+    """Damped least squares, the textbook baseline."""
+    return Adapter(
+        name="dls",
+        make=_dls,
+        loose=(*few(2, 3, 4, 6), *LADDER),
+        setup="wb.DampedLeastSquares(), all else as it comes: one start, at most 300 steps, damping by Sugihara 2011.",
+        differences=(
+            "dls knows no contacts: it passes through things and may end inside of them",
+            "dls minimises no measure: each step is the least motion",
+            "dls takes equalities only: Balance, ReachCones and Plane with side 'above' are refused",
+        ),
+    )
+
+
+def newton_adapter(way: str) -> Adapter:
+    """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
+    return Adapter(
+        name=f"newton/{way}",
+        make=partial(_newton, way),
+        loose=(*few(3, 6, 12, 25), *LADDER[1:]),
+        setup=f"wb.Newton() with {_NEWTON_SETUPS[way]}; all else as it comes. A budget of few iterations has one "
+        "start.",
+        differences=(
+            "newton minimises measures up to what the stopping of its iteration leaves, and PotentialEnergy not at all",
+        ),
+    )
+
+
+def _qp(solver: str, tolerance: float, iterations: int | None) -> Method:
+    from wholebody.methods.qp.method import QP
+
+    if iterations is None or iterations == FIRST_FIT:
+        return QP(solver=solver, tolerance=tolerance, measures=iterations is None)
+    return QP(solver=solver, tolerance=tolerance, iterations=iterations, budget=0, restarts=0)
+
+
+def _ccd(tolerance: float, iterations: int | None) -> Method:
+    from wholebody.methods.ccd.method import CCD
+
+    if iterations is None:
+        return CCD(tolerance=tolerance)
+    return CCD(tolerance=tolerance, iterations=iterations, restarts=0)
+
+
+def _newton(way: str, tolerance: float, iterations: int | None) -> Method:
+    from wholebody.methods.newton.method import Newton
+
+    if iterations is None:
+        return Newton(tolerance=tolerance, **NEWTONS[way])
+    return Newton(tolerance=tolerance, iterations=iterations, restarts=0, **NEWTONS[way])
+
+
+def _dls(tolerance: float, iterations: int | None) -> Method:
+    from wholebody.methods.damped_least_squares import DampedLeastSquares
+
+    if iterations is None:
+        return DampedLeastSquares(tolerance=tolerance)
+    return DampedLeastSquares(tolerance=tolerance, iterations=iterations)
+
+
+class MovingPoint(Goal):
+    """The origin of a frame at a place that moves: write the place into `target`, shape (3,)."""
+
+    def __init__(self, frame: str, target: Array) -> None:
+        """Name the frame; the array is kept, not copied."""
+        self.frame, self.target = frame, target
+        self._id = self._joint = 0
+
+    def resolve(self, scene: Surroundings, start: Array) -> MovingPoint:
+        """Find the frame."""
+        index = scene.figure.frame_id(self.frame)
+        return filled(self, _id=index, _joint=int(scene.model.frames[index].parentJoint))
+
+    def error(self, state: State) -> Array:
+        """(3,) from the target to the frame [m]."""
+        return np.asarray(state.frame(self._id).translation - self.target)
+
+    def jacobian(self, state: State) -> Wrench:
+        """Three forces along the world's axes, through the frame's origin."""
+        x, y, z = state.frame(self._id).translation
+        rows = np.array([[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]])
+        return Wrench(rows, self._joint)
+
+
+class WholebodyTool(Tool):
+    """One program a step, with the workspace of the step before."""
+
+    def __init__(self, track: Track, solver: str) -> None:
+        """State the problem; the target is moved afterwards."""
+        self.name = f"wholebody/{solver}"
+        self._target = np.array(track.targets[0])
+        self.problem = wb.Problem(
+            track.scene,
+            track.start,
+            goals=[MovingPoint(track.tip, self._target)],
+            constraints=[
+                *(wb.Hold(foot) for foot in track.feet),
+                wb.StepLimit(JOINT_SPEED, root_velocity=ROOT_SPEED, root_turn=ROOT_TURN),
+            ],
+            measures=[wb.Displacement()],
+            clearance=CLEARANCE,
+        )
+        self._tracker = wb.QP(solver=solver).tracker(self.problem, DT)
+        self._q = np.array(track.start)
+        self._told: list[tuple[int, bool, int]] = []
+
+    def reset(self, q: Array) -> None:
+        """Go to a posture."""
+        self._q = np.array(q)
+        self._told.clear()
+
+    def step(self, target: Array) -> None:
+        """Move one step."""
+        self._target[:] = target
+        step = self._tracker.step(self._q)
+        self._q = step.q
+        self._told.append((step.rows, step.exact, step.iterations))
+
+    def posture(self) -> Array:
+        """Where it is."""
+        return np.array(self._q)
+
+    def remarks(self) -> dict[str, float]:
+        """Mean number of contact rows, and shares of steps that were closed exactly, and without the solver."""
+        rows, exact, iterations = zip(*self._told, strict=True)
+        return {
+            "rows": float(np.mean(rows)),
+            "exact": float(np.mean(exact)),
+            "at_once": float(np.mean(np.array(iterations) == 0)),
+        }

@@ -1,0 +1,163 @@
+"""Which adapters there are, and which of them are installed here: those that solve, and those that follow a reach."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from wholebody.bench.adapters.base import Adapter, Tool
+from wholebody.bench.adapters.own import NEWTONS, ccd_adapter, dls_adapter, newton_adapter, qp_adapter
+from wholebody.bench.track import Track
+from wholebody.errors import MissingPackageError, UnknownNameError
+
+SOLVERS = {"quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
+"""Further QP solvers that the extra `solvers` installs: their names in qpsolvers -> the modules they need."""
+
+
+class _Row(NamedTuple):
+    """How to build an adapter, the modules it needs, and the extra that installs them."""
+
+    build: Callable[[], Adapter]
+    modules: tuple[str, ...] = ()
+    extra: str = ""
+
+    def installed(self) -> bool:
+        return all(find_spec(module) for module in self.modules)
+
+
+def adapters(names: Iterable[str] | None = None) -> tuple[Adapter, ...]:
+    """The adapters of these names, in the order given; all installed ones where None.
+
+    The name of a method with several adapters, "qp" or "newton", means all of them that are installed.
+
+    Raises:
+        UnknownNameError: there is no such adapter.
+        MissingPackageError: what it needs is not installed.
+    """
+    rows = _rows()
+    if names is None:
+        return tuple(row.build() for row in rows.values() if row.installed())
+    families = {name.partition("/")[0] for name in rows}
+    chosen: dict[str, None] = {}
+    for name in names:
+        if name in rows:
+            chosen[name] = None
+        elif name in families:
+            chosen.update(dict.fromkeys(key for key in rows if key.startswith(f"{name}/") and rows[key].installed()))
+        else:
+            raise UnknownNameError("method", name, {*rows, *families})
+    for name in chosen:
+        if not rows[name].installed():
+            raise MissingPackageError(f"{name} is not installed; install it with: {_command(rows[name])}")
+    return tuple(rows[name].build() for name in chosen)
+
+
+def names() -> tuple[str, ...]:
+    """Names of all adapters, installed or not, in the order of reports."""
+    return tuple(_rows())
+
+
+def missing() -> Mapping[str, str]:
+    """Adapters whose packages are not installed -> the command that installs them."""
+    return MappingProxyType({name: _command(row) for name, row in _rows().items() if not row.installed()})
+
+
+def _command(row: _Row) -> str:
+    return f"pip install 'wholebody[{row.extra}]'"
+
+
+def _outside(name: str) -> Adapter:
+    made: Adapter = getattr(import_module(f"wholebody.bench.adapters.{name}"), f"{name}_adapter")()
+    return made
+
+
+def _rows() -> dict[str, _Row]:
+    from wholebody.methods.qp.solvers.registry import solver_names
+
+    rows = {f"qp/{solver}": _Row(partial(qp_adapter, solver)) for solver in ("osqp", "daqp")}
+    for solver, module in SOLVERS.items():
+        rows[f"qp/{solver}"] = _Row(partial(qp_adapter, solver, module), (module,), "solvers")
+    for solver in solver_names():  # any other that qpsolvers finds on this machine
+        rows.setdefault(f"qp/{solver}", _Row(partial(qp_adapter, solver, solver)))
+    for way in NEWTONS:
+        rows[f"newton/{way}"] = _Row(partial(newton_adapter, way))
+    rows["ccd"] = _Row(ccd_adapter)
+    rows["dls"] = _Row(dls_adapter)
+    rows["placo"] = _Row(partial(_outside, "placo"), ("placo",), "placo")
+    rows["pink"] = _Row(partial(_outside, "pink"), ("pink", "daqp"), "compare")
+    rows["mink"] = _Row(partial(_outside, "mink"), ("mink", "mujoco", "daqp"), "compare")
+    return rows
+
+
+STEPPING = {
+    "wholebody/osqp": ("osqp",),
+    "wholebody/daqp": ("daqp",),
+    "placo": ("placo",),
+    "pink": ("pink", "daqp"),
+    "mink": ("mink", "mujoco", "daqp"),
+}
+"""Name of every tool that follows reaches -> the modules it needs."""
+
+
+def installed_tools() -> tuple[str, ...]:
+    """Names of the tools whose packages are installed."""
+    return tuple(name for name, modules in STEPPING.items() if all(find_spec(module) for module in modules))
+
+
+def chosen_tools(names: Iterable[str] | None) -> tuple[str, ...]:
+    """Check names of tools; all installed ones where None.
+
+    Raises:
+        UnknownNameError: there is no such tool.
+        MissingPackageError: its packages are not installed.
+    """
+    if names is None:
+        return installed_tools()
+    chosen = tuple(names)
+    for name in chosen:
+        if name not in STEPPING:
+            raise UnknownNameError("tool", name, STEPPING)
+        if name not in installed_tools():
+            extra = "placo" if name == "placo" else "compare"
+            raise MissingPackageError(f"{name} is not installed; install it with: pip install 'wholebody[{extra}]'")
+    return chosen
+
+
+def make_tool(name: str, track: Track) -> Tool:
+    """Set a tool up for a reach.
+
+    Raises:
+        UnknownNameError: there is no such tool.
+        MissingPackageError: its packages are not installed.
+    """
+    kind = tool_class(name)
+    tool: Tool = kind(track, name.partition("/")[2]) if "/" in name else kind(track)
+    return tool
+
+
+def tool_class(name: str) -> Any:
+    """The class of a tool; the others' packages are not imported for it.
+
+    Raises:
+        UnknownNameError: there is no such tool.
+        MissingPackageError: its packages are not installed.
+    """
+    (name,) = chosen_tools([name])
+    family = name.partition("/")[0]
+    module = "own" if family == "wholebody" else family
+    return getattr(import_module(f"wholebody.bench.adapters.{module}"), f"{family.capitalize()}Tool")
+
+
+def differences(name: str) -> tuple[str, ...]:
+    """What a tool cannot express of the task, or does otherwise; one sentence each.
+
+    Raises:
+        UnknownNameError: there is no such tool.
+        MissingPackageError: its packages are not installed.
+    """
+    stated: tuple[str, ...] = tool_class(name).differences
+    return stated

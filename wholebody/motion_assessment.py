@@ -1,0 +1,146 @@
+"""What a motion, postures one after the other, is judged by, computed from the postures alone.
+
+All pairs are asked at every posture, without culling, as `wholebody.assess` does for one; the ways between postures are
+swept. Nothing of a method is used. Whoever judges motions judges them with this: frame loops, drags, streams of hard
+cases, and the steps of tools that are compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.figures.figure import Figure
+from wholebody.figures.state import State
+from wholebody.first_order import AllPairs
+from wholebody.geometry.continuous.sweep import Sweep
+from wholebody.scene import Scene
+from wholebody.tasks import ReachCones
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.intp]
+
+OVERLAPS = 1e-5  # m: deeper than this a pair overlaps
+PARTS = 41  # places on a way where its depth is measured
+
+DEPTHS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
+"""Depths, metres, that are tried in turn as a bound on what a way goes in by."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionAssessment:
+    """How good a motion is.
+
+    Attributes:
+        depth: (n,) deepest overlap of any pair at each posture, metres; 0 where there is none.
+        overlapping: (n,) pairs that overlap by more than 0.01 mm.
+        limit_violation: how far the worst joint of any posture is out of its limits, radians or metres.
+        velocity: (n - 1, nv) from posture to posture, radians and metres a second.
+        jerk: (n - 3,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
+    """
+
+    depth: Array
+    overlapping: Counts
+    limit_violation: float
+    velocity: Array
+    jerk: Array
+
+
+def assess_motion(scene: Scene, q: Array, dt: float) -> MotionAssessment:
+    """Judge postures (n, nq) of a scene in which nothing else moves, `dt` seconds apart."""
+    depth, overlapping = np.zeros(len(q)), np.zeros(len(q), dtype=np.intp)
+    for frame, pairs in enumerate(pairs_along(scene, q)):
+        depth[frame] = max(0.0, -pairs.least)
+        overlapping[frame] = int((pairs.distance < -OVERLAPS).sum())
+    return MotionAssessment(
+        depth, overlapping, limit_violation(scene.figure, q), velocities(scene.model, q, dt), jerk(scene.model, q, dt)
+    )
+
+
+def pairs_along(scene: Scene, q: Array) -> Iterator[AllPairs]:
+    """All pairs at each of the postures (n, nq), with the kinematic state there; good until the next is asked for."""
+    built = scene.built
+    with built.pool(AllPairs, lambda: AllPairs(built)).lend() as pairs:
+        for posture in q:
+            pairs.move(np.asarray(posture, dtype=float))
+            yield pairs
+
+
+def limit_violation(figure: Figure, q: Array) -> float:
+    """How far the worst joint of any posture (n, nq) is out of its limits, radians or metres."""
+    limits = figure.limits
+    values = np.atleast_2d(q)[:, limits.idx_q]
+    return float(np.maximum(limits.lower - values, values - limits.upper).max(initial=0.0))
+
+
+def cone_violation(scene: Scene, q: Array) -> float:
+    """How far the worst limb of any posture (n, nq) is out of its reach cone, radians."""
+    if not scene.figure.cones:
+        return 0.0
+    cones, state = ReachCones().resolve(scene, q[0]), State(scene.model)
+    return max(0.0, *(-float(cones.value(state.update(posture)).min()) for posture in q))
+
+
+def velocities(model: pin.Model, q: Array, dt: float) -> Array:
+    """(n - 1, nv) from posture to posture of (n, nq), `dt` seconds apart, radians and metres a second."""
+    return np.array([pin.difference(model, *pair) for pair in pairwise(q)]).reshape(-1, model.nv) / dt
+
+
+def jerk(model: pin.Model, q: Array, dt: float) -> Array:
+    """(n - 3,) root of the mean square of the third difference of the joint angles, rad/s^3."""
+    joints = slice(6 if model.nq != model.nv else 0, None)
+    return root_mean_square(third_differences(model, q, dt)[:, joints])
+
+
+def third_differences(model: pin.Model, q: Array, dt: float) -> Array:
+    """(n - 3, nv) of postures (n, nq) over time, rad/s^3 and m/s^3."""
+    return np.diff(velocities(model, q, dt), n=2, axis=0) / dt**2 if len(q) > 3 else np.zeros((0, model.nv))
+
+
+def root_mean_square(values: Array) -> Array:
+    """Of each row of (n, k)."""
+    return np.asarray(np.sqrt((values**2).mean(axis=1)))
+
+
+def passed(scene: Scene, q: Array, depth: float) -> tuple[int, ...]:
+    """Postures of (n, nq) on the way to which, from the one before, some pair goes deeper than `depth` metres."""
+    sweep, ways = Sweep(scene.model, scene.geometry), enumerate(pairwise(q), start=1)
+    return tuple(frame for frame, way in ways if sweep.first_contact(*way, tolerance=depth) is not None)
+
+
+def deepened(scene: Scene, q: Array) -> Array:
+    """(n - 1,) how much deeper any pair gets on the way to the next of the postures (n, nq) than at its ends, metres.
+
+    The least of `DEPTHS` by which nothing gets deeper on the way, from either end; inf where it is by all of them.
+    """
+    sweep = Sweep(scene.model, scene.geometry)
+    return np.array([_deepened(sweep, *way) for way in pairwise(q)])
+
+
+def _deepened(sweep: Sweep, before: Array, after: Array) -> float:
+    for depth in DEPTHS:
+        if sweep.first_contact(before, after, tolerance=depth) is None:
+            return depth
+        if sweep.first_contact(after, before, tolerance=depth) is None:
+            return depth
+    return np.inf
+
+
+def dip(scene: Scene, before: Array, after: Array, depth: float) -> tuple[float, str]:
+    """How deep the way between two postures (nq,) goes into something, metres, and into what; things stay in place.
+
+    The sweep sees whether it goes deeper than `depth`, however thin the thing; how deep is measured at parts of it.
+    """
+    contact = scene.sweep(before, after, depth)
+    if contact is None or not contact.certain:
+        return 0.0, ""
+    deepest = depth
+    for share in np.linspace(0.0, 1.0, PARTS):
+        found = scene.contacts(np.asarray(pin.interpolate(scene.model, before, after, float(share))), within=0.0)
+        deepest = max(deepest, float(-found.distance.min(initial=0.0)))
+    return deepest, " and ".join(scene.piece_owner[piece] for piece in contact.pair)

@@ -1,0 +1,306 @@
+"""Jobs in processes of their own: what crashes, hangs or fills the memory ends its process, and nothing else.
+
+A job is a function with arguments and a deadline. An alarm of the system, which no compiled code can hold up, ends the
+process at the deadline. The job may move its deadline (`allow`) and send notes before its answer (`tell`). A process
+serves one job after the other and is replaced when it ended. It ends by itself when its parent is gone.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+from wholebody.errors import WholebodyError
+
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+"""Environment of a process whose libraries compute on one core."""
+
+FULL = 2e9  # bytes: a process that holds more should be replaced; placo never frees a robot (some 6 MB)
+LONGEST_WORDS = 200  # letters of what a process wrote last that are kept
+
+_START = (
+    "import sys; sys.path[:] = [{root!r}, *filter(None, sys.path)]; from wholebody.runner import serve; "
+    "sys.path.remove({root!r}); sys.path.append({root!r}); serve({descriptor})"
+)
+"""What a new interpreter runs. The package is found first, and hides no other one afterwards."""
+
+_parent: Connection | None = None  # in a process that serves jobs: the way to whoever asked
+
+
+class EndedError(WholebodyError):
+    """The process of a job has ended before its answer.
+
+    Attributes:
+        overtime: whether the deadline ended it.
+        code: its exit code; the negative number of the signal that ended it.
+        said: the last line that it wrote; "" where it wrote none, or was forked.
+    """
+
+    def __init__(self, code: int, said: str = "") -> None:
+        """Say how the process ended."""
+        self.overtime, self.code, self.said = code == -signal.SIGALRM, code, said
+        message = "it took too long" if self.overtime else f"the process ended with {self.how}"
+        super().__init__(message + (f": {said}" if said and not self.overtime else ""))
+
+    @property
+    def how(self) -> str:
+        """The exit code or the signal, in words."""
+        return signal.Signals(-self.code).name if self.code < 0 else f"exit code {self.code}"
+
+
+class Job(NamedTuple):
+    """What a process is to do.
+
+    Attributes:
+        name: what the job is to whoever asks; it stays with them.
+        function: called in the process.
+        arguments: of the function.
+        seconds: until the process is ended, unless the job moves its deadline.
+    """
+
+    name: Any
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    seconds: float
+
+
+class Outcome(NamedTuple):
+    """What came of a job.
+
+    Attributes:
+        job: which.
+        notes: what it told before its answer.
+        answer: what the function returned; None where the process ended.
+        error: how the process ended; None where there is an answer.
+    """
+
+    job: Job
+    notes: tuple[Any, ...]
+    answer: Any
+    error: EndedError | None
+
+
+class Child:
+    """A process that does one job at a time; a new one takes its place when it has ended."""
+
+    def __init__(self, environment: Mapping[str, str] | None = None, forked: bool = False) -> None:
+        """Start nothing yet.
+
+        Args:
+            environment: variables of the process that differ from those here.
+            forked: whether each job has a process of its own, forked from this one. What was imported and compiled here
+                is there then, and neither functions nor arguments have to be importable.
+        """
+        self._environment, self._forked = dict(environment or {}), forked
+        self._process: subprocess.Popen[bytes] | BaseProcess | None = None
+        self._words: IO[bytes] | None = None
+        self._ear: Connection | None = None
+        self._job: Job | None = None
+        self._notes: list[Any] = []
+
+    @property
+    def process(self) -> int | None:
+        """Number of the process; None where none runs."""
+        return None if self._process is None else self._process.pid
+
+    @property
+    def ear(self) -> Connection:
+        """What can be read once a job told something; see `multiprocessing.connection.wait`."""
+        assert self._ear is not None
+        return self._ear
+
+    def call(self, function: Callable[..., Any], *arguments: Any, seconds: float) -> Any:
+        """Do a job, and wait for its answer.
+
+        Raises:
+            EndedError: the process has ended over it; the next call starts another.
+        """
+        self.begin(Job(None, function, arguments, seconds))
+        while (outcome := self.listen()) is None:
+            pass
+        if outcome.error is not None:
+            raise outcome.error
+        return outcome.answer
+
+    def begin(self, job: Job) -> None:
+        """Send a job; `listen` has what comes of it."""
+        self._job, self._notes = job, []
+        if self._forked:
+            self._fork(job)
+            return
+        if self._process is None:
+            self._start()
+        try:
+            self.ear.send((job.seconds, _dumps((job.function, job.arguments))))
+        except (BrokenPipeError, ConnectionResetError):
+            return  # it ended since its last job: `listen` says so
+
+    def listen(self) -> Outcome | None:
+        """Wait for the next word of a job: the job's end, or None after a note."""
+        assert self._job is not None
+        try:
+            last, value = self.ear.recv()
+        except (EOFError, ConnectionResetError):
+            return Outcome(self._job, tuple(self._notes), None, self._ended())
+        if not last:
+            self._notes.append(value)
+            return None
+        if self._forked:
+            self.close()
+        return Outcome(self._job, tuple(self._notes), value, None)
+
+    def close_if_full(self) -> None:
+        """End a process that has done its job and holds more memory than `FULL`; the next job starts another."""
+        if self._process is not None and _memory(self._process.pid) > FULL:
+            self.close()
+
+    def close(self) -> None:
+        """End the process, whatever it does."""
+        if self._process is not None:
+            self._process.kill()
+            _wait_for(self._process)
+        for stream in (self._ear, self._words):
+            if stream is not None:
+                stream.close()
+        self._process = self._words = self._ear = None
+
+    def _start(self) -> None:
+        """Start an interpreter that reads jobs."""
+        import wholebody
+
+        ours, theirs = socket.socketpair()
+        root = str(Path(wholebody.__file__).parents[1])
+        self._words = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", _START.format(root=root, descriptor=theirs.fileno())],
+                stdin=subprocess.DEVNULL,
+                stdout=self._words,
+                stderr=self._words,
+                pass_fds=[theirs.fileno()],
+                env=os.environ | self._environment,
+            )
+        self._ear = Connection(ours.detach())
+
+    def _fork(self, job: Job) -> None:
+        """Fork a process that has the job already."""
+        context = multiprocessing.get_context("fork")
+        self._ear, theirs = context.Pipe()
+        self._process = context.Process(target=_serve_one, args=(theirs, job, self._environment), daemon=True)
+        self._process.start()
+        theirs.close()
+
+    def _ended(self) -> EndedError:
+        assert self._process is not None
+        code, said = _wait_for(self._process), ""
+        if self._words is not None:
+            self._words.seek(0)
+            lines = self._words.read().decode("utf-8", errors="replace").strip().splitlines()
+            said = lines[-1].strip()[:LONGEST_WORDS] if lines else ""
+        self.close()
+        return EndedError(code, said)
+
+
+def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> Iterator[Outcome]:
+    """Do jobs beside each other, and give their outcomes as they end; the children are closed at the end.
+
+    Args:
+        next_job: asked for a job whenever a process is free; None where there is none (now, or any more).
+        children: as many jobs are done at a time.
+    """
+    free, busy = list(children), list[Child]()
+    try:
+        while True:
+            while free and (job := next_job()) is not None:
+                busy.append(free.pop())
+                busy[-1].begin(job)
+            if not busy:
+                return
+            ready = wait([child.ear for child in busy])
+            for child in [child for child in busy if child.ear in ready]:
+                outcome = child.listen()
+                if outcome is not None:
+                    busy.remove(child)
+                    free.append(child)
+                    yield outcome
+    finally:
+        for child in children:
+            child.close()
+
+
+def allow(seconds: float) -> None:
+    """Give the job that this is called in so many seconds from now; nothing where no job runs here."""
+    if _parent is not None:
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+
+
+def tell(note: Any) -> None:
+    """Send a note to whoever asked for the job that this is called in; nothing where no job runs here."""
+    if _parent is not None:
+        _parent.send((False, note))
+
+
+def serve(descriptor: int) -> None:
+    """Do jobs until the parent is gone; this is what a process of `Child` runs."""
+    global _parent
+    _parent = Connection(descriptor)
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    try:
+        while True:
+            seconds, packed = _parent.recv()
+            allow(seconds)
+            function, arguments = pickle.loads(packed)
+            answer = function(*arguments)
+            allow(0.0)
+            _parent.send((True, answer))
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        return
+
+
+def _serve_one(parent: Connection, job: Job, environment: Mapping[str, str]) -> None:
+    """Do one job in a forked process."""
+    global _parent
+    _parent = parent
+    os.environ.update(environment)
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    allow(job.seconds)
+    parent.send((True, job.function(*job.arguments)))
+    os._exit(0)  # nothing of the parent's is to be closed twice
+
+
+def _wait_for(process: subprocess.Popen[bytes] | BaseProcess) -> int:
+    """Wait until a process has ended; return its exit code."""
+    if isinstance(process, subprocess.Popen):
+        return process.wait()
+    process.join()
+    return process.exitcode or 0
+
+
+def _memory(process: int | None) -> float:
+    """Return the bytes of memory that a process holds; 0 where the system does not say."""
+    try:
+        pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
+    except OSError:
+        return 0.0
+    return float(pages * os.sysconf("SC_PAGE_SIZE"))
+
+
+def _dumps(value: Any) -> bytes:
+    """Pickle; what is not importable by its code, unless cloudpickle is missing, which the doctor has to survive."""
+    try:
+        import cloudpickle
+    except ImportError:
+        return pickle.dumps(value)
+    packed: bytes = cloudpickle.dumps(value)
+    return packed
