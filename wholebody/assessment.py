@@ -11,15 +11,13 @@ from dataclasses import dataclass, field
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import a, number, posture
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.first_order import MET, AllPairs, Blocker, blockers, optimality
 from wholebody.problem import Problem
-
-Array = NDArray[np.float64]
 
 STILL = 1e-2  # rad, m: optimality below which a posture counts as the nearest to goals that it does not meet
 NAMED = 4  # blockers that a message names at the most

@@ -14,11 +14,9 @@ from reprlib import Repr
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError, UnknownNameError
-
-Array = NDArray[np.float64]
 
 _T = TypeVar("_T")
 

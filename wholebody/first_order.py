@@ -13,15 +13,13 @@ from typing import Any, Literal
 import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.guesses import Guesses
 from wholebody.problem import Problem
 from wholebody.scene_geometry import SceneGeometry
-
-Array = NDArray[np.float64]
 
 ACTIVE = 1e-4  # m, rad: nearer to its bound than this a constraint may push back
 FLAT = 1e-2  # share of the largest curvature below which a degree of freedom counts as having that much

@@ -11,16 +11,13 @@ from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.proximity import Contacts
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.first_order import AllPairs
@@ -22,7 +23,6 @@ from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.intp]
 
 OVERLAPS = 1e-5  # m: deeper than this a pair overlaps

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from wholebody import checks
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import FARTHEST
@@ -21,8 +21,6 @@ from wholebody.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 UNIT_TOLERANCE = 1e-3  # how far a start's quaternion may be from unit length before it is taken for a mistake
 LARGEST_CLEARANCE = 0.5  # m: more is taken for a slip of units

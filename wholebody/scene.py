@@ -9,11 +9,10 @@ from threading import RLock
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from wholebody import checks
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import FARTHEST
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.geometry.continuous.sweep import FirstContact
     from wholebody.geometry.penetration import ObjectPenetration
-
-Array = NDArray[np.float64]
 
 
 class Scene:

@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from wholebody.arrays import Array
 from wholebody.assessment import Assessment
 
-Array = NDArray[np.float64]
 Status = Literal["solved", "unreachable", "infeasible", "stalled"]
 
 

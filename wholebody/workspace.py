@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
@@ -17,8 +16,6 @@ from wholebody.scene_geometry import SceneGeometry
 
 if TYPE_CHECKING:
     from wholebody.geometry.continuous.sweep import Sweep
-
-Array = NDArray[np.float64]
 
 
 class Workspace:

@@ -19,15 +19,14 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.bench.problem_sets.registry import SETS
 from wholebody.bench.stability.case import Posed
 from wholebody.bench.stability.catalogue import cases
 from wholebody.methods.solve import method_named
 from wholebody.problem import Problem
 
-Array = NDArray[np.float64]
 Value = float | int | tuple[float, ...]
 
 SHARED = ("wholebody.methods.starts", "wholebody.geometry.continuous.passing_through")

@@ -6,14 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.problem_sets.things import Occupied
 from wholebody.errors import InputError
 from wholebody.files import Scratch
-
-Array = NDArray[np.float64]
 
 LENGTH = 2.0  # m: of the whole chain, however many joints it has
 HALF = 0.025  # m: half the breadth of its segments

@@ -11,13 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.problem_sets.things import Occupied
 from wholebody.errors import InputError, UnknownNameError
-
-Array = NDArray[np.float64]
 
 VARIANTS = ("free", "contact", "alone")
 DT = 0.01  # s

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import FileFormatError, one_line
 from wholebody.figures.state import State
 from wholebody.files import read_text
@@ -20,8 +20,6 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.taskfile import Task, read_task
 from wholebody.version import __version__
-
-Array = NDArray[np.float64]
 
 
 class GoalLeft(NamedTuple):

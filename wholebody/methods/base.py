@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import number, posture, time_step
 from wholebody.errors import InputError
 from wholebody.methods.control import Progress
@@ -19,8 +19,6 @@ from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 
 class Step(Protocol):

@@ -6,16 +6,14 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.assessment import Assessment, assess
 from wholebody.figures.state import State
 from wholebody.methods.contradictions import Contradiction, explanation, in_words, proven
 from wholebody.methods.control import Control
 from wholebody.problem import Problem
 from wholebody.solution import Iterate, Solution, Status
-
-Array = NDArray[np.float64]
 
 SLACK = 1.05  # times the tolerance: an assessment measures with other arithmetic
 COAL_ACCURACY = 1e-6  # m

@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.geometry.placement import placement
 from wholebody.problem import Problem
 from wholebody.solution import Status
@@ -25,8 +26,6 @@ from wholebody.tasks.hold import Hold
 from wholebody.tasks.inputs import find_place
 from wholebody.tasks.point import Point
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 CLEAR = 1e-4  # m, rad: what differs by less is left to the search
 NEAREST = 1.02  # times the least that can be left of the goals, up to which a posture is taken for the nearest

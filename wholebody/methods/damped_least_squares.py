@@ -21,8 +21,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
@@ -31,9 +31,6 @@ from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_probl
 from wholebody.problem import Problem
 from wholebody.solution import Iterate, Solution
 from wholebody.tasks.base import Constraint, Goal
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 SHARE = 0.5  # of the tolerance: to what goals and equalities are met, so that the judge, who rounds otherwise, agrees
 REST = 1e-2  # share of the tolerance: a step smaller than this has come to rest

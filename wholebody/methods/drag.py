@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import time_step
 from wholebody.geometry.continuous.passing_through import GRAZE, is_free
 from wholebody.methods.base import Method, goal_error
@@ -24,8 +24,6 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Frame, Point, StepLimit
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 FRAME = 1.0 / 60.0  # s: a frame of a screen
 LEGS = (np.inf, 0.01, 0.002)  # m, rad: how far the goal is followed in a frame, in turn where a longer way is not free

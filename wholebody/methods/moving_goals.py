@@ -6,10 +6,9 @@ import copy
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import whole
 from wholebody.errors import InputError
 from wholebody.methods.inputs import check_problem
@@ -17,8 +16,6 @@ from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
 from wholebody.tasks import Frame, Point
 from wholebody.tasks.base import Goal
-
-Array = NDArray[np.float64]
 
 
 def copied(problem: Problem) -> Problem:

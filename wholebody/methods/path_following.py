@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wholebody import checks
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
@@ -22,8 +23,6 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point
 from wholebody.tasks.inputs import FARTHEST, point
-
-Array = NDArray[np.float64]
 
 SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from nearer
 CLOSEST = 1e-6  # m: least spacing

@@ -6,12 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.problem import Problem
-
-Array = NDArray[np.float64]
 
 SPREADS = (0.3, 0.6, 1.0)  # share of each joint's range that a start may leave the first one by, in turn
 AT_LIMIT = 0.02  # rad: nearer to its limit than this a joint counts as at it

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from wholebody.arrays import Array
 from wholebody.assessment import assess
 from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.base import Tracker
 from wholebody.problem import Problem
 from wholebody.solution import Solution
-
-Array = NDArray[np.float64]
 
 WITHIN = 0.06  # m: pairs nearer than this are measured when a way is judged; larger = dearer, fewer left to a sweep
 PASSING = 1e-3  # m: a solution whose way goes in deeper gives way to a nearer one

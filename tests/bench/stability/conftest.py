@@ -5,14 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.assessment import assess
 from wholebody.bench.adapters.base import Adapter
 from wholebody.problem import Problem
 from wholebody.solution import Solution, Status
-
-Array = NDArray[np.float64]
 
 
 @dataclass

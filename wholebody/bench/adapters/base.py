@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, runtime_checkable
 
-from wholebody.bench.track import Array
+from wholebody.arrays import Array
 from wholebody.methods.base import Method
 from wholebody.problem import Problem
 

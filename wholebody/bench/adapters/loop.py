@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError, named_terms, refusal
@@ -23,8 +23,6 @@ from wholebody.problem import Problem
 from wholebody.solution import Iterate, Solution
 from wholebody.tasks import Displacement, Effort, Hold
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 STEP = (
     0.025  # rad, m: most that a joint or the root moves in one iteration; twice that leaves pink no solution more often

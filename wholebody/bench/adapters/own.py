@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.adapters.base import FIRST_FIT, LADDER, Adapter, Budget, Tool, few
-from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Array, Track
+from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.base import Method
 from wholebody.tasks.base import Goal, Surroundings, filled

@@ -7,13 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.attack import urdfs
 from wholebody.bench.attack.judging import Pairs
-
-Array = NDArray[np.float64]
 
 SCALES = (0.005, 0.02, 0.1, 1.0, 1.0, 1.0, 10.0, 60.0)
 """Sizes of robots that are made up, metres: links from a millimetre to some thirty metres."""

@@ -14,8 +14,8 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import (
@@ -30,8 +30,6 @@ from wholebody.tasks import (
     Posture,
     Relative,
 )
-
-Array = NDArray[np.float64]
 
 RESTING = 1e-6  # m: a pair that begins deeper than this begins inside, and is asked for the whole clearance
 

@@ -6,14 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.bench.attack.bodies import Body, body
 from wholebody.bench.attack.case import Written
 from wholebody.bench.attack.things import Placed, Thing, clear, inside, seven
 from wholebody.methods import installed_methods
-
-Array = NDArray[np.float64]
 
 CLEARANCES = (0.0, 0.0, 0.001, 0.005, 0.005, 0.05, 0.3)
 METHODS = (*("'qp'",) * 12, "wb.QP(tolerance=1e-8)", "wb.QP(measures=False)", "wb.QP(solver='daqp')") + tuple(

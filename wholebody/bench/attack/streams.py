@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.bench.attack.bodies import Body, body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs, judge
@@ -16,8 +16,6 @@ from wholebody.bench.attack.solves import Asked, opening
 from wholebody.bench.attack.things import Placed, Thing, clear, seven
 from wholebody.errors import WholebodyError
 from wholebody.problem import Problem
-
-Array = NDArray[np.float64]
 
 DIP = 5e-4  # m, of pieces of up to a metre: as far as a way between two postures may go deeper into a pair than before
 PARTS = 8  # of a way that are looked at

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.bench.attack.bodies import body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs
@@ -13,8 +13,6 @@ from wholebody.bench.attack.solves import Asked, opening
 from wholebody.bench.attack.things import Placed, clear, inside
 from wholebody.geometry.continuous.sweep import TOLERANCE, FirstContact
 from wholebody.scene import Scene
-
-Array = NDArray[np.float64]
 
 PARTS = 150  # of a way
 FINER = 40  # parts of the part where something is deepest

@@ -8,12 +8,10 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.attack.bodies import Body
-
-Array = NDArray[np.float64]
 
 KINDS = ("box", "sphere", "capsule", "ellipsoid", "hull", "plate", "halfspace", "mesh")
 SHARES = (0.25, 0.15, 0.15, 0.1, 0.12, 0.12, 0.1, 0.01)

@@ -7,16 +7,14 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.assessment import Assessment, assess
 from wholebody.bench.compare.record import ANSWERED, Record
 from wholebody.bench.problem_sets.case import Case
 from wholebody.methods.base import SolvedStep, Tracker
 from wholebody.motion_assessment import third_differences
 from wholebody.problem import Problem
-
-Array = NDArray[np.float64]
 
 USUAL = 0.95  # share of the frames whose tracking error counts: in the first ones the goal is far away
 STILL = 1e-6  # m: a gap that changes less in a frame does not turn

@@ -10,16 +10,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk
 
 BUILDING_SHARE = 0.3  # of a set's time, that building its cases may take
 
 FIRST = 4  # cases after which it is known what building one takes
-
-Array = NDArray[np.float64]
 
 
 class Allowed(NamedTuple):

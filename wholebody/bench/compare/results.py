@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.bench.adapters.base import Budget
 from wholebody.bench.compare.record import COARSE, DEFAULT, FLOOR, REFUSED, Record
-
-Array = NDArray[np.float64]
 
 EFFORT_FLOOR = 1e-5  # share of the best effort below which efforts are not told apart
 EXACT = 1e-6  # m, rad: answers less exact than this are cheaper by what they lack, and are no measure for others

@@ -10,9 +10,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.errors import InputError
-
-Array = NDArray[np.float64]
 
 ROOM = 0.005  # m: what limbs and things leave free in a witness, and things at the start
 CLEARANCE = 0.002  # m: what is asked of an answer

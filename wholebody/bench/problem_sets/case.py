@@ -6,12 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.problem import Problem
 from wholebody.tasks.base import Goal
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

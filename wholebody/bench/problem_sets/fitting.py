@@ -12,13 +12,10 @@ from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import wholebody as wb
+from wholebody.arrays import Array, Indices
 from wholebody.figures.state import State, Wrench
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 EXACT = 1e-10  # m, rad
 TURNS = 25

@@ -7,14 +7,12 @@ from collections.abc import Iterable, Sequence
 import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.geometry.placement import placement
 from wholebody.geometry.swept_points import swept_points
-
-Array = NDArray[np.float64]
 
 KINDS = ("box", "sphere", "capsule", "hull")
 SPACE = ((-0.6, -1.0, 0.1), (1.2, 1.0, 2.0))  # m: where things are put around a person

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import WholebodyError
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.scene import Scene
 
-Array = NDArray[np.float64]
 
 SEED = 7
 """Of the postures whose tips are the targets."""

@@ -7,14 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.stability.case import HardCase, Nonsense, Posed, Stream
 from wholebody.errors import WholebodyError
 from wholebody.methods.drag import Drag
-
-Array = NDArray[np.float64]
 
 ASKED = 1e-5  # m, rad: tolerance that methods are asked for; they are judged by the case's own
 

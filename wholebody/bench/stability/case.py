@@ -8,12 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wholebody.bench.adapters.base import Adapter
 from wholebody.problem import Problem
 
-Array = NDArray[np.float64]
 Kind = Literal["solved", "honest", "refusal", "adapter", "wrong"]
 
 FRAME = 1.0 / 60.0  # s: a frame of a screen

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wholebody.assessment import Assessment, assess
 from wholebody.bench.stability.answering import Answer
@@ -13,8 +12,6 @@ from wholebody.bench.stability.case import HardCase, Nonsense, Posed, Stream
 from wholebody.motion_assessment import dip, velocities
 from wholebody.problem import Problem
 from wholebody.tasks import Point
-
-Array = NDArray[np.float64]
 
 INSIDE = 1e-4  # m: deeper than this is inside
 DIP = 1e-3  # m: by which the straight way between two postures may go in deeper than its ends

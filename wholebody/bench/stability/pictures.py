@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.bench.stability.answering import Answer
 from wholebody.bench.stability.case import HardCase, Nonsense, Stream
 from wholebody.bench.stability.rows import Result
@@ -19,8 +19,6 @@ from wholebody.tasks import Point
 from wholebody.view import Viewer
 from wholebody.view.screenshot import Screenshots
 from wholebody.view.style import FIELD_OF_VIEW
-
-Array = NDArray[np.float64]
 
 SIZE = (560, 420)  # pixels
 ROOM = 1.0  # times the radius of what is to be seen

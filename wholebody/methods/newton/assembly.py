@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from wholebody.arrays import Array
 from wholebody.checks import choice, flag, known, number, numbers, shown, text, whole
 from wholebody.errors import InputError
 from wholebody.geometry.pieces import check_length
@@ -25,8 +26,6 @@ from wholebody.methods.newton.linear_algebra.choice import NAMES, linear_algebra
 from wholebody.methods.newton.system import System
 from wholebody.pool import OneAtATime
 from wholebody.tasks.inputs import direction, point, target_placement
-
-Array = NDArray[np.float64]
 
 WORLD = "world"
 UNIT_TOLERANCE = 1e-3  # how far a quaternion may be from unit length before it is taken for a mistake

@@ -7,15 +7,13 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.methods.newton.course import Course, unit
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.reaching import reach
 from wholebody.methods.newton.settling import settle
 from wholebody.solution import Status
-
-Array = NDArray[np.float64]
 
 FINEST = 1e-9  # least error of the KKT system that is asked for: redundant equations leave about a tenth of it
 

@@ -9,14 +9,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.errors import InputError
 from wholebody.methods.newton import quaternions as quat
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 PLACE, TURN = slice(0, 3), slice(3, 7)
 OTHER_PLACE, OTHER_TURN = slice(7, 10), slice(10, 14)

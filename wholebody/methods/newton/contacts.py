@@ -5,17 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Coincide
 from wholebody.problem import Problem
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 ENTER = 0.03  # m beyond the clearance: nearer pairs become inequalities; larger = more rows, fewer steps made anew
 LEAVE = 0.06  # m beyond the clearance: farther pairs are let go; the difference keeps the structure still

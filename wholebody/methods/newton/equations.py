@@ -7,15 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.methods.newton.angles import Angle
 from wholebody.methods.newton.batches import Batch, Coincide, Slide, Turn, Unit
 from wholebody.methods.newton.keys import Key
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
 from wholebody.methods.newton.system import System
-
-Array = NDArray[np.float64]
 
 
 class Row(NamedTuple):

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.memory_views import placement_view
@@ -15,9 +15,6 @@ from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.newton.angles import Angle
 from wholebody.methods.newton.equations import EquationSet
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 SMALLEST = 0.1  # m: size of a body without anything on it; smaller = turns of such bodies cost less

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.methods.newton.batches import Batch, Unit
 from wholebody.methods.newton.contacts import ContactSet
 from wholebody.methods.newton.course import Course
@@ -19,8 +19,6 @@ from wholebody.methods.newton.system import System
 from wholebody.methods.newton.terms import bound_equations, constraint_equations, goal_equations
 from wholebody.problem import Problem
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 LONGEST = 0.08  # m: longest way of a body in a step where there are pairs that can touch; larger = faster, less seen
 REMEMBERED = 32  # structures that are kept, for contacts that come and go; more = more memory

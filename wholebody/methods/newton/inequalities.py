@@ -13,9 +13,8 @@ from __future__ import annotations
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from wholebody.arrays import Array
 
 FREE = 1e12  # diagonal of an inequality that is not at work: it takes part in the pattern, and in nothing else
 RELEASE = 1e-12  # multiplier below which an active inequality is let go; larger = held longer

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError
-
-Array = NDArray[np.float64]
 
 SAME_PLACE = 1e-9  # m: joints of one kind between two bodies that are nearer than this are one
 

@@ -9,8 +9,8 @@ solution's message says so.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.methods.newton.figure_bodies import FigureBodies
@@ -18,9 +18,6 @@ from wholebody.methods.newton.system import System
 from wholebody.problem import Problem
 from wholebody.tasks import Discomfort, Displacement, Effort
 from wholebody.tasks.base import Measure
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 CAN = (Effort, Displacement, Discomfort)  # sums over joints: what the others of them cost does not hinder
 SAMPLES = 3  # postures at which a measure is asked what it depends on

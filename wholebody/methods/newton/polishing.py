@@ -10,13 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.linear_algebra.base import SingularSystemError
 from wholebody.methods.newton.run import Run
-
-Array = NDArray[np.float64]
 
 ROUNDS = 40  # most of them
 LONGER, SHORTER = 1.3, 0.5  # what a step's share is multiplied by after a round that served, and one that did not

@@ -11,9 +11,8 @@ derivatives. A relative orientation conj(a) b is bilinear, so the equations of j
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from wholebody.arrays import Array
 
 
 def product(a: Array, b: Array) -> Array:

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from wholebody.arrays import Array
 from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.run import Run
-
-Array = NDArray[np.float64]
 
 MENDING = 30  # most steps that only mend what must hold, where the goals were not met
 

@@ -12,14 +12,13 @@ from math import sqrt
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.inequalities import FREE, Inequalities, Kind, inequalities
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
 from wholebody.solution import Iterate
 
-Array = NDArray[np.float64]
 Measures = Literal["lower", "keep", "ignore"]
 
 HARD_DAMPING = 1e-10  # of what must hold: redundant equations are tolerated at this loss of accuracy

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.assessment import Assessment, assess
 from wholebody.methods.conclusion import Ending, concluded, counted
 from wholebody.methods.contradictions import Contradiction, contradictions, least_left
@@ -20,8 +20,6 @@ from wholebody.methods.newton.polishing import polish
 from wholebody.methods.newton.reaching import Reached, reach
 from wholebody.methods.starts import Minima, bent, restarts
 from wholebody.solution import Iterate, Solution
-
-Array = NDArray[np.float64]
 
 SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessment adds the rows of a goal up
 TRIAL = 30  # iterations that another start is given to come nearer than the best so far

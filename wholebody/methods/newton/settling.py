@@ -14,13 +14,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.system import System
-
-Array = NDArray[np.float64]
 
 DAMPING = 1e-10  # redundant equations are tolerated at this loss of accuracy
 HALVINGS = 12  # of a step that does not serve

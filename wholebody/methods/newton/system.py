@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.keys import OBJECTIVE, Key
 from wholebody.methods.newton.linear_algebra.base import Pattern
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 WORLD = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.checks import number, posture, time_step
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import Method, nearest_to
@@ -21,8 +21,6 @@ from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
-
-Array = NDArray[np.float64]
 
 FRAME_TOLERANCE = 1e-4  # m, rad: on the way of a drag; its end is solved to the method's own
 FRAME_ITERATIONS = 12  # most of one frame; a goal that asks for more is followed over the next frames

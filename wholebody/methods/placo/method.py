@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
@@ -20,8 +20,6 @@ from wholebody.methods.placo.terms import add_terms, named_frames, unsupported
 from wholebody.problem import Problem
 from wholebody.solution import Iterate, Solution
 from wholebody.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 STEP = 0.05  # rad, m: most that a joint or the root moves in one iteration
 NEAR = 0.1  # m: pairs nearer than this have a row; placo's trigger

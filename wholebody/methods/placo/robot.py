@@ -13,14 +13,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.errors import MissingPackageError
 from wholebody.figures.figure import Figure
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.problem import Problem
-
-Array = NDArray[np.float64]
 
 SWELL = 0.005
 """Metres by which pieces are swollen beyond their clearance, and which placo's margin takes off again.

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.methods.base import named_terms
 from wholebody.methods.placo.robot import Robot, unsupported_joints
 from wholebody.problem import Problem
@@ -32,7 +32,6 @@ from wholebody.tasks import (
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
-Array = NDArray[np.float64]
 Frames = dict[str, tuple[int, pin.SE3]]
 
 REASONS = {

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Mask
 from wholebody.compiled import compiled
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @compiled(error_model="numpy")

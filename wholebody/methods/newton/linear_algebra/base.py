@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wholebody.arrays import Array, Indices
 from wholebody.errors import WholebodyError
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 class SingularSystemError(WholebodyError, ArithmeticError):

@@ -6,12 +6,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wholebody.arrays import Indices
+from wholebody.arrays import Array, Indices
 from wholebody.methods.newton.linear_algebra.base import Pattern
-
-Array = NDArray[np.float64]
 
 
 class Gram:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from wholebody.arrays import Array
 from wholebody.compiled import compiled
 
-Array = NDArray[np.float64]
 Places = NDArray[np.int32]
 
 
