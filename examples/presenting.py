@@ -28,7 +28,7 @@ def report(title: str, problem: wb.Problem, solution: wb.Solution) -> None:
     print(f"  {solution.message}")
     for goal, error in zip(problem.goals, judged.goal_errors, strict=True):
         print(f"  {name_of(goal):<40} off by {error:.1e} m or rad")
-    held = max(judged.limit_violation, judged.constraint_violation, judged.clearance_lack)
+    held = max(judged.limit_violation, judged.constraint_violation, judged.clearance_violation)
     print(f"  limits, constraints and clearances hold to {held:.1e}, deepest penetration {judged.penetration:.1e} m")
     print(f"  nearest: {nearest(problem.scene, solution)}")
 

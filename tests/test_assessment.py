@@ -27,7 +27,7 @@ def test_depth_and_lack_of_clearance(free_bodies):
         found = wb.assess(problem, q)
         assert found.least_distance == pytest.approx(distance, abs=1e-9)
         assert found.penetration == pytest.approx(max(-distance, 0.0), abs=1e-9)
-        assert found.clearance_lack == pytest.approx(max(0.01 - distance, 0.0), abs=1e-9)
+        assert found.clearance_violation == pytest.approx(max(0.01 - distance, 0.0), abs=1e-9)
         assert found.holds(1e-6) is (distance >= 0.01)
 
 
@@ -180,9 +180,9 @@ def test_what_is_no_posture_is_refused(planar_arm, q):
 def test_clearances_are_read_afresh(free_bodies):
     scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.1), name="ball", at=(0.25, 0.0, 0.0))
     problem = wb.Problem(scene)
-    assert wb.assess(problem, problem.start).clearance_lack == 0.0
+    assert wb.assess(problem, problem.start).clearance_violation == 0.0
     problem.clearances += 0.1
-    assert wb.assess(problem, problem.start).clearance_lack == pytest.approx(0.05, abs=1e-6)
+    assert wb.assess(problem, problem.start).clearance_violation == pytest.approx(0.05, abs=1e-6)
     assert wb.solve(problem).q[0] == pytest.approx(-0.05, abs=1e-4)
     problem.clearances = np.zeros(2)
     with pytest.raises(wb.InputError, match="one for each of the 1 pairs"):

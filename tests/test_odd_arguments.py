@@ -481,7 +481,7 @@ def surface() -> list[str]:
 
 
 ANSWERS = (
-    "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "Iterate", "Assessment",
+    "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "TraceEntry", "Assessment",
     "Task", "Step", "QPStep", "Simplified", "LeftOut",
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
     "Scene.of_parts",

@@ -32,7 +32,7 @@ class Assessment:
         goal_angle: largest angle left to a goal, radians.
         penetration: depth of the deepest overlap of any pair, metres; 0 where nothing overlaps.
         least_distance: least signed distance of any pair, metres; inf without pairs.
-        clearance_lack: by how much the worst pair misses the distance asked of it, metres.
+        clearance_violation: by how much the worst pair misses the distance asked of it, metres.
         limit_violation: how far the worst joint is out of its limits, radians or metres.
         constraint_violation: how far the worst constraint is from holding, metres or radians.
         measure: weighted sum of the measures.
@@ -48,7 +48,7 @@ class Assessment:
     goal_angle: float
     penetration: float
     least_distance: float
-    clearance_lack: float
+    clearance_violation: float
     limit_violation: float
     constraint_violation: float
     measure: float
@@ -60,7 +60,7 @@ class Assessment:
     def holds(self, tolerance: float) -> bool:
         """Whether limits, constraints and clearances hold to a tolerance, metres and radians."""
         tolerance = number(tolerance, "tolerance", 0.0, inf)
-        worst = max(self.limit_violation, self.constraint_violation, self.clearance_lack, self.penetration)
+        worst = max(self.limit_violation, self.constraint_violation, self.clearance_violation, self.penetration)
         return bool(worst <= tolerance)
 
     def met(self, tolerance: float) -> bool:
@@ -113,7 +113,7 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
         goal_angle=angle,
         penetration=max(0.0, -pairs.least) if np.isfinite(pairs.least) else 0.0,
         least_distance=pairs.least,
-        clearance_lack=lack,
+        clearance_violation=lack,
         limit_violation=_limit_violation(problem, q),
         constraint_violation=missed,
         measure=sum(term.weight * term.value(state) for term in problem.measures),

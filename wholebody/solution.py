@@ -12,7 +12,7 @@ Status = Literal["solved", "unreachable", "infeasible", "stalled"]
 
 
 @dataclass(frozen=True)
-class Iterate:
+class TraceEntry:
     """One line of a solution's trace.
 
     Attributes:
@@ -50,7 +50,7 @@ class Solution:
     seconds: float
     iterations: int
     assessment: Assessment
-    trace: tuple[Iterate, ...] = field(repr=False)
+    trace: tuple[TraceEntry, ...] = field(repr=False)
     method: str
     message: str
 

@@ -170,18 +170,18 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     if method != "qp":
         return {}
     from wholebody.methods.qp.acceleration import Anderson
-    from wholebody.methods.qp.descent import Descent
     from wholebody.methods.qp.funnel import Funnel
-    from wholebody.methods.qp.search import Search
+    from wholebody.methods.qp.multistart import Search
+    from wholebody.methods.qp.sqp import SQP
 
     return {
         "the funnel narrows": (Funnel, "narrow", lambda self, before, after: None),
-        "the watchdog": (Descent, "_promises", lambda self, here, there: False),
+        "the watchdog": (SQP, "_promises", lambda self, here, there: False),
         "acceleration": (Anderson, "propose", lambda self, dq: None),
         "a start with bent joints": (Search, "_bent", lambda self, start: iter(())),
-        "homotopy": (Search, "_staged", lambda self, start: iter(())),
-        "relaxed probes": (Search, "_scouted", lambda self, starts: iter(())),
-        "descents without contacts": (Search, "_hopeless", lambda self, q: False),
+        "homotopy": (Search, "_homotopy", lambda self, start: iter(())),
+        "relaxed probes": (Search, "_relaxed_probes", lambda self, starts: iter(())),
+        "descents without contacts": (Search, "_known_out_of_reach", lambda self, q: False),
     }
 
 

@@ -139,7 +139,7 @@ def _levels(name: str, number: int, models: dict[str, Problem], finest: str) -> 
                 judge_ms=1e3 * min(found.assessment.seconds for found in answers),
                 prepare_ms=prepare_ms,
                 penetration_mm=1e3 * truth.penetration,
-                lack_mm=1e3 * truth.clearance_lack,
+                lack_mm=1e3 * truth.clearance_violation,
                 goal_error_mm=1e3 * truth.goal_error,
                 effort=truth.measure,
                 above=truth.measure / best - 1.0 if answer.solved and np.isfinite(best) else float("nan"),

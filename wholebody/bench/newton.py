@@ -15,9 +15,9 @@ from wholebody.bench.newton_shapes import SHAPES, median_us
 from wholebody.bench.newton_solves import AgreementRow, DragRow, SolveRow
 from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
+from wholebody.methods.newton.iteration import HARD_DAMPING
 from wholebody.methods.newton.linear_algebra.base import LinearSystem
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
-from wholebody.methods.newton.run import HARD_DAMPING
 
 SIZES = (10, 30, 100, 300, 1000)
 SMALLEST_FITTED = 30  # bodies: smaller systems cost what any call costs

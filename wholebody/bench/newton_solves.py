@@ -13,9 +13,9 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.bench.newton_shapes import LINK, chain, four_bar, median_us, ring, three_bar
 from wholebody.methods.newton.assembly import Assembly
-from wholebody.methods.newton.course import Course
+from wholebody.methods.newton.feasibility import reach
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
-from wholebody.methods.newton.reaching import reach
+from wholebody.methods.newton.system import ActiveSystem
 from wholebody.methods.newton.tracking import NewtonTracker
 
 PAPER_BODIES = 30  # 210 variables and about 1455 non-zeros, as in the paper
@@ -114,9 +114,9 @@ def nearest_row(repeats: int) -> SolveRow:
 def assembly_row(case: str, made: Assembly, repeats: int) -> SolveRow:
     """A reach from where an assembly stands."""
     system = made.system()
-    course, x = Course(system, linear_algebra(system.pattern)), made.variables()
-    found = reach(course, x, tolerance=1e-5, iterations=50)
-    us = median_us(lambda: reach(course, x, tolerance=1e-5, iterations=50), repeats)
+    active_system, x = ActiveSystem(system, linear_algebra(system.pattern)), made.variables()
+    found = reach(active_system, x, tolerance=1e-5, iterations=50)
+    us = median_us(lambda: reach(active_system, x, tolerance=1e-5, iterations=50), repeats)
     pattern, errors = system.pattern, " ".join(f"{value:.1e}" for value in found.residuals[-4:])
     each = us / max(found.systems, 1) / pattern.width
     return SolveRow(case, pattern.width, len(pattern.rows), found.iterations, found.systems, 1e-3 * us, each, errors)
@@ -124,16 +124,16 @@ def assembly_row(case: str, made: Assembly, repeats: int) -> SolveRow:
 
 def figure_row(case: str, problem: wb.Problem, repeats: int) -> SolveRow:
     """A reach of a figure, without polishing of the measures."""
-    from wholebody.methods.newton.figure_course import FigureCourse
+    from wholebody.methods.newton.figure_system import FigureSystem
 
-    course = FigureCourse(problem, problem.workspace(), "auto")
+    active_system = FigureSystem(problem, problem.workspace(), "auto")
     few = max(3, repeats // 10)
 
     def once() -> Any:
-        return reach(course, course.variables(problem.start), tolerance=1e-5, iterations=50)
+        return reach(active_system, active_system.variables(problem.start), tolerance=1e-5, iterations=50)
 
     found, us = once(), median_us(once, few)
-    pattern, errors = course.system.pattern, " ".join(f"{value:.1e}" for value in found.residuals[-4:])
+    pattern, errors = active_system.system.pattern, " ".join(f"{value:.1e}" for value in found.residuals[-4:])
     each = us / max(found.systems, 1) / pattern.width
     return SolveRow(case, pattern.width, len(pattern.rows), found.iterations, found.systems, 1e-3 * us, each, errors)
 

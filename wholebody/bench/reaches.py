@@ -36,12 +36,12 @@ class ReachRow:
         seed: what it was made from.
         solver: of the QP method.
         status: as the method said.
-        how: "directly", "in stages", "from another start", or the message of what was not solved.
+        how: "directly", "by homotopy", "from another start", or the message of what was not solved.
         milliseconds: of the solve.
         iterations: of the method.
         goal_error: distance left, as judged independently [m].
         penetration: deepest overlap, as judged [m].
-        clearance_lack: by how much the worst pair misses its clearance, as judged [m].
+        clearance_violation: by how much the worst pair misses its clearance, as judged [m].
         limit_violation: as judged [rad].
         constraint_violation: of the feet, as judged [m, rad].
         measure: effort of the answer.
@@ -56,7 +56,7 @@ class ReachRow:
     iterations: int
     goal_error: float
     penetration: float
-    clearance_lack: float
+    clearance_violation: float
     limit_violation: float
     constraint_violation: float
     measure: float
@@ -94,7 +94,7 @@ def solve_reach(seed: int, solver: str, figure: wb.Figure | None = None) -> Reac
         iterations=solution.iterations,
         goal_error=judged.goal_error,
         penetration=judged.penetration,
-        clearance_lack=judged.clearance_lack,
+        clearance_violation=judged.clearance_violation,
         limit_violation=judged.limit_violation,
         constraint_violation=judged.constraint_violation,
         measure=judged.measure,

@@ -13,7 +13,7 @@ from wholebody.figures.state import State
 from wholebody.methods.contradictions import Contradiction, explanation, in_words, proven
 from wholebody.methods.control import Control
 from wholebody.problem import Problem
-from wholebody.solution import Iterate, Solution, Status
+from wholebody.solution import Solution, Status, TraceEntry
 
 SLACK = 1.05  # times the tolerance: an assessment measures with other arithmetic
 COAL_ACCURACY = 1e-6  # m
@@ -40,7 +40,7 @@ class Ending:
     q: Array
     settled: bool
     iterations: int
-    trace: tuple[Iterate, ...]
+    trace: tuple[TraceEntry, ...]
     how: str
     unit: str = "iterations"
     failure: str = ""
@@ -115,7 +115,7 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
 def _worst(problem: Problem, judgement: Assessment, q: Array) -> tuple[str, float]:
     """What is farthest from holding, and by how much."""
     worst = max(
-        ("the clearance of a pair", max(judgement.clearance_lack, judgement.penetration)),
+        ("the clearance of a pair", max(judgement.clearance_violation, judgement.penetration)),
         ("a joint limit", judgement.limit_violation),
         key=lambda item: item[1],
     )

@@ -15,7 +15,7 @@ from wholebody.assessment import Assessment
 from wholebody.checks import a, number
 from wholebody.compiled import compile_seconds
 from wholebody.errors import InputError
-from wholebody.solution import Iterate
+from wholebody.solution import TraceEntry
 
 LONGEST = 4.0
 """Seconds of processor time that a solve may take where no time limit is given. Few come near it, and how loaded the
@@ -24,7 +24,7 @@ machine is does not change their answers."""
 LIMITS = (1e-9, 1e9)
 """Least and greatest time limit, seconds."""
 
-Progress = Callable[[Iterate], Any]
+Progress = Callable[[TraceEntry], Any]
 """Called after every iteration with its entry of the trace; where it returns True, the solve ends."""
 
 
@@ -76,10 +76,10 @@ class Control:
         if not self.reason:
             return ""
         left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
-        broken = max(judgement.clearance_lack, judgement.constraint_violation, judgement.limit_violation)
+        broken = max(judgement.clearance_violation, judgement.constraint_violation, judgement.limit_violation)
         return f"{self.reason}: {left}" + (f", and what must hold is missed by {broken:.3g} m or rad" * (broken > 1e-4))
 
-    def tell(self, entry: Iterate) -> None:
+    def tell(self, entry: TraceEntry) -> None:
         """Tell the caller of an iteration."""
         if self._progress is not None and self._progress(entry) is True and not self.reason:
             self.reason = "progress ended it"

@@ -29,7 +29,7 @@ from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.problem import Problem
-from wholebody.solution import Iterate, Solution
+from wholebody.solution import Solution, TraceEntry
 from wholebody.tasks.base import Constraint, Goal
 
 SHARE = 0.5  # of the tolerance: to what goals and equalities are met, so that the judge, who rounds otherwise, agrees
@@ -122,7 +122,7 @@ class _Descent:
         self._problem, self._method = problem, method
         self._state, self._control = state, control
         self.best: Array = problem.scene.figure.clamp(problem.start)
-        self.trace: list[Iterate] = []
+        self.trace: list[TraceEntry] = []
         self.steps = 0
 
     def run(self) -> bool:
@@ -134,7 +134,7 @@ class _Descent:
             self._state.update(q)
             held, wanted = self._held(), self._wanted()
             violation, error = float(np.abs(held).max(initial=0.0)), self._largest_error()
-            self.trace.append(Iterate(error, violation, 0.0, step))
+            self.trace.append(TraceEntry(error, violation, 0.0, step))
             self._control.tell(self.trace[-1])
             if (max(violation, enough), error) < best:
                 best, self.best = (max(violation, enough), error), q

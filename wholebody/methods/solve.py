@@ -87,7 +87,7 @@ def solve(problem: Problem, method: str | Method = "qp", progress: Progress | No
         problem: what is asked.
         method: "qp", "ccd", "newton", "placo", "dls", or a configured method such as
             `QP(solver="daqp", time_limit=0.1)`.
-        progress: called after every iteration with its entry of the trace (see `Iterate`); the solve ends where it
+        progress: called after every iteration with its entry of the trace (see `TraceEntry`); the solve ends where it
             returns True.
 
     Returns:

@@ -24,7 +24,7 @@ def record(
 ) -> Record:  # fmt: skip
     return Record(
         family, number, adapter, tolerance, 0, outcome, status, "", seconds, seconds, goal_error=error, goal_angle=0.0,
-        penetration=penetration, clearance_lack=penetration, limit_violation=0.0, constraint_violation=0.0,
+        penetration=penetration, clearance_violation=penetration, limit_violation=0.0, constraint_violation=0.0,
         measure=measure, optimality=0.0, best=1.0,
     )  # fmt: skip
 

@@ -30,7 +30,7 @@ FETCHED = re.compile(
 def record(adapter: str, number: int, tolerance: float, seconds: float, error: float) -> Record:
     return Record(
         "arm", number, adapter, tolerance, 0, ANSWERED, "solved", "", seconds, seconds, goal_error=error,
-        goal_angle=0.0, penetration=0.0, clearance_lack=0.0, limit_violation=0.0, constraint_violation=0.0,
+        goal_angle=0.0, penetration=0.0, clearance_violation=0.0, limit_violation=0.0, constraint_violation=0.0,
         measure=1.0, optimality=0.0, best=1.0,
     )  # fmt: skip
 

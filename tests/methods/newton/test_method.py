@@ -11,9 +11,9 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.methods.newton.feasibility import reach
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.figure_course import FigureCourse
-from wholebody.methods.newton.reaching import reach
+from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.tasks.base import Bound
 
 
@@ -149,17 +149,17 @@ def test_nothing_is_jumped_over(human: wb.Figure, least_distance: Callable[..., 
     # a plate a millimetre thick between the hand and its goal; steps of the hand are up to eight centimetres
     scene = wb.Scene(human).add(wb.Box((0.001, 0.6, 0.6)), name="plate", at=(0.4, -0.25, 1.1))
     problem = _standing(scene, wb.Point("right_index_tip", (0.5, -0.25, 1.1)))
-    course = FigureCourse(problem, problem.workspace(), "auto")
+    active_system = FigureSystem(problem, problem.workspace(), "auto")
     visited = [problem.start]
-    arrive = course.arrive
+    arrive = active_system.arrive
 
     def watched(x: Any) -> bool:
         changed = arrive(x)
-        visited.append(course.q.copy())
+        visited.append(active_system.q.copy())
         return changed
 
-    course.arrive = watched  # type: ignore[method-assign]
-    reach(course, course.variables(problem.start), tolerance=1e-5, iterations=60)
+    active_system.arrive = watched  # type: ignore[method-assign]
+    reach(active_system, active_system.variables(problem.start), tolerance=1e-5, iterations=60)
     assert len(visited) > 10
     for before, after in itertools.pairwise(visited):
         way = [least_distance(scene, pin.interpolate(human.model, before, after, t)) for t in np.linspace(0, 1, 9)]

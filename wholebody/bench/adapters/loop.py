@@ -20,7 +20,7 @@ from wholebody.methods.base import SolvingTracker, UnsupportedTermError, named_t
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress
 from wholebody.problem import Problem
-from wholebody.solution import Iterate, Solution
+from wholebody.solution import Solution, TraceEntry
 from wholebody.tasks import Displacement, Effort, Hold
 from wholebody.workspace import Workspace
 
@@ -196,18 +196,18 @@ class _Run:
         self._problem, self._stepper, self._method, self._control = problem, stepper, method, control
         self._state, self._proximity = workspace.state, workspace.proximity
         self.q: Array = problem.scene.figure.clamp(problem.start)
-        self.trace: list[Iterate] = []
+        self.trace: list[TraceEntry] = []
         self.steps, self.rested, self.failure = 0, False, ""
         self._damping, self._last = 0.0, np.zeros(problem.scene.model.nv)
         stepper.begin()
 
     def go(self) -> None:
-        """Iterate until everything is met, nothing moves, the tool gives up or the steps run out."""
+        """TraceEntry until everything is met, nothing moves, the tool gives up or the steps run out."""
         enough = SHARE * self._method.tolerance
         length = 0.0
         while True:
             error, violation = self._look()
-            self.trace.append(Iterate(error, violation, 0.0, length))
+            self.trace.append(TraceEntry(error, violation, 0.0, length))
             self._control.tell(self.trace[-1])
             if self._control.over:
                 return

@@ -78,7 +78,7 @@ def _wrongs(problem: Problem, solution: Solution, found: Judged, tolerance: floa
     pairs = (
         ("least distance", said.least_distance, found.least),
         ("goal error", max(said.goal_error, said.goal_angle), found.goal),
-        ("clearance lack", said.clearance_lack, found.lack),
+        ("clearance lack", said.clearance_violation, found.lack),
     )
     for name, value, measured in pairs:
         if not np.isfinite(value) and value != measured:

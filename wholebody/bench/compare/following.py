@@ -59,7 +59,7 @@ def _summary(frames: list[_Frame], case: Case, empty: Record) -> Record:
     judgements = [frame.judgement for frame in frames]
     errors = np.array([(judged.goal_error, judged.goal_angle) for judged in judgements])
     held = np.array(
-        [(j.penetration, j.clearance_lack, j.limit_violation, j.constraint_violation) for j in judgements]
+        [(j.penetration, j.clearance_violation, j.limit_violation, j.constraint_violation) for j in judgements]
     )  # fmt: skip
     seconds = np.array([frame.seconds for frame in frames])
     goal_error, goal_angle = np.quantile(errors, USUAL, axis=0)
@@ -75,7 +75,7 @@ def _summary(frames: list[_Frame], case: Case, empty: Record) -> Record:
         goal_error=float(goal_error),
         goal_angle=float(goal_angle),
         penetration=float(penetration),
-        clearance_lack=float(lack),
+        clearance_violation=float(lack),
         limit_violation=float(limits),
         constraint_violation=float(constraints),
         measure=judgements[-1].measure,

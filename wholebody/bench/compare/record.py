@@ -35,7 +35,7 @@ class Record:
         setup_seconds: to build a model of its own from the problem [s]; 0 for one that needs none.
         iterations: as the method counts them; of a frame, mean, where goals move.
         goal_error, goal_angle: left, as judged [m], [rad]; 95 % of the frames where goals move.
-        penetration, clearance_lack, limit_violation, constraint_violation: as judged; the worst frame.
+        penetration, clearance_violation, limit_violation, constraint_violation: as judged; the worst frame.
         measure, optimality: as judged; of the last frame.
         best: measure of the witness, which is as good as any method need be.
         frames: answered with moving goals; 0 for a case that is solved once.
@@ -59,7 +59,7 @@ class Record:
     goal_error: float = inf
     goal_angle: float = inf
     penetration: float = inf
-    clearance_lack: float = inf
+    clearance_violation: float = inf
     limit_violation: float = inf
     constraint_violation: float = inf
     measure: float = inf
@@ -88,7 +88,7 @@ class Record:
     @property
     def broken(self) -> float:
         """Worst of all that must hold [m or rad]: contacts, clearances, limits, constraints."""
-        return max(self.penetration, self.clearance_lack, self.limit_violation, self.constraint_violation)
+        return max(self.penetration, self.clearance_violation, self.limit_violation, self.constraint_violation)
 
     @property
     def worst(self) -> float:

@@ -43,7 +43,7 @@ def _goal(record: Record, best: float) -> float:
 
 def _penetration(record: Record, best: float) -> float:
     others = max(record.missed, record.limit_violation, record.constraint_violation)
-    return max(record.penetration, record.clearance_lack, FLOOR) if others <= COARSE else inf
+    return max(record.penetration, record.clearance_violation, FLOOR) if others <= COARSE else inf
 
 
 def effort_excess(record: Record, best: float) -> float:

@@ -166,7 +166,7 @@ def judged(record: Record, judgement: Assessment) -> Record:
         goal_error=judgement.goal_error,
         goal_angle=judgement.goal_angle,
         penetration=judgement.penetration,
-        clearance_lack=judgement.clearance_lack,
+        clearance_violation=judgement.clearance_violation,
         limit_violation=judgement.limit_violation,
         constraint_violation=judgement.constraint_violation,
         measure=judgement.measure,

@@ -23,7 +23,7 @@ from wholebody.methods.contradictions import NEAREST, Contradiction, contradicti
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, check_problem, check_settings
 from wholebody.problem import Problem
-from wholebody.solution import Iterate, Solution
+from wholebody.solution import Solution, TraceEntry
 from wholebody.workspace import Workspace
 
 DISTURBANCES = (0.0, 0.05, 0.2, 0.6)  # rad: of the first starts, from the posture at hand; later ones begin anywhere
@@ -185,7 +185,7 @@ class _Search:
         self.sweeps = 0
         self.contradictions: tuple[Contradiction, ...] = ()
         self._workspace = workspace
-        self.trace: list[Iterate] = []
+        self.trace: list[TraceEntry] = []
 
     def run(self) -> _Trial:
         """The best of all starts, or the first that serves."""
@@ -243,7 +243,7 @@ class _Search:
                 self._resolver.query(back)
                 trial = _Trial(back, self._resolver.deepest, self._error(back), True)
             step = float(np.abs(pin.difference(self._problem.scene.model, before, q)).max(initial=0.0))
-            self.trace.append(Iterate(trial.error, trial.overlap, 0.0, step, note if turn == 0 else "overlap"))
+            self.trace.append(TraceEntry(trial.error, trial.overlap, 0.0, step, note if turn == 0 else "overlap"))
             self._control.tell(self.trace[-1])
             gained = best is None or trial.better(best, self._tolerance)
             if gained:

@@ -17,13 +17,12 @@ from wholebody.geometry.pieces import check_length
 from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE
 from wholebody.methods.newton.assembly_solution import AssemblySolution, solved
-from wholebody.methods.newton.course import Course, unit
 from wholebody.methods.newton.equations import EquationSet, axes_along
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.joint_register import JointRegister
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
 from wholebody.methods.newton.linear_algebra.choice import NAMES, linear_algebra
-from wholebody.methods.newton.system import System
+from wholebody.methods.newton.system import ActiveSystem, System, unit
 from wholebody.pool import OneAtATime
 from wholebody.tasks.inputs import direction, point, target_placement
 
@@ -282,7 +281,7 @@ class Assembly:
             if nearest and system.inequality.any():
                 raise InputError("nearest is for assemblies without limits and one-sided planes; leave it out")
             x, solution = solved(
-                list(self._names), Course(system, factor), self.variables(),
+                list(self._names), ActiveSystem(system, factor), self.variables(),
                 tolerance=tolerance, iterations=iterations, kind=inequalities, nearest=nearest,
             )  # fmt: skip
             self._places = list(x.reshape(-1, 7))

@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.methods.newton.course import Course, unit
+from wholebody.methods.newton.feasibility import reach
 from wholebody.methods.newton.inequalities import Kind
-from wholebody.methods.newton.reaching import reach
-from wholebody.methods.newton.settling import settle
+from wholebody.methods.newton.kkt import settle
+from wholebody.methods.newton.system import ActiveSystem, unit
 from wholebody.solution import Status
 
 FINEST = 1e-9  # least error of the KKT system that is asked for: redundant equations leave about a tenth of it
@@ -54,7 +54,7 @@ class AssemblySolution:
 
 def solved(
     names: list[str],
-    course: Course,
+    active_system: ActiveSystem,
     before: Array,
     *,
     tolerance: float,
@@ -63,8 +63,8 @@ def solved(
     nearest: bool,
 ) -> tuple[Array, AssemblySolution]:
     """Solve from the variables `before` (7 n,); where the bodies end, as variables and in words."""
-    found = reach(course, before, tolerance=tolerance, iterations=iterations, kind=kind)
-    system, x = course.system, found.x
+    found = reach(active_system, before, tolerance=tolerance, iterations=iterations, kind=kind)
+    system, x = active_system.system, found.x
     nearness: tuple[float, ...] = ()
     if nearest and found.met:
         settled = settle(system, x, before, tolerance=max(tolerance, FINEST), iterations=iterations)
@@ -89,7 +89,7 @@ def solved(
         joint_error=float(size[~system.goal].max(initial=0.0)),
         residuals=found.residuals,
         systems=found.systems,
-        algebra=course.algebra.name,
+        algebra=active_system.algebra.name,
         nearness=nearness,
         message=message,
     )

@@ -7,6 +7,7 @@ last row is the world, which does not move. Each batch has k equations groups of
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,19 @@ from wholebody.methods.newton import quaternions as quat
 
 PLACE, TURN = slice(0, 3), slice(3, 7)
 OTHER_PLACE, OTHER_TURN = slice(7, 10), slice(10, 14)
+
+
+OBJECTIVE = "objective"
+"""Kind of batches whose squares are to be small, in place of holding."""
+
+
+class Key(NamedTuple):
+    """What a batch has in common: its type, whether it may be missed or is one-sided, and its weight."""
+
+    kind: str
+    goal: bool
+    one_sided: bool
+    weight: float
 
 
 class Batch(ABC):

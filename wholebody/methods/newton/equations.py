@@ -10,8 +10,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.methods.newton.angles import Angle
-from wholebody.methods.newton.batches import Batch, Coincide, Slide, Turn, Unit
-from wholebody.methods.newton.keys import Key
+from wholebody.methods.newton.batches import Batch, Coincide, Key, Slide, Turn, Unit
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
 from wholebody.methods.newton.system import System
 

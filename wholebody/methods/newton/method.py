@@ -9,10 +9,10 @@ from wholebody.checks import choice, known
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
-from wholebody.methods.newton.figure_course import FigureCourse
+from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.linear_algebra.choice import NAMES
-from wholebody.methods.newton.search import Search, Settings
+from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.terms import state_equations
 from wholebody.methods.newton.tracking import NewtonTracker
 from wholebody.problem import Problem
@@ -90,9 +90,9 @@ class Newton:
         check_problem(problem, "Newton.solve: problem")
         began = time.perf_counter()
         with problem.lend() as workspace, Control(self.time_limit, progress) as control:
-            course = FigureCourse(problem, workspace, self.algebra)
-            course.control = control
-            search = Search(course, self.settings)
+            active_system = FigureSystem(problem, workspace, self.algebra)
+            active_system.control = control
+            search = Search(active_system, self.settings)
             found = search.everywhere(problem.scene.figure.clamp(problem.start))
             return search.solution(found, began)
 

@@ -13,10 +13,10 @@ from wholebody.checks import number, posture, time_step
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import Method, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.methods.newton.figure_course import FigureCourse
+from wholebody.methods.newton.feasibility import reach
+from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.linear_algebra.base import Pattern
-from wholebody.methods.newton.reaching import reach
-from wholebody.methods.newton.search import SHARPER, Search, Settings
+from wholebody.methods.newton.multistart import SHARPER, Search, Settings
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.solution import Solution
@@ -93,22 +93,22 @@ class NewtonTracker:
         q = posture(q, self.workspace.model.nq)
         tolerance = number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
         with self._alone:
-            course = self._renewed()
-            course.objective.anchor(q)
+            active_system = self._renewed()
+            active_system.objective.anchor(q)
             if self.dt is not None and any(isinstance(bound, StepLimit) for bound in self.problem.bounds):
                 state = self.workspace.state.update(q)
                 ranges = np.array([bound.bounds(state, self.dt) for bound in self.problem.bounds])
-                course.bodies.bound_step(q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0))
+                active_system.bodies.bound_step(q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0))
             found = reach(
-                course,
-                course.variables(q),
+                active_system,
+                active_system.variables(q),
                 tolerance=SHARPER * self._settings.tolerance,
                 goal_tolerance=tolerance,
                 iterations=FRAME_ITERATIONS,
                 kind=self._settings.inequalities,
-                hurried=True,
+                early_exit=True,
             )
-            return NewtonStep(course.posture(found.x), found.iterations, found.systems, course.structures)
+            return NewtonStep(active_system.posture(found.x), found.iterations, found.systems, active_system.structures)
 
     def frame(self, q: Array, tolerance: float | None = None) -> NewtonStep:
         """One frame of a motion: the same as `step`."""
@@ -147,10 +147,10 @@ class NewtonTracker:
 
     def _lay_out(self) -> None:
         problem = self.problem
-        self._course = FigureCourse(problem, self.workspace, self._algebra)
+        self._course = FigureSystem(problem, self.workspace, self._algebra)
         self._terms = (problem.constraints, problem.bounds, problem.measures)
 
-    def _renewed(self) -> FigureCourse:
+    def _renewed(self) -> FigureSystem:
         """The equations of the problem with its present goals; laid out anew where other terms were replaced."""
         problem = self.problem
         problem.check_fresh()

@@ -18,7 +18,7 @@ from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, named_frames, unsupported
 from wholebody.problem import Problem
-from wholebody.solution import Iterate, Solution
+from wholebody.solution import Solution, TraceEntry
 from wholebody.workspace import Workspace
 
 STEP = 0.05  # rad, m: most that a joint or the root moves in one iteration
@@ -156,7 +156,7 @@ class _Run:
         self._problem, self._robot, self._method, self._control = problem, robot, method, control
         self._proximity, self._state = workspace.proximity, workspace.state
         self.q: Array = problem.scene.figure.clamp(problem.start)
-        self.trace: list[Iterate] = []
+        self.trace: list[TraceEntry] = []
         self.programs, self.rested, self.failure = 0, False, ""
         self._damping, self._last = 0.0, np.zeros(problem.scene.model.nv)
         self._solver: Any = placo.KinematicsSolver(robot.wrapper)
@@ -173,12 +173,12 @@ class _Run:
         apart.configure("apart", "hard", 1.0)
 
     def go(self) -> None:
-        """Iterate until everything is met, nothing moves, placo gives up or the programs run out."""
+        """TraceEntry until everything is met, nothing moves, placo gives up or the programs run out."""
         method, model = self._method, self._problem.scene.model
         step = 0.0
         while True:
             error, violation = self._look()
-            self.trace.append(Iterate(error, violation, 0.0, step))
+            self.trace.append(TraceEntry(error, violation, 0.0, step))
             self._control.tell(self.trace[-1])
             enough = SHARE * method.tolerance
             if max(error, violation) <= enough and self._apart(enough):

@@ -121,12 +121,12 @@ def settle(
                     worst, kind, place = wrong, 1, i
         following = 0
         for j in range(k):
-            lack = least[j] - reached[j]
+            violated = least[j] - reached[j]
             if pushing[j]:
-                lack = -push[following] * np.sum(elastic[j] ** 2 / diagonal)
+                violated = -push[following] * np.sum(elastic[j] ** 2 / diagonal)
                 following += 1
-            if next_pushing[j] != pushing[j] and lack > worst:
-                worst, kind, place = lack, 2, j
+            if next_pushing[j] != pushing[j] and violated > worst:
+                worst, kind, place = violated, 2, j
         mask = at_lower if kind == 0 else (at_upper if kind == 1 else pushing)
         mask[place] = not mask[place]
     return False

@@ -24,8 +24,8 @@ from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.linearisation import Lineariser
 from wholebody.methods.control import Control
 from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.sqp import Iterate, LocalSolution
 from wholebody.methods.qp.subproblem import Rows, Subproblem
-from wholebody.methods.qp.visit import Local, Visit
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 
@@ -54,7 +54,7 @@ class CurvedReach:
         free = [joint.idx_v for joint in model.joints if joint.shortname() == "JointModelFreeFlyer"]
         self._walk = np.array([first + k for first in free for k in range(3)], dtype=np.intp)
 
-    def through_everything(self, start: Array, enough: float, most: int) -> Local:
+    def through_everything(self, start: Array, enough: float, most: int) -> LocalSolution:
         """Descend from a posture (nq,) within limits and constraints, as if nothing were there.
 
         Args:
@@ -67,13 +67,13 @@ class CurvedReach:
         """
         return self._descend(self._alone, start, enough, most, 0.0)
 
-    def among_things(self, start: Array, enough: float, most: int) -> Local:
+    def among_things(self, start: Array, enough: float, most: int) -> LocalSolution:
         """Descend from a posture (nq,) and pass through nothing; arguments as of `through_everything`."""
         return self._descend(self._lineariser, start, enough, most, WITHIN)
 
-    def _descend(self, lineariser: Lineariser, q: Array, enough: float, most: int, within: float) -> Local:
+    def _descend(self, lineariser: Lineariser, q: Array, enough: float, most: int, within: float) -> LocalSolution:
         working_set = WorkingSet(self._solver)
-        here = self._visit(lineariser, q, within)
+        here = self._iterate_at(lineariser, q, within)
         push = np.zeros(len(here.rows.soft_error))
         radius, used, converged = RADIUS, 0, False
         while used < most and here.violation.worst > enough and radius > LEAST_RADIUS and not self._control.over:
@@ -104,7 +104,9 @@ class CurvedReach:
             if gain <= FLAT * here.violation.total:
                 converged = True
                 break
-            there = self._visit(lineariser, np.asarray(pin.integrate(lineariser.state.model, here.at.q, x)), within)
+            there = self._iterate_at(
+                lineariser, np.asarray(pin.integrate(lineariser.state.model, here.at.q, x)), within
+            )
             ratio = (here.violation.total - there.violation.total) / gain
             step = float(np.abs(x).max(initial=0.0))
             blocked = ratio > WORTH and within > 0.0 and self._jumps(here, there)
@@ -115,14 +117,14 @@ class CurvedReach:
             if ratio > WORTH and not blocked:
                 push = rows.soft_weight * (rows.soft @ x + rows.soft_error)
                 here = there
-        return Local(here.at.q, here.violation, here.at.measure, converged, used)
+        return LocalSolution(here.at.q, here.violation, here.at.measure, converged, used)
 
-    def _visit(self, lineariser: Lineariser, q: Array, within: float) -> Visit:
+    def _iterate_at(self, lineariser: Lineariser, q: Array, within: float) -> Iterate:
         at = lineariser.at(q, within)
         rows = self._subproblem.rows(at)
-        return Visit(at, rows, self._subproblem.violation(rows), Placed(at.contacts, within))
+        return Iterate(at, rows, self._subproblem.violation(rows), Placed(at.contacts, within))
 
-    def _jumps(self, here: Visit, there: Visit) -> bool:
+    def _jumps(self, here: Iterate, there: Iterate) -> bool:
         return passes_through(self._lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
 
     def _curvature(self, rows: Rows, push: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ WORTH = 0.05  # share of what was foreseen that a step must bring
 GOOD, POOR = 0.5, 0.25  # shares above which the next step may be longer, and below which it must be shorter
 
 
-class Verdict(NamedTuple):
+class StepAcceptance(NamedTuple):
     """How a step did.
 
     Attributes:
@@ -26,11 +26,11 @@ class Verdict(NamedTuple):
     by: str
 
 
-class Outlook(NamedTuple):
+class PredictedReduction(NamedTuple):
     """What a program foresees of its step: how much less violation, and how much less of the measures."""
 
-    gain: float
-    saving: float
+    violation: float
+    measure: float
 
 
 class Funnel:
@@ -45,24 +45,26 @@ class Funnel:
         self.width = max(WIDTH, violation)
 
     def judge(
-        self, before: tuple[float, float], after: tuple[float, float], outlook: Outlook, measures: bool
-    ) -> Verdict:
+        self, before: tuple[float, float], after: tuple[float, float], predicted: PredictedReduction, measures: bool
+    ) -> StepAcceptance:
         """Judge a step.
 
         Args:
             before: violation and measures before it.
             after: and after it.
-            outlook: what was foreseen.
+            predicted: what was foreseen.
             measures: whether the measures count.
         """
-        lead = measures and outlook.saving > SWITCH * before[0] ** 2 and before[0] <= self.width
+        lead = measures and predicted.measure > SWITCH * before[0] ** 2 and before[0] <= self.width
         saved = before[1] - after[1]
-        if lead and after[0] <= self.width and saved >= WORTH * outlook.saving:
-            return Verdict(True, saved >= GOOD * outlook.saving, saved < POOR * outlook.saving, "measure")
+        if lead and after[0] <= self.width and saved >= WORTH * predicted.measure:
+            return StepAcceptance(True, saved >= GOOD * predicted.measure, saved < POOR * predicted.measure, "measure")
         gained = before[0] - after[0]
-        if outlook.gain > 0.0 and gained >= WORTH * outlook.gain:
-            return Verdict(True, gained >= GOOD * outlook.gain, gained < POOR * outlook.gain, "goal")
-        return Verdict(False, False, False, "rejected measure" if lead else "rejected")
+        if predicted.violation > 0.0 and gained >= WORTH * predicted.violation:
+            return StepAcceptance(
+                True, gained >= GOOD * predicted.violation, gained < POOR * predicted.violation, "goal"
+            )
+        return StepAcceptance(False, False, False, "rejected measure" if lead else "rejected")
 
     def narrow(self, before: float, after: float) -> None:
         """After a step that lessened the violation from `before` to `after`."""

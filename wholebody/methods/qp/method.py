@@ -9,7 +9,7 @@ from wholebody.checks import flag
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
-from wholebody.methods.qp.search import Search, Settings
+from wholebody.methods.qp.multistart import Search, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.tracking import QPTracker
@@ -69,7 +69,7 @@ class QP:
         return None
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture; the best of a descent, of goals approached in stages, and of seeded starts.
+        """Find a posture; the best of a descent, of goals approached by homotopy, and of seeded starts.
 
         The later ones are tried only when the earlier ones did not reach the goals, and within the budget. Never
         raises for a goal out of reach or a start in penetration: the status says so.

@@ -73,23 +73,23 @@ class QuadraticProgram:
     def value(self, x: Array) -> float:
         """Objective at x, shape (n,)."""
         residual = self.rows @ x - self.target
-        lack = np.maximum(self.least - self.elastic @ x, 0.0)
+        violated = np.maximum(self.least - self.elastic @ x, 0.0)
         return float(
             0.5 * (self.diagonal * x) @ x
             + self.linear @ x
             + 0.5 * (self.weight * residual) @ residual
-            + 0.5 * (self.elastic_weight * lack) @ lack
+            + 0.5 * (self.elastic_weight * violated) @ violated
         )
 
     def gradient(self, x: Array) -> Array:
         """Derivative of the objective at x, shape (n,); it is continuous."""
         residual = self.rows @ x - self.target
-        lack = np.maximum(self.least - self.elastic @ x, 0.0)
+        violated = np.maximum(self.least - self.elastic @ x, 0.0)
         result: Array = (
             self.diagonal * x
             + self.linear
             + (self.weight * residual) @ self.rows
-            - (self.elastic_weight * lack) @ self.elastic
+            - (self.elastic_weight * violated) @ self.elastic
         )
         return result
 
@@ -98,8 +98,8 @@ class QuadraticProgram:
 
         The scale of an entry is the curvature there, so the figure reads as the Newton step that is still to be made.
         """
-        lack = self.least - self.elastic @ x > 0.0
-        scale = self.diagonal + self.weight @ self.rows**2 + (self.elastic_weight * lack) @ self.elastic**2
+        violated = self.least - self.elastic @ x > 0.0
+        scale = self.diagonal + self.weight @ self.rows**2 + (self.elastic_weight * violated) @ self.elastic**2
         moved = np.clip(x - self.gradient(x) / scale, self.lower, self.upper)
         return float(np.abs(moved - x).max(initial=0.0))
 

@@ -81,20 +81,20 @@ def _line_minimum(program: QuadraticProgram, x: Array, way: Array, longest: floa
         (program.diagonal * x + program.linear) @ way + (program.weight * slope) @ (program.rows @ x - program.target)
     )
     rise = float((program.diagonal * way) @ way + (program.weight * slope) @ slope)
-    lack, speed = program.least - program.elastic @ x, program.elastic @ way
-    pushing = lack > 0.0
-    base -= float((program.elastic_weight * speed * lack)[pushing].sum())
+    violated, speed = program.least - program.elastic @ x, program.elastic @ way
+    pushing = violated > 0.0
+    base -= float((program.elastic_weight * speed * violated)[pushing].sum())
     rise += float((program.elastic_weight * speed**2)[pushing].sum())
     moving = np.flatnonzero(np.abs(speed) > 0.0)
-    at = lack[moving] / speed[moving]
+    at = violated[moving] / speed[moving]
     ahead = at > 0.0
     order = moving[ahead][np.argsort(at[ahead], kind="stable")]
     for j in order.tolist():
-        place = lack[j] / speed[j]
+        place = violated[j] / speed[j]
         if place >= longest or base + rise * place >= 0.0:
             break
         sign = -1.0 if pushing[j] else 1.0
-        base -= sign * program.elastic_weight[j] * speed[j] * lack[j]
+        base -= sign * program.elastic_weight[j] * speed[j] * violated[j]
         rise += sign * program.elastic_weight[j] * speed[j] ** 2
     if rise <= 0.0:
         return 0.0

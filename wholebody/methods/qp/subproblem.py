@@ -18,7 +18,7 @@ from wholebody.linearisation import Linearisation
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.problem import Problem
 
-ALOOF = 0.01  # share of the curvature left where measures do not count: they still say which joints move
+PROXIMAL_SHARE = 0.01  # share of the curvature left where measures do not count: they still say which joints move
 GOAL_FORCE = 1e4  # 1/m: what a goal pulls with, however far it is; far above what measures pull with
 GOAL_WEIGHTS = (1e4, 1e8)  # 1/m^2, 1/rad^2: least and greatest weight of a goal row
 HOLD_WEIGHT = 1e10  # equalities give way by 1e-6 m to the pull of a goal out of reach
@@ -40,7 +40,7 @@ class Violation(NamedTuple):
     Attributes:
         goal: norm of the goal errors, each times the root of its weight's share of the largest.
         hold: norm of the equality constraints' errors.
-        elastic: sum of what pairs lack in distance and inequalities in value.
+        elastic: sum of the violations of clearances and inequalities.
         left: norm of the goal errors, without weights.
     """
 
@@ -69,9 +69,9 @@ class Rows(NamedTuple):
         soft_weight: (m,) their weights.
         goals: how many of them are goals'.
         elastic: (k, nv) rows of inequalities and gaps.
-        lack: (k,) what they lack; negative where they have more than enough.
-        group: (k,) rows of one contact share a number; the worst of them counts.
-        groups: how many numbers there are.
+        elastic_violation: (k,) by how much they are violated; negative where they hold with room to spare.
+        contact: (k,) rows of one contact share its number; the worst of them counts.
+        contacts: how many numbers there are.
         key: (k,) names a row from one linearisation to the next.
     """
 
@@ -80,9 +80,9 @@ class Rows(NamedTuple):
     soft_weight: Array
     goals: int
     elastic: Array
-    lack: Array
-    group: NDArray[np.intp]
-    groups: int
+    elastic_violation: Array
+    contact: NDArray[np.intp]
+    contacts: int
     key: NDArray[np.intp]
 
 
@@ -138,25 +138,25 @@ class Subproblem:
         weight = np.concatenate([pull * self._goal_share, np.full(len(self._equal), HOLD_WEIGHT)])
         low, high = self._low, self._high
         elastic = np.vstack([at.value_jacobian[low], -at.value_jacobian[high], at.gap_jacobian])
-        lack = np.concatenate(
+        violated = np.concatenate(
             [self._lower[low] - at.value[low], at.value[high] - self._upper[high], at.clearance - at.gap]
         )
         one_sided = len(low) + len(high)
-        group = np.concatenate([np.arange(one_sided), one_sided + at.gap_contact])
+        contact = np.concatenate([np.arange(one_sided), one_sided + at.gap_contact])
         contacts = len(at.contacts.distance)
         more = at.gap_contact[contacts:]
         place = np.concatenate([np.zeros(contacts, np.intp), 1 + np.arange(len(more)) - np.searchsorted(more, more)])
         key = np.concatenate([-1 - np.arange(one_sided), at.contacts.number[at.gap_contact] * MOST_ROWS + place])
-        return Rows(soft, error, weight, goals, elastic, lack, group, one_sided + contacts, key)
+        return Rows(soft, error, weight, goals, elastic, violated, contact, one_sided + contacts, key)
 
     def violation(self, rows: Rows, displacement: Array | None = None) -> Violation:
         """Violation at the linearised posture, or what the linearisation predicts after a displacement (nv,)."""
-        error, lack = rows.soft_error, rows.lack
+        error, violated = rows.soft_error, rows.elastic_violation
         if displacement is not None:
             error = error + rows.soft @ displacement
-            lack = lack - rows.elastic @ displacement
-        worst = np.zeros(rows.groups)
-        np.maximum.at(worst, rows.group, lack)
+            violated = violated - rows.elastic @ displacement
+        worst = np.zeros(rows.contacts)
+        np.maximum.at(worst, rows.contact, violated)
         goal, hold = error[: rows.goals], error[rows.goals :]
         return Violation(
             float(np.sqrt((self._goal_share * goal) @ goal)),
@@ -191,7 +191,7 @@ class Subproblem:
         floor = float(curvature.max(initial=0.0)) * LEAST_CURVATURE or 1.0
         diagonal = np.maximum(curvature, floor)
         linear = self.scale * at.gradient if measures else np.zeros_like(at.gradient)
-        diagonal = np.maximum(diagonal if measures else ALOOF * diagonal, np.abs(linear) / radius)
+        diagonal = np.maximum(diagonal if measures else PROXIMAL_SHARE * diagonal, np.abs(linear) / radius)
         error = rows.soft_error.copy()
         goal, goal_weight = error[: rows.goals], rows.soft_weight[: rows.goals]
         farthest = float(np.abs(goal).max(initial=0.0))
@@ -213,8 +213,8 @@ class Subproblem:
             target=-(error + shift),
             weight=rows.soft_weight,
             elastic=rows.elastic,
-            least=np.minimum(rows.lack, PULL * radius),
-            elastic_weight=np.full(len(rows.lack), ELASTIC_WEIGHT),
+            least=np.minimum(rows.elastic_violation, PULL * radius),
+            elastic_weight=np.full(len(rows.elastic_violation), ELASTIC_WEIGHT),
             lower=lower,
             upper=upper,
         )

@@ -118,7 +118,7 @@ class QPTracker:
         self._method, self._minimising = method, minimising
         solver.load()  # not in the middle of a drag
         self._working_set = WorkingSet(solver)
-        self._within = LEAST_WITHIN
+        self._query_distance = LEAST_WITHIN
         self._alone = OneAtATime("tracker")
         self.workspace = problem.workspace()
         self._set_up()
@@ -184,16 +184,16 @@ class QPTracker:
         self._renew()
         at, rows, program, answer = self._solved(q, measures)
         motion, turn = self._motion(at, answer.x)
-        if motion > 0.5 * self._within and rows.lack.max(initial=0.0) > UNSEEN:
+        if motion > 0.5 * self._query_distance and rows.elastic_violation.max(initial=0.0) > UNSEEN:
             # something came in fast: to get out of its way, one must look as far as one has to go
-            self._within = min(HEADROOM * motion, LARGEST_WITHIN)
+            self._query_distance = min(HEADROOM * motion, LARGEST_WITHIN)
             at, rows, program, answer = self._solved(q, measures)
             motion, turn = self._motion(at, answer.x)
-        share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
+        share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
         displacement = answer.x if share == 1.0 else share * answer.x
         if 0.5 * share**2 * motion * turn > UNSEEN:
             displacement, share = self._looked_after(at, rows, program, displacement, share)
-        self._within = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
+        self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
         following = pin.integrate(self.problem.scene.model, at.q, displacement)
         return QPStep(
             following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
@@ -202,7 +202,7 @@ class QPTracker:
 
     def _solved(self, q: Array, measures: bool) -> tuple[Linearisation, Rows, QuadraticProgram, QPSolution]:
         """Linearisation, rows, program and its answer at a posture (nq,)."""
-        at = self._lineariser.at(q, self._within)
+        at = self._lineariser.at(q, self._query_distance)
         rows = self._subproblem.rows(at)
         program = self._subproblem.program(
             at, rows, RADIUS, PULL * RADIUS, DAMPING, np.zeros(len(rows.soft_error)), measures
@@ -225,16 +225,16 @@ class QPTracker:
             The displacement (nv,) and its share.
         """
         began = np.minimum(at.contacts.distance, at.clearance[: len(at.contacts.distance)])
-        groups = np.zeros(rows.groups)
+        groups = np.zeros(rows.contacts)
         for _ in range(CORRECTIONS):
             short = self._shortfall(at, displacement, np.maximum(began, self._foreseen(at, rows, displacement)))
             if short.max(initial=0.0) <= UNSEEN:
                 return displacement, share
-            groups[rows.groups - len(short) :] += short
-            again = self._working_set.solve(replace(program, least=program.least + groups[rows.group]), rows.key)
+            groups[rows.contacts - len(short) :] += short
+            again = self._working_set.solve(replace(program, least=program.least + groups[rows.contact]), rows.key)
             self.workspace.state.update(at.q)  # where motion begins
             motion, _ = self._motion(at, again.x)
-            share = min(1.0, 0.5 * self._within / max(motion, 1e-12))
+            share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
             displacement = share * again.x
         for _ in range(CUTS):
             if self._shortfall(at, displacement, began).max(initial=0.0) <= UNSEEN:
@@ -244,10 +244,10 @@ class QPTracker:
 
     def _foreseen(self, at: Linearisation, rows: Rows, displacement: Array) -> Array:
         """Distance (k,) that each contact has after a displacement (nv,) as its rows have it, at most what is asked."""
-        lack = np.zeros(rows.groups)
-        np.maximum.at(lack, rows.group, rows.lack - rows.elastic @ displacement)
+        violated = np.zeros(rows.contacts)
+        np.maximum.at(violated, rows.contact, rows.elastic_violation - rows.elastic @ displacement)
         count = len(at.contacts.distance)
-        foreseen: Array = at.clearance[:count] - lack[rows.groups - count :]
+        foreseen: Array = at.clearance[:count] - violated[rows.contacts - count :]
         return foreseen
 
     def _shortfall(self, at: Linearisation, displacement: Array, kept: Array) -> Array:

@@ -122,7 +122,7 @@ class _Workspace:
         )
 
     def run(self, limit: int, tolerance: float) -> tuple[Array, int]:
-        """Iterate on from where the last run ended; x and the iterations used."""
+        """TraceEntry on from where the last run ended; x and the iterations used."""
         self._solver.update_settings(max_iter=limit, eps_abs=tolerance)
         result = self._solver.solve(raise_error=False)
         x = np.asarray(result.x[: self.n]) / SCALE

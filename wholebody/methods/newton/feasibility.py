@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from wholebody.arrays import Array
-from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.inequalities import Kind
-from wholebody.methods.newton.run import Run
+from wholebody.methods.newton.iteration import Iteration
+from wholebody.methods.newton.system import ActiveSystem
 
 MENDING = 30  # most steps that only mend what must hold, where the goals were not met
 
 
-class Reached(NamedTuple):
+class FeasibilityResult(NamedTuple):
     """Where the iteration ended.
 
     Attributes:
@@ -40,32 +40,32 @@ class Reached(NamedTuple):
 
 
 def reach(
-    course: Course,
+    active_system: ActiveSystem,
     x: Array,
     *,
     tolerance: float,
     iterations: int,
     kind: Kind = "slack",
     goal_tolerance: float | None = None,
-    hurried: bool = False,
-) -> Reached:
+    early_exit: bool = False,
+) -> FeasibilityResult:
     """Meet all equations from x (7 n,), or come as near as goes.
 
     Args:
-        course: the equations.
+        active_system: the equations.
         x: where to begin.
         tolerance: metres and radians.
         iterations: most of them.
         kind: how inequalities are dealt with.
         goal_tolerance: of the goals, where it is another.
-        hurried: end at the first steps that bring little, and do not look for the nearest point of goals not met.
+        early_exit: end at the first steps that bring little, and do not look for the nearest point of goals not met.
     """
-    run = Run(course, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
-    run.iterate(iterations, goals=True, measures="lower", hurried=hurried)
-    if not hurried and run.stationary and not run.met and len(run.objective):
+    run = Iteration(active_system, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
+    run.iterate(iterations, goals=True, measures="lower", early_exit=early_exit)
+    if not early_exit and run.stationary and not run.met and len(run.objective):
         run.iterate(iterations, goals=True, measures="ignore")
     if run.hard > tolerance and len(run.goal_rows):
         stationary = run.stationary
         run.iterate(MENDING, goals=False, measures="ignore")
         run.stationary = stationary if run.hard <= tolerance else run.stationary
-    return Reached(run.x, run.met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)
+    return FeasibilityResult(run.x, run.met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)

@@ -14,12 +14,12 @@ from wholebody.arrays import Array
 from wholebody.assessment import Assessment, assess
 from wholebody.methods.conclusion import Ending, concluded, counted
 from wholebody.methods.contradictions import Contradiction, contradictions, least_left
-from wholebody.methods.newton.figure_course import FigureCourse
+from wholebody.methods.newton.feasibility import FeasibilityResult, reach
+from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import Kind
-from wholebody.methods.newton.polishing import polish
-from wholebody.methods.newton.reaching import Reached, reach
+from wholebody.methods.newton.refinement import polish
 from wholebody.methods.starts import Minima, bent, restarts
-from wholebody.solution import Iterate, Solution
+from wholebody.solution import Solution, TraceEntry
 
 SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessment adds the rows of a goal up
 TRIAL = 30  # iterations that another start is given to come nearer than the best so far
@@ -54,16 +54,16 @@ class Found(NamedTuple):
 
     q: Array
     judgement: Assessment
-    reached: Reached
+    reached: FeasibilityResult
     how: str
 
 
 class Search:
     """All ways for one problem, remembering the best end."""
 
-    def __init__(self, course: FigureCourse, settings: Settings) -> None:
-        """Set up for the problem of a course."""
-        self.course, self.settings = course, settings
+    def __init__(self, active_system: FigureSystem, settings: Settings) -> None:
+        """Set up for the problem of a active_system."""
+        self.active_system, self.settings = active_system, settings
         self.iterations = 0
         self.residuals: list[float] = []
         self.contradictions: tuple[Contradiction, ...] = ()
@@ -74,7 +74,7 @@ class Search:
 
     def everywhere(self, q: Array) -> Found:
         """The best end of all ways, the measures brought to their least there if it serves."""
-        self.contradictions = contradictions(self.course.problem, self.course.workspace)
+        self.contradictions = contradictions(self.active_system.problem, self.active_system.workspace)
         hopeless = least_left(self.contradictions) is None
         best = self._go(q, "", TRIAL) if hopeless else self.from_here(q)
         if not self._serves(best) and not hopeless:
@@ -90,52 +90,56 @@ class Search:
                     best = found
                 if self._serves(best):
                     self.contradictions = ()
-                if self._serves(best) or self.course.control.over or self.course.control.spent > FOR_STARTS:
+                if (
+                    self._serves(best)
+                    or self.active_system.control.over
+                    or self.active_system.control.spent > FOR_STARTS
+                ):
                     break
-        if self.course.control.over:
+        if self.active_system.control.over:
             return best
         if not best.judgement.holds(self.settings.counted) and not hopeless:
             best = self._least_violation(best, q)
-        if self._serves(best) and self.course.objective.minimised:
+        if self._serves(best) and self.active_system.objective.minimised:
             best = self._polished(best)
         return best
 
     def solution(self, found: Found, began: float) -> Solution:
         """What was found as a solution; the search began at `began` by `time.perf_counter`."""
-        reported = ", ".join(self.course.objective.reported)
+        reported = ", ".join(self.active_system.objective.reported)
         ending = Ending(
             found.q,
             found.reached.stationary,
             self.iterations,
-            tuple(Iterate(error, 0.0, 0.0, 0.0) for error in self.residuals),
+            tuple(TraceEntry(error, 0.0, 0.0, 0.0) for error in self.residuals),
             f"in {self.iterations} iterations{found.how}",
             remark=f"; {reported} is reported, not minimised" if reported else "",
             contradictions=self.contradictions,
             judgement=found.judgement,
         )
         return concluded(
-            self.course.problem,
+            self.active_system.problem,
             ending,
-            method=f"newton/{self.course.algebra.name}",
+            method=f"newton/{self.active_system.algebra.name}",
             tolerance=self.settings.tolerance,
-            control=self.course.control,
+            control=self.active_system.control,
             began=began,
         )
 
     def _starts(self, q: Array) -> Iterator[tuple[Array, str]]:
-        problem = self.course.problem
-        start = bent(problem, self.course.workspace.state, q)
+        problem = self.active_system.problem
+        start = bent(problem, self.active_system.workspace.state, q)
         if start is not None:
             yield start, " from a start with bent joints"
         rng = np.random.default_rng(self.settings.seed)
-        for start in restarts(problem, self.course.workspace.state, q, rng, self.settings.restarts):
+        for start in restarts(problem, self.active_system.workspace.state, q, rng, self.settings.restarts):
             yield start, " from another start"
 
     def _go(self, q: Array, how: str, iterations: int) -> Found:
-        course, settings = self.course, self.settings
+        active_system, settings = self.active_system, self.settings
         reached = reach(
-            course,
-            course.variables(q),
+            active_system,
+            active_system.variables(q),
             tolerance=SHARPER * settings.tolerance,
             iterations=iterations,
             kind=settings.inequalities,
@@ -146,26 +150,26 @@ class Search:
 
     def _polished(self, found: Found) -> Found:
         """The same with lower measures, if they can be lowered."""
-        course, tolerance = self.course, self.settings.tolerance
-        x, spent = polish(course, found.reached.x, course.objective.value, tolerance=tolerance)
+        active_system, tolerance = self.active_system, self.settings.tolerance
+        x, spent = polish(active_system, found.reached.x, active_system.objective.value, tolerance=tolerance)
         self.iterations += spent
         lower = self._judged(found.reached._replace(x=x), found.how)
         return lower if self._serves(lower) and self._better(lower, found) else found
 
     def _least_violation(self, best: Found, q: Array) -> Found:
         """The nearest to all constraints, if that breaks less: where they cannot all hold."""
-        whole = self.course
-        self.course = FigureCourse(whole.problem, whole.workspace, whole.algebra_name, yielding=True)
-        self.course.control = whole.control
+        whole = self.active_system
+        self.active_system = FigureSystem(whole.problem, whole.workspace, whole.algebra_name, yielding=True)
+        self.active_system.control = whole.control
         found = self._go(q, best.how, self.settings.iterations)
-        self.course = whole
+        self.active_system = whole
         stationary = best.reached.stationary or found.reached.stationary
         found = found._replace(reached=found.reached._replace(stationary=stationary))
         return found if self._better(found, best) else best
 
-    def _judged(self, reached: Reached, how: str) -> Found:
-        q = self.course.posture(reached.x)
-        return Found(q, assess(self.course.problem, q), reached, how)
+    def _judged(self, reached: FeasibilityResult, how: str) -> Found:
+        q = self.active_system.posture(reached.x)
+        return Found(q, assess(self.active_system.problem, q), reached, how)
 
     def _serves(self, found: Found) -> bool:
         return found.judgement.holds(self.settings.counted) and found.judgement.met(self.settings.counted)
@@ -182,7 +186,7 @@ class Search:
 
 def _broken(found: Found) -> float:
     judged = found.judgement
-    return max(judged.limit_violation, judged.constraint_violation, judged.clearance_lack, judged.penetration)
+    return max(judged.limit_violation, judged.constraint_violation, judged.clearance_violation, judged.penetration)
 
 
 def _missed(found: Found) -> float:

@@ -14,10 +14,10 @@ from typing import Literal
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.inequalities import FREE, Inequalities, Kind, inequalities
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
-from wholebody.solution import Iterate
+from wholebody.methods.newton.system import ActiveSystem
+from wholebody.solution import TraceEntry
 
 Measures = Literal["lower", "keep", "ignore"]
 
@@ -41,8 +41,8 @@ NARROW = 0.7  # what is left of the funnel after a step that only mended
 WORTH = 0.05  # share of the promised progress that a step must make
 MENDED = 0.2  # the same where it only mends what must hold
 STAGNANT = 1e-6  # relative progress below which steps count as none
-IDLE = 0.1  # the same where frames wait
-LINGERS = 1  # steps that bring less than that, after which a frame ends
+LEAST_PROGRESS = 0.1  # the same where frames wait
+STALLED = 1  # steps that bring less than that, after which a frame ends
 PATIENCE = 12  # such steps in a row before the nearest point counts as found
 REFUSALS = 6  # times in a row that a step is made anew because it runs into something; after that it is shortened
 SHORTENINGS = 8  # halvings of a step whose way is not free before it counts as failed
@@ -50,13 +50,15 @@ SYSTEMS = 25  # most linear systems a step, while inequalities come and go
 NEAR = 1e-2  # m or rad: errors below which the damping of equations is made good by the last multipliers
 
 
-class Run:
+class Iteration:
     """State of one iteration."""
 
-    def __init__(self, course: Course, x: Array, tolerance: float, goal_tolerance: float, kind: Kind) -> None:
-        self.course, self.kind = course, kind
+    def __init__(
+        self, active_system: ActiveSystem, x: Array, tolerance: float, goal_tolerance: float, kind: Kind
+    ) -> None:
+        self.active_system, self.kind = active_system, kind
         self.tolerance, self.goal_tolerance = tolerance, goal_tolerance
-        self.begin(course.retract(x))
+        self.begin(active_system.retract(x))
         self.residuals = [max(self.hard, self.goal)]
         self.systems, self.stationary = 0, False
 
@@ -67,8 +69,8 @@ class Run:
 
     def begin(self, x: Array) -> None:
         """Take the equations as they are now, at x."""
-        self.course.arrive(x)
-        self.system, self.algebra = self.course.system, self.course.algebra
+        self.active_system.arrive(x)
+        self.system, self.algebra = self.active_system.system, self.active_system.algebra
         self.goal_rows = np.flatnonzero(self.system.goal)
         self.objective = np.flatnonzero(self.system.objective)
         self.one_sided = np.flatnonzero(self.system.inequality)
@@ -91,14 +93,14 @@ class Run:
         error[self.objective] = 0.0
         return error
 
-    def iterate(self, iterations: int, *, goals: bool, measures: Measures, hurried: bool = False) -> None:
+    def iterate(self, iterations: int, *, goals: bool, measures: Measures, early_exit: bool = False) -> None:
         """Step until everything holds, nothing moves any more, or the iterations are spent.
 
         Args:
             iterations: most of them.
             goals: whether goals are asked for.
             measures: to be lowered, to grow little, or not to be looked at.
-            hurried: end at the first step that brings little, as in a frame whose goal lies in something.
+            early_exit: end at the first step that brings little, as in a frame whose goal lies in something.
         """
         damping, share, pull, stagnant = 0.0, 1.0, PULL, 0
         self.stationary = False
@@ -108,9 +110,9 @@ class Run:
         for _ in range(iterations):
             if (self.met if goals else self.hard <= self.tolerance) and self.state.finished():
                 return
-            if self.course.control.over:
+            if self.active_system.control.over:
                 return
-            self.course.control.tell(Iterate(self.goal, self.hard, 0.0, 0.0))
+            self.active_system.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
             before = self._norms(self.residual)
             try:
                 mend = not goals or (self.goal > self.goal_tolerance and before[0] > MEND * funnel)
@@ -124,8 +126,8 @@ class Run:
             except SingularSystemError:
                 step = np.zeros_like(self.x)
             length = self.length(step)
-            trial = self.course.retract(self.x + length * step)
-            if refused < REFUSALS and self.course.runs_into():
+            trial = self.active_system.retract(self.x + length * step)
+            if refused < REFUSALS and self.active_system.runs_into():
                 refused += 1  # what was run into is an equation now: the step is made anew from where it began
                 self.residuals.append(self.residuals[-1])
                 self.begin(self.x)
@@ -141,15 +143,15 @@ class Run:
                 if damping >= MOST_DAMPING:
                     self.stationary = True
                     return
-                stagnant += hurried
-                if hurried and stagnant > LINGERS:
+                stagnant += early_exit
+                if early_exit and stagnant > STALLED:
                     return
                 damping = max(FIRST_DAMPING, damping * DAMPING_UP)
                 share, pull = max(0.5 * share, 0.05), max(0.5 * pull, 1e-3)
                 continue
             if mend and after[1] >= before[1]:
                 funnel = max(NARROW * funnel, self.tolerance)
-            nearer = sum(after) < (1.0 - (IDLE if hurried else STAGNANT)) * least
+            nearer = sum(after) < (1.0 - (LEAST_PROGRESS if early_exit else STAGNANT)) * least
             least = min(least, sum(after))
             stagnant = 0 if nearer or not self.state.finished() else stagnant + 1
             self.advance(trial, length)
@@ -162,28 +164,28 @@ class Run:
             if stagnant >= PATIENCE:
                 self.stationary = True
                 return
-            if hurried and stagnant > LINGERS:
+            if early_exit and stagnant > STALLED:
                 return
 
     def length(self, step: Array) -> float:
-        """Share of a step (7 n,) that the linearisation and the course are good for."""
+        """Share of a step (7 n,) that the linearisation and the active_system are good for."""
         length = min(1.0, LARGEST_TURN / max(largest_turn(step), 1e-300)) * self.state.share()
-        if np.isfinite(self.course.longest):
-            length = min(length, self.course.longest / max(self._motion(step), 1e-300))
+        if np.isfinite(self.active_system.longest):
+            length = min(length, self.active_system.longest / max(self._motion(step), 1e-300))
         return length
 
     def shorten(self, trial: Array, step: Array, length: float) -> tuple[Array, float, bool]:
         """The trial and its length, halved until the way to it is free; and whether it is."""
         for _ in range(SHORTENINGS):
-            if self.course.passes():
+            if self.active_system.passes():
                 return trial, length, True
             length *= 0.5
-            trial = self.course.retract(self.x + length * step)
-        return trial, length, self.course.passes()
+            trial = self.active_system.retract(self.x + length * step)
+        return trial, length, self.active_system.passes()
 
     def advance(self, trial: Array, length: float) -> None:
         """Take the equations at a trial, which this share of the last step led to."""
-        if self.course.arrive(trial):
+        if self.active_system.arrive(trial):
             self.begin(trial)
         else:
             self._move(trial, None)

@@ -1,4 +1,4 @@
-"""All the ways that are tried for one problem: a descent, bent limbs, goals approached in stages, other starts."""
+"""All the ways that are tried for one problem: a descent, bent limbs, goals approached by homotopy, other starts."""
 
 from __future__ import annotations
 
@@ -13,25 +13,24 @@ from wholebody.linearisation import Lineariser
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
 from wholebody.methods.qp.curved_reach import CurvedReach
-from wholebody.methods.qp.descent import Descent
 from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.sqp import SQP, LocalSolution
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.qp.visit import Local
 from wholebody.methods.starts import Minima, bent, restarts
 from wholebody.problem import Problem
-from wholebody.solution import Iterate
+from wholebody.solution import TraceEntry
 from wholebody.workspace import Workspace
 
 ALIKE = 1e-5  # share of a goal's error by which two descents may differ and count as equally near
 JUST = 0.05  # tolerances by which what must hold may be missed more and count as held as well
-SCOUT = 40  # most programs of a scout; more = surer on curved ways, fewer starts within the budget
-GHOST = 0.15  # m: by which a scout that goes through things may be inside of them; two limbs that cross need as much
-NO_NEARER = 20  # scouts in a row that came no nearer although nothing was in their way: the goals are out of reach
-REACHED = 10.0  # tolerances: scouts that are not this near to the goals although nothing is in their way are given up
-NEARER = 0.02  # share of what is left by which a scout is nearer
-FIRST = 8  # scouts before goals are approached in stages, which takes as many programs and stays near the start
-PROBES = 10  # most descents without contacts that tell whether goals are out of reach
-PROBE = 60  # most programs of each
+PROBE_PROGRAMS = 40  # most programs of a probe; more = surer on curved ways, fewer starts within the budget
+RELAXATION_DEPTH = 0.15  # m: by which a relaxed probe may be inside of things; two limbs that cross need as much
+NO_NEARER = 20  # relaxed probes in a row that came no nearer: the goals are out of reach
+REACHED = 10.0  # tolerances: relaxed probes that end farther from the goals are given up
+NEARER = 0.02  # share of what is left by which a probe is nearer
+FIRST = 8  # relaxed probes before homotopy, which takes as many programs and stays near the start
+REACH_TRIALS = 10  # most descents without contacts that tell whether goals are out of reach
+REACH_TRIAL_PROGRAMS = 60  # most programs of each
 FAR = (1.0, 0.6)  # shares of the joints' ranges that their starts may be away by
 HELD = 1e-3  # m, rad: by which constraints may be missed where such a descent ends
 AGREEING = 5  # of them that have to come to rest equally near
@@ -39,7 +38,7 @@ AGREE = 1.05  # times the least violation up to which they count as equally near
 COMING_NEAR = 40  # most programs from there to the nearest posture among things
 PUSHED_OUT = 2  # of the nearest ends of such descents, how many are pushed out of things
 FOR_WAYS = 0.5  # share of the time limit that ways after the first may take: to come nearest takes its time too
-STAGES = (0.25, 0.5, 0.75)  # of the way to the goals, when the straight attempt ends in a local minimum
+HOMOTOPY = (0.25, 0.5, 0.75)  # of the way to the goals, when the straight attempt ends in a local minimum
 
 
 class Settings(NamedTuple):
@@ -54,7 +53,7 @@ class Settings(NamedTuple):
 
 
 class Search:
-    """Descent, continuation and restarts for one problem, remembering the best posture."""
+    """SQP, continuation and restarts for one problem, remembering the best posture."""
 
     def __init__(
         self, problem: Problem, workspace: Workspace, solver: QPSolver, settings: Settings, control: Control
@@ -63,25 +62,25 @@ class Search:
         self.problem, self.solver, self.settings, self.control = problem, solver, settings, control
         self.subproblem = Subproblem(problem, workspace.state)
         self.lineariser = problem.lineariser(workspace)
-        self.trace: list[Iterate] = []
+        self.trace: list[TraceEntry] = []
         self.spent = 0
         self._left = settings.budget  # programs that the ways after the first may still solve
-        self._in_vain = 0  # scouts in a row that came no nearer
+        self._without_gain = 0  # relaxed probes in a row that came no nearer
         self.how = "directly"
         self.contradictions: tuple[Contradiction, ...] = ()
         self._least = 0.0  # what is known to be left of the goals at least, metres
-        self._minima = Minima()  # where scouts ended that were pushed out of things
-        self._nearest: list[Local] = []  # where probes without contacts ended
+        self._minima = Minima()  # where relaxed probes ended that were pushed out of things
+        self._nearest: list[LocalSolution] = []  # where probes without contacts ended
         self._out_of_reach: bool | None = None
-        self._best: Local | None = None
+        self._best: LocalSolution | None = None
 
     @property
-    def best(self) -> Local:
+    def best(self) -> LocalSolution:
         """The best posture so far."""
         assert self._best is not None
         return self._best
 
-    def run(self) -> Local:
+    def run(self) -> LocalSolution:
         """Try one way after the other until the goals are met; the best that was found."""
         self._try_ways()
         self._settle()
@@ -93,12 +92,12 @@ class Search:
 
     def _try_ways(self) -> None:
         start = self.problem.scene.figure.clamp(self.problem.start)
-        first = self._descend(start, eager=not self.settings.measures, hopeless=self._hopeless)
+        first = self._descend(start, full_step=not self.settings.measures, out_of_reach=self._known_out_of_reach)
         if self._accept(first, "directly"):
             return
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         least = least_left(self.contradictions)
-        if least is None or (not least and self._hopeless(self.best.q)):
+        if least is None or (not least and self._known_out_of_reach(self.best.q)):
             return
         self._least = least
         if self._proven():
@@ -106,59 +105,67 @@ class Search:
         rng = np.random.default_rng(self.settings.seed)
         starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, self.settings.restarts))
         ways = chain(
-            self._bent(start), self._scouted(islice(starts, FIRST)), self._staged(start), self._scouted(starts)
+            self._bent(start),
+            self._relaxed_probes(islice(starts, FIRST)),
+            self._homotopy(start),
+            self._relaxed_probes(starts),
         )
         for local, how in ways:
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
 
-    def _bent(self, start: Array) -> Iterator[tuple[Local, str]]:
+    def _bent(self, start: Array) -> Iterator[tuple[LocalSolution, str]]:
         """Straight limbs hide what bending them would do: the same descent with joints moved off their limits."""
         q = bent(self.problem, self.lineariser.state, start)
         if q is not None:
             yield self._try(q, "bent"), "from a start with bent joints"
 
-    def _staged(self, start: Array) -> Iterator[tuple[Local, str]]:
+    def _homotopy(self, start: Array) -> Iterator[tuple[LocalSolution, str]]:
         """Goals approached through intermediate ones: the errors at the start, shrinking to nothing."""
         if not self.problem.goals:
             return
         whole, q = self._goal_errors(start), start
-        for share in STAGES:
-            q = self._try(q, "stage", (1.0 - share) * whole).q
-        yield self._try(q, "stage"), "in stages"
+        for share in HOMOTOPY:
+            q = self._try(q, "homotopy", (1.0 - share) * whole).q
+        yield self._try(q, "homotopy"), "by homotopy"
 
-    def _scouted(self, starts: Iterator[Array]) -> Iterator[tuple[Local, str]]:
-        """Scouts from the start and from seeded postures, and a descent from where one reaches the goals.
+    def _relaxed_probes(self, starts: Iterator[Array]) -> Iterator[tuple[LocalSolution, str]]:
+        """Relaxed probes from the start and from seeded postures, and a descent from where one reaches the goals.
 
-        A scout first goes through things, where limbs can change sides, and then is pushed out of them. Where many in
+        A probe first goes through things, where limbs can change sides, and then is pushed out of them. Where many in
         a row, although nothing was in their way, came no nearer than the best posture, the goals are out of reach.
         """
         for q in starts:
-            if self._in_vain == NO_NEARER or self._minima.complete or self._left <= 0 or self.control.spent > FOR_WAYS:
+            if (
+                self._without_gain == NO_NEARER
+                or self._minima.complete
+                or self._left <= 0
+                or self.control.spent > FOR_WAYS
+            ):
                 return
-            ghost = self._scout(q, GHOST)
-            nearer = ghost.violation.left < (1.0 - NEARER) * self.best.violation.left
-            self._in_vain = 0 if nearer else self._in_vain + 1
-            if ghost.violation.left > REACHED * self.settings.tolerance:
+            relaxed = self._probe(q, RELAXATION_DEPTH)
+            nearer = relaxed.violation.left < (1.0 - NEARER) * self.best.violation.left
+            self._without_gain = 0 if nearer else self._without_gain + 1
+            if relaxed.violation.left > REACHED * self.settings.tolerance:
                 continue
-            scout = self._scout(ghost.q, 0.0)
-            if not _held(scout, self.settings.tolerance) and not _held(self.best, self.settings.tolerance):
-                scout = self._scout(q, 0.0)  # nothing leads out from there; to be outside comes before the goals
-            reached = scout.violation.worst <= self.settings.tolerance
+            probe = self._probe(relaxed.q, 0.0)
+            if not _held(probe, self.settings.tolerance) and not _held(self.best, self.settings.tolerance):
+                probe = self._probe(q, 0.0)  # nothing leads out from there; to be outside comes before the goals
+            reached = probe.violation.worst <= self.settings.tolerance
             if not reached:
-                self._minima.add(scout.violation.total, scout.converged)
-            yield self._try(scout.q, "restart") if reached else scout, "from another start"
+                self._minima.add(probe.violation.total, probe.converged)
+            yield self._try(probe.q, "restart") if reached else probe, "from another start"
 
-    def _scout(self, start: Array, depth: float) -> Local:
+    def _probe(self, start: Array, depth: float) -> LocalSolution:
         """Look whether the goals can be met from a start, in haste and without regard to the measures.
 
         Args:
             start: (nq,).
             depth: by which pieces may be inside of each other, metres.
         """
-        most = max(min(self._left, SCOUT), 1)
+        most = max(min(self._left, PROBE_PROGRAMS), 1)
         lineariser = self.lineariser if depth == 0.0 else self.lineariser.relaxed(depth)
-        local = self._descent(most, None, "scout", measures=False, hasty=True, lineariser=lineariser).run(start)
+        local = self._descent(most, None, "probe", measures=False, early_exit=True, lineariser=lineariser).run(start)
         self.spent += local.iterations
         self._left -= local.iterations
         return local
@@ -189,11 +196,11 @@ class Search:
         left = self.best.violation.left
         return bool(self._least) and _held(self.best, self.settings.tolerance) and left <= NEAREST * self._least
 
-    def _hopeless(self, q: Array) -> bool:
+    def _known_out_of_reach(self, q: Array) -> bool:
         """Whether the goals are out of reach: from a posture (nq,) and other starts, even through everything.
 
         Where several descents without contacts, from postures all over the limits, come to rest at the same distance
-        and none comes nearer, it is the nearest that limits and constraints allow. Local minima differ.
+        and none comes nearer, it is the nearest that limits and constraints allow. LocalSolution minima differ.
         """
         if self._out_of_reach is not None or not (self.problem.goals and self.problem.scene.model.nv):
             return bool(self._out_of_reach)
@@ -202,8 +209,8 @@ class Search:
         start = self.problem.scene.figure.clamp(self.problem.start)
         rng = np.random.default_rng(self.settings.seed)
         self._out_of_reach = False
-        for begin in chain([q], restarts(self.problem, state, start, rng, PROBES - 1, FAR)):
-            local = reach.through_everything(begin, REACHED * tolerance, PROBE)
+        for begin in chain([q], restarts(self.problem, state, start, rng, REACH_TRIALS - 1, FAR)):
+            local = reach.through_everything(begin, REACHED * tolerance, REACH_TRIAL_PROGRAMS)
             self.spent += local.iterations
             if local.violation.worst <= REACHED * tolerance or not local.converged or self.control.over:
                 return False
@@ -229,14 +236,14 @@ class Search:
 
     def _pushed_out(self, q: Array) -> Array:
         """Where leaving what a posture (nq,) is inside of ends, with the goals' errors to stay as they are."""
-        local = self._descent(SCOUT, self._goal_errors(q), "nearest", measures=False).run(q)
+        local = self._descent(PROBE_PROGRAMS, self._goal_errors(q), "nearest", measures=False).run(q)
         self.spent += local.iterations
         return local.q
 
     def _curved(self) -> CurvedReach:
         return CurvedReach(self.problem, self.lineariser, self.solver, self.control)
 
-    def _stay(self, local: Local) -> Local:
+    def _stay(self, local: LocalSolution) -> LocalSolution:
         """Descend with the goals' errors to stay as they are: what must hold is mended, then the measures improve."""
         nearest = self._goal_errors(local.q)
         stayed = self._descent(self.settings.iterations, nearest, "nearest").run(local.q)
@@ -249,7 +256,7 @@ class Search:
         state = self.lineariser.state.update(q)
         return np.concatenate([np.zeros(0), *(np.atleast_1d(goal.error(state)) for goal in self.problem.goals)])
 
-    def _try(self, start: Array, note: str, offset: Array | None = None) -> Local:
+    def _try(self, start: Array, note: str, offset: Array | None = None) -> LocalSolution:
         """Descend with what is left of the budget."""
         before = self.spent
         local = self._descend(start, offset, note, most=max(self._left, 1))
@@ -264,16 +271,16 @@ class Search:
         *,
         measures: bool = True,
         most: int | None = None,
-        eager: bool = False,
-        hopeless: Callable[[Array], bool] | None = None,
-    ) -> Local:
+        full_step: bool = False,
+        out_of_reach: Callable[[Array], bool] | None = None,
+    ) -> LocalSolution:
         """Descend from a start; where that ends with something that must hold not holding, mend it."""
         iterations = self.settings.iterations if most is None else min(most, self.settings.iterations)
-        descent = self._descent(iterations, offset, note, measures=measures, eager=eager)
-        descent.hopeless = hopeless
+        descent = self._descent(iterations, offset, note, measures=measures, full_step=full_step)
+        descent.out_of_reach = out_of_reach
         local = descent.run(start)
         self.spent += local.iterations
-        if hopeless is not None and self._out_of_reach:
+        if out_of_reach is not None and self._out_of_reach:
             return local
         if not _held(local, self.settings.tolerance) and offset is None and (most is None or local.iterations < most):
             stayed = self._stay(local)
@@ -287,27 +294,27 @@ class Search:
         note: str,
         *,
         measures: bool = True,
-        hasty: bool = False,
-        eager: bool = False,
+        early_exit: bool = False,
+        full_step: bool = False,
         lineariser: Lineariser | None = None,
-    ) -> Descent:
-        return Descent(
+    ) -> SQP:
+        return SQP(
             self.subproblem, lineariser or self.lineariser, self.solver, self.settings.tolerance, iterations, offset,
-            self.trace, note, measures and self.settings.measures, hasty, eager, self.control,
+            self.trace, note, measures and self.settings.measures, early_exit, full_step, self.control,
         )  # fmt: skip
 
-    def _accept(self, local: Local, how: str) -> bool:
+    def _accept(self, local: LocalSolution, how: str) -> bool:
         """Keep the better one; whether what is asked holds now."""
         if self._best is None or _better(local, self._best, self.settings.tolerance):
             self._best, self.how = local, how
         return self.best.violation.worst <= self.settings.tolerance
 
 
-def _held(local: Local, tolerance: float) -> bool:
+def _held(local: LocalSolution, tolerance: float) -> bool:
     return _broken(local) <= tolerance
 
 
-def _better(one: Local, other: Local, tolerance: float) -> bool:
+def _better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
     """Whether one descent ended better: in what must hold, then in the goals, then in the measures."""
     for left, right, alike in (
         (_broken(one), _broken(other), JUST * tolerance),
@@ -319,5 +326,5 @@ def _better(one: Local, other: Local, tolerance: float) -> bool:
     return one.measure < other.measure
 
 
-def _broken(local: Local) -> float:
+def _broken(local: LocalSolution) -> float:
     return max(local.violation.hold, local.violation.elastic)

@@ -7,15 +7,13 @@ import time
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.methods.newton.batches import Batch, Unit
+from wholebody.methods.newton.batches import OBJECTIVE, Batch, Key, Unit
 from wholebody.methods.newton.contacts import ContactSet
-from wholebody.methods.newton.course import Course
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.keys import OBJECTIVE, Key
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
 from wholebody.methods.newton.objective import Objective
-from wholebody.methods.newton.system import System
+from wholebody.methods.newton.system import ActiveSystem, System
 from wholebody.methods.newton.terms import bound_equations, constraint_equations, goal_equations
 from wholebody.problem import Problem
 from wholebody.workspace import Workspace
@@ -26,7 +24,7 @@ HARD = Key("", False, False, 1.0)
 ONE_SIDED = Key("", False, True, 1.0)
 
 
-class FigureCourse(Course):
+class FigureSystem(ActiveSystem):
     """A problem's equations, at one posture after the other.
 
     After every step the posture is read off the bodies and the bodies are put where it has them, so that joints never

@@ -12,9 +12,9 @@ from collections.abc import Callable
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.methods.newton.course import Course
+from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra.base import SingularSystemError
-from wholebody.methods.newton.run import Run
+from wholebody.methods.newton.system import ActiveSystem
 
 ROUNDS = 40  # most of them
 LONGER, SHORTER = 1.3, 0.5  # what a step's share is multiplied by after a round that served, and one that did not
@@ -25,11 +25,13 @@ BACK = 6  # most Newton steps back to the equations
 ROUNDING = 1e-13  # relative change of the measures that says nothing
 
 
-def polish(course: Course, x: Array, measure: Callable[[Array], float], *, tolerance: float) -> tuple[Array, int]:
+def polish(
+    active_system: ActiveSystem, x: Array, measure: Callable[[Array], float], *, tolerance: float
+) -> tuple[Array, int]:
     """Lower the measures from x (7 n,), where all equations hold.
 
     Args:
-        course: the equations.
+        active_system: the equations.
         x: where to begin.
         measure: what the measures are at variables (7 n,).
         tolerance: of the equations; a round that moves nothing by more, metres and radians, is the last.
@@ -37,7 +39,7 @@ def polish(course: Course, x: Array, measure: Callable[[Array], float], *, toler
     Returns:
         The variables, and how many iterations it took.
     """
-    run = Run(course, x, FINER * tolerance, FINER * tolerance, "slack")
+    run = Iteration(active_system, x, FINER * tolerance, FINER * tolerance, "slack")
     run.iterate(BACK, goals=True, measures="keep")
     if not run.met:
         return x, 0
@@ -48,8 +50,8 @@ def polish(course: Course, x: Array, measure: Callable[[Array], float], *, toler
         except SingularSystemError:
             break
         length = share * run.length(step)
-        trial = course.retract(run.x + length * step)
-        if course.runs_into():
+        trial = active_system.retract(run.x + length * step)
+        if active_system.runs_into():
             run.begin(best)
             continue
         trial, length, free = run.shorten(trial, step, length)
