@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from presenting import DARK, LIGHT, OAK, STEEL, command_line
 
 import wholebody as wb
-from wholebody.bench import style
+from wholebody.bench import plot_style as style
 from wholebody.view.parts import Part, Parts
 
 GROUND, CRANK, COUPLER, ROCKER = 0.40, 0.12, 0.36, 0.28  # m: a crank-rocker, for 0.12 + 0.40 < 0.36 + 0.28

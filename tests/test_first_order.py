@@ -76,7 +76,7 @@ def test_an_answer_says_it_in_words_and_in_the_picture(planar_arm):
     with wb.Viewer(scene) as viewer:
         viewer.show(solution.q, problem=problem)
         composition: Composition = viewer._composition
-        moment = composition.moment(solution.q, problem, wb.assess(problem, solution.q).blockers)
+        moment = composition.keyframe(solution.q, problem, wb.assess(problem, solution.q).blockers)
     labels = [marker.text for marker, _ in moment.markers.values() if marker.text]
     assert any(text.startswith("in the way: link1 against block") for text in labels)
 

@@ -91,7 +91,7 @@ def test_the_ghost_moves(tmp_path: Path) -> None:
     ghost[:, 0] = 0.0, 0.1, 0.2
     with wb.Viewer(scene) as viewer:
         viewer.play(shown, 0.1, ghost=ghost)
-        tracks = viewer._stage.store.animation
+        tracks = viewer._graph.store.animation
         assert GHOST_NODE in str(tracks)
         with pytest.raises(wb.InputError, match="the ghost has 2 postures and the motion 3"):
             viewer.play(shown, 0.1, ghost=ghost[:2])

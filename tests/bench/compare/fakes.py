@@ -16,6 +16,8 @@ import wholebody as wb
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
 from wholebody.errors import InputError
+from wholebody.methods.base import SolvingTracker
+from wholebody.methods.control import Progress
 
 ARM = Path(__file__).parents[2] / "data" / "arm" / "arm.urdf"
 
@@ -61,7 +63,13 @@ class Fake:
     def name(self) -> str:
         return self.does
 
-    def solve(self, problem: wb.Problem) -> Any:
+    def accepts(self, problem: wb.Problem) -> None:
+        return None
+
+    def tracker(self, problem: wb.Problem, dt: float) -> SolvingTracker:
+        return SolvingTracker(self, problem, dt)
+
+    def solve(self, problem: wb.Problem, progress: Progress | None = None) -> Any:
         if self.does == "raises":
             raise ZeroDivisionError("by nothing")
         if self.does == "refuses":

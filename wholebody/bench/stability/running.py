@@ -9,6 +9,7 @@ from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.stability.answering import NOTHING, Answer, ask
 from wholebody.bench.stability.case import HardCase
 from wholebody.bench.stability.judging import Judged, judge
+from wholebody.compiled import compile_all
 from wholebody.runner import Child, EndedError, Job, allow, run_jobs, tell
 
 CAP = 20.0  # s: a method that has not answered by then, or has not made its next frame, hangs
@@ -50,6 +51,7 @@ def _warm() -> None:
     from wholebody.bench.stability.streams import ThinPlate
     from wholebody.methods.qp.method import QP
 
+    compile_all()
     question = ThinPlate().question()
     judged = QP().solve(question.problem)
     question.problem.scene.sweep(question.problem.start, judged.q)
