@@ -5,7 +5,7 @@ number. Whoever must give the same answer to the same question forgets these gue
 
 One thing coal remembers for the whole process: whether boxes are as large as they say, or 1 + 1e-10 times that. The
 first box that it looks at decides it, by whether the direction it looks in has a zero (coal 3.0.2, a static variable
-of its support function of boxes). `settle_boxes` is that first look.
+of its support functions of boxes: one for half-spaces, another for GJK). `settle_boxes` is that first look of each.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 
 import coal
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 REQUEST_STRIDE = 128  # bytes of a coal.DistanceRequest
@@ -43,9 +44,11 @@ class Guesses:
 
 def settle_boxes() -> None:
     """Have coal take boxes as large as they say in this process, whatever is asked of it later."""
-    aslant = coal.Halfspace(np.full(3, 3.0**-0.5), 0.0)
-    here = coal.Transform3s()
-    coal.distance(coal.Box(1.0, 1.0, 1.0), here, aslant, here, coal.DistanceRequest(), coal.DistanceResult())
+    direction = np.full(3, 3.0**-0.5)
+    turned = coal.Transform3s(pin.exp3(direction), np.full(3, 3.0))
+    here, box = coal.Transform3s(), coal.Box(1.0, 1.0, 1.0)
+    for other in (coal.Halfspace(direction, 0.0), coal.Ellipsoid(1.0, 1.0, 1.0)):
+        coal.distance(other, here, box, turned, coal.DistanceRequest(), coal.DistanceResult())
 
 
 def _views(requests: Any) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
