@@ -86,13 +86,14 @@ class Row:
 
 
 def constants(method: str) -> tuple[list[Constant], list[str]]:
-    """Constants of a method's modules, and modules whose constants are compiled in, so that they cannot be changed.
+    """Constants of a method but those of tracking, and modules whose constants are compiled in and cannot be changed.
 
     Args:
         method: name of a package of `wholebody.methods`.
     """
     package = import_module(f"wholebody.methods.{method}")
     names = [f"{package.__name__}.{found.name}" for found in pkgutil.walk_packages(package.__path__)]
+    names = [name for name in names if not name.endswith(".tracking")]  # no step is asked for here
     found: list[Constant] = []
     compiled: list[str] = []
     for name in (*names, *SHARED):

@@ -41,7 +41,7 @@ def restarts(
     start: Array,
     rng: np.random.Generator,
     count: int,
-    spreads: Sequence[float] = SPREADS,
+    spreads: Sequence[float] = (),
 ) -> Iterator[Array]:
     """Postures within limits, shape (nq,); farther and farther from the start as the spreads say, in turn.
 
@@ -51,12 +51,13 @@ def restarts(
         start: (nq,).
         rng: where the randomness comes from.
         count: how many.
-        spreads: share of each joint's range that each of them may leave the start by.
+        spreads: share of each joint's range that each of them may leave the start by; `SPREADS` where empty.
     """
     lower, upper = problem.scene.figure.tangent_bounds(start)
     span = np.where(np.isfinite(upper - lower), upper - lower, ROOT_SPREAD)
+    shares = spreads or SPREADS
     for number in range(count):
-        spread = spreads[number % len(spreads)]
+        spread = shares[number % len(shares)]
         yield _moved(problem, state, start, rng.uniform(-0.5, 0.5, len(span)) * spread * span)
 
 
