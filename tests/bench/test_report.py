@@ -16,7 +16,7 @@ from wholebody.bench.report import TEMPLATES, formatted, groups, quantile, rende
 
 @pytest.mark.parametrize("path", sorted(TEMPLATES.iterdir()), ids=lambda path: path.name)
 def test_every_template_can_be_read(path: Path) -> None:
-    report._environment().get_template(path.name)
+    assert report._environment().get_template(path.name).name == path.name
 
 
 @pytest.mark.parametrize("path", sorted(TEMPLATES.glob("*.md.jinja")), ids=lambda path: path.name)
