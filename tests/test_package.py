@@ -30,6 +30,8 @@ ROOMS = (
         "workspace",
         "scene",
         "tasks",
+        "term_plan",
+        "term_kernel",
         "linearisation",
         "problem",
         "first_order",

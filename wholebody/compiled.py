@@ -15,6 +15,8 @@ from typing import Any, TypeVar
 LOOPS = (
     "wholebody.geometry.contact_rows",
     "wholebody.geometry.continuous.moved_pairs",
+    "wholebody.geometry.proximity",
+    "wholebody.linearisation",
     "wholebody.methods.newton.linear_algebra.gram",
     "wholebody.methods.qp.active_set",
 )
