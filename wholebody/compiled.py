@@ -19,6 +19,7 @@ LOOPS = (
     "wholebody.linearisation",
     "wholebody.methods.newton.linear_algebra.gram",
     "wholebody.methods.qp.active_set",
+    "wholebody.methods.qp.subproblem",
 )
 """Modules with compiled loops; each has a function `compiled_kernel`, which makes them ready."""
 

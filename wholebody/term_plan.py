@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from wholebody import tasks
 from wholebody.arrays import Array
 from wholebody.errors import InputError
-from wholebody.figures.state import State, Wrench, extended_columns, joint_support
+from wholebody.figures.state import State, Wrench, extended_columns
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.distance import LEAST_CURVATURE
 from wholebody.tasks.inputs import WORLD, Place
@@ -186,14 +186,14 @@ def make_plan(
         for joint in range(model.njoints)
     ]
     columns = extended_columns(model)
-    support = joint_support(model)
-    joint_of = np.array([int(np.flatnonzero(column)[0]) for column in support.T], dtype=np.int64)
-    places = np.arange(support.shape[1]) if columns is None else columns
-    parts[COLUMN] = [((int(place), int(joint)), np.zeros(0)) for place, joint in zip(places, joint_of, strict=True)]
+    places = np.arange(len(state.column_joint)) if columns is None else columns
+    parts[COLUMN] = [
+        ((int(place), int(joint)), np.zeros(0)) for place, joint in zip(places, state.column_joint, strict=True)
+    ]
     floats, integers, layout = _packed(parts)
     return TermPlan(
-        floats, integers, layout, support.astype(np.int8), goal_rows, row - goal_rows, tuple(others), other_bounds,
-        other_measures, goal_entries,
+        floats, integers, layout, state.support.astype(np.int8), goal_rows, row - goal_rows, tuple(others),
+        other_bounds, other_measures, goal_entries,
     )  # fmt: skip
 
 

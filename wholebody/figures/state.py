@@ -43,6 +43,8 @@ class State:
         jacobian: (6, n) columns of the joints, world frame. n is nv, and one more for each degree of freedom of a joint
             that follows another (mimic): `folded` and `spread` translate.
         support: (njoints, n) 1 where a column moves a joint, else 0.
+        column_joint: (n,) the joint that a column belongs to.
+        parents: (njoints,) the joint that carries each joint.
     """
 
     def __init__(self, model: pin.Model) -> None:
@@ -52,6 +54,8 @@ class State:
         self.data = model.createData()
         self.q: Array = pin.neutral(model)
         self.support = joint_support(model)
+        self.parents: NDArray[np.intp] = np.array(list(model.parents), dtype=np.intp)
+        self.column_joint: NDArray[np.intp] = self.support.argmax(axis=0).astype(np.intp)
         self._columns = extended_columns(model)
         if self._columns is not None:
             self._fold = np.eye(model.nv)[self._columns]

@@ -17,7 +17,7 @@ from wholebody.methods.base import Method, goal_error, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem
+from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem, compiled_kernel
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
@@ -122,10 +122,7 @@ class QPTracker:
         self._alone = OneAtATime("tracker")
         self.workspace = problem.workspace()
         self._set_up()
-        table = self.workspace.table
-        self._moving = np.flatnonzero(table.joint > 0)
-        self._support = self.workspace.state.support[table.joint[self._moving]]
-        self._reach = table.reach[self._moving]
+        self._kernel = compiled_kernel()
 
     def step(self, q: Array, measures: bool = True) -> QPStep:
         """One step from q, shape (nq,); a posture out of limits is brought back first.
@@ -292,13 +289,8 @@ class QPTracker:
         The workspace's state is where the linearisation is.
         """
         state = self.workspace.state
-        twist = (self._support * state.spread(displacement)) @ state.jacobian.T
-        center = at.contacts.placements[self._moving, 3]
-        turn = twist[:, 3:]
-        shift = twist[:, :3].copy()
-        shift[:, 0] += turn[:, 1] * center[:, 2] - turn[:, 2] * center[:, 1]
-        shift[:, 1] += turn[:, 2] * center[:, 0] - turn[:, 0] * center[:, 2]
-        shift[:, 2] += turn[:, 0] * center[:, 1] - turn[:, 1] * center[:, 0]
-        angle = np.sqrt(np.einsum("ij,ij->i", turn, turn))
-        way = np.sqrt(np.einsum("ij,ij->i", shift, shift)) + angle * self._reach
-        return float(way.max(initial=0.0)), float(angle.max(initial=0.0))
+        way, turn = self._kernel.motion(
+            state.spread(displacement), state.jacobian.T, state.column_joint, state.parents, self.workspace.table.joint,
+            at.contacts.placements, self.workspace.table.reach,
+        )  # fmt: skip
+        return way, turn
