@@ -178,6 +178,7 @@ class Subproblem:
         damping: float,
         shift: Array,
         measures: bool,
+        gain: float = 1.0,
     ) -> QuadraticProgram:
         """The program of one step.
 
@@ -190,10 +191,11 @@ class Subproblem:
                 is asked for, how much of the squared error (Sugihara 2011, as in `DampedLeastSquares`).
             shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
             measures: whether the measures count; without them the nearest posture to the goals is sought.
+            gain: share of the way to the least measures that the step is to go.
         """
         numbers = np.array(
             [self.scale, LEAST_CURVATURE, PROXIMAL_SHARE, radius, 0.0 if pull is None else pull, damping, LEVER]
-            + [BOX * radius, PULL * radius]
+            + [BOX * radius, PULL * radius, gain]
         )
         columns = np.empty((4, len(at.gradient)))
         target, least = np.empty(len(rows.soft_error)), np.empty(len(rows.elastic_violation))
@@ -221,7 +223,7 @@ def compiled_kernel() -> Any:
     from wholebody.methods.qp import subproblem_kernel
 
     none, rows, index, pair = np.zeros(0), np.zeros((0, 1)), np.zeros(0, dtype=np.intp), np.zeros((2, 0))
-    one, number = np.ones(1), np.ones(9)
+    one, number = np.ones(1), np.ones(10)
     subproblem_kernel.sort_rows(
         none, rows, none, rows, none, rows, index, none, index, index, pair, none, FORCE, MOST_ROWS, rows, pair, rows,
         none, np.zeros((2, 0), dtype=np.intp),

@@ -132,12 +132,12 @@ def program(
     """The numbers of a program that are not rows, as `Subproblem.program` says.
 
     `numbers` are the scale of the measures, the least share of the largest curvature, the proximal share, the radius,
-    the pull, the damping, the lever, the size of the box and the largest violation asked for. `columns` (4, nv) is room
-    for diagonal, linear, lower and upper; `target` (m,) and `least` (k,) are room too.
+    the pull, the damping, the lever, the size of the box, the largest violation asked for and the gain. `columns` (4,
+    nv) is room for diagonal, linear, lower and upper; `target` (m,) and `least` (k,) are room too.
     """
     nv = len(gradient)
     scale, floor_share, proximal, radius = numbers[0], numbers[1], numbers[2], numbers[3]
-    pull, damping, lever, box, most = numbers[4], numbers[5], numbers[6], numbers[7], numbers[8]
+    pull, damping, lever, box, most, gain = numbers[4], numbers[5], numbers[6], numbers[7], numbers[8], numbers[9]
     largest = 0.0
     for i in range(nv):
         largest = max(largest, scale * curvature[i])
@@ -159,7 +159,7 @@ def program(
     for i in range(nv):
         entry = max(scale * curvature[i], floor)
         columns[1, i] = scale * gradient[i] if measures else 0.0
-        columns[0, i] = max(entry if measures else proximal * entry, abs(columns[1, i]) / radius)
+        columns[0, i] = max(entry / gain if measures else proximal * entry, abs(columns[1, i]) / radius)
         columns[2, i] = min(max(lower[i], -box), box)
         columns[3, i] = min(max(upper[i], -box), box)
     if pulls:

@@ -35,8 +35,9 @@ CUTS = 6  # times that a step is halved before it is given up
 OF_A_FRAME = 1e-4  # m, rad: to which the goals of a frame are met
 PROGRAMS = 3  # most of a frame; more = nearer to a goal that turns quickly, dearer frames where it cannot be met
 WORTH = 0.5  # share of the error that another program must leave at most for one more to follow
-DAMPING = (
-    0.3  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at what is in the way
+DAMPING = 1.0  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at obstacles
+SETTLING = (
+    0.3  # s: in which measures lessen by 1/e: longer = slower to settle, shorter = joints swing about the optimum
 )
 
 
@@ -76,6 +77,20 @@ class FrameStep(NamedTuple):
 
     q: Array
     iterations: int
+
+
+class _Before(NamedTuple):
+    """The step before.
+
+    Attributes:
+        q: (nq,) where it ended.
+        foreseen: (m,) errors of the goals and equalities there, to first order.
+        left: what it left of the way to the goals that it was to go, metres and radians: they are out of reach.
+    """
+
+    q: Array
+    foreseen: Array
+    left: float
 
 
 class QPTracker:
@@ -192,6 +207,9 @@ class QPTracker:
             displacement, share = self._looked_after(at, rows, program, displacement, share)
         self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
         following = pin.integrate(self.problem.scene.model, at.q, displacement)
+        gone = rows.soft @ displacement
+        left = gone[: rows.goals] - program.target[: rows.goals]
+        self._before = _Before(following.copy(), rows.soft_error + gone, float(np.sqrt(left @ left)))
         return QPStep(
             following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
             answer.iterations, answer.by, share,
@@ -201,8 +219,15 @@ class QPTracker:
         """Linearisation, rows, program and its answer at a posture (nq,)."""
         at = self._lineariser.at(q, self._query_distance)
         rows = self._subproblem.rows(at)
+        shift, damping, goals = np.zeros(len(rows.soft_error)), 0.0, rows.goals
+        before = self._before
+        if before is not None and np.array_equal(before.q, q):
+            # what held constraints miss, because the last step was curved, the next one will miss again
+            shift[goals:] = rows.soft_error[goals:] - before.foreseen[goals:]
+            error = float(np.linalg.norm(at.goal_error))
+            damping = DAMPING * min(1.0, before.left / max(error, 1e-12))
         program = self._subproblem.program(
-            at, rows, RADIUS, PULL * RADIUS, DAMPING, np.zeros(len(rows.soft_error)), measures
+            at, rows, RADIUS, PULL * RADIUS, damping, shift, measures, min(1.0, self.dt / SETTLING)
         )
         return at, rows, program, self._working_set.solve(program, rows.key)
 
@@ -263,6 +288,7 @@ class QPTracker:
         self._subproblem = Subproblem(problem, self.workspace.state)
         self._lineariser = problem.lineariser(self.workspace, self.dt)
         self._goals = self._signatures(problem.goals)
+        self._before: _Before | None = None
 
     def _renew(self) -> None:
         """Take what was replaced of the problem since the last step; where targets moved only, keep what is set up."""
