@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.compiled import compiled
@@ -44,7 +45,7 @@ def _integers(flat: Integers, layout: Integers, table: int) -> Integers:
 def linearise(
     joints: Array,
     columns: Array,
-    support: Array,
+    support: NDArray[np.int8],
     q: Array,
     floats: Array,
     integers: Integers,
@@ -118,7 +119,9 @@ def linearise(
 
 
 @compiled()
-def _row(wrench: Array, joint: int, against: int, columns: Array, support: Array, column: Integers, row: Array) -> None:
+def _row(
+    wrench: Array, joint: int, against: int, columns: Array, support: NDArray[np.int8], column: Integers, row: Array
+) -> None:
     """Add to a row (nv,) the rates at which a wrench works on the motion of a joint relative to another."""
     a, b, c, d, e, f = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5]
     for k in range(len(columns)):

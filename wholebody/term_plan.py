@@ -39,6 +39,8 @@ world; PLANE: joint; AXIS: joint, whether the target is a place; COORDINATE: pla
 """
 
 Integers: TypeAlias = NDArray[np.int64]
+Row: TypeAlias = tuple[tuple[int, ...], Array]
+"""Integers and floats of a row of a table."""
 
 
 class Entry(NamedTuple):
@@ -154,7 +156,7 @@ def make_plan(
         state: tells how many rows terms of other classes have; stays where it is.
     """
     model = state.model
-    parts: dict[int, list[tuple[tuple[int, ...], Array]]] = {table: [] for table in range(COLUMN + 1)}
+    parts: dict[int, list[Row]] = {table: [] for table in range(COLUMN + 1)}
     others: list[OtherTerm] = []
     row = 0
 
@@ -197,7 +199,7 @@ def make_plan(
     )  # fmt: skip
 
 
-def _packed(parts: dict[int, list[tuple[tuple[int, ...], Array]]]) -> tuple[Array, Integers, Integers]:
+def _packed(parts: dict[int, list[Row]]) -> tuple[Array, Integers, Integers]:
     layout = np.zeros((len(parts), 6), dtype=np.int64)
     floats: list[Array] = [np.zeros(0)]
     integers: list[int] = []
@@ -306,24 +308,22 @@ def coordinates(model: pin.Model) -> Integers:
     return places
 
 
-def _boxes(
-    bounds: Sequence[Bound], state: State, dt: float | None
-) -> tuple[list[tuple[tuple[int, ...], Array]], tuple[Bound, ...]]:
+def _boxes(bounds: Sequence[Bound], state: State, dt: float | None) -> tuple[list[Row], tuple[Bound, ...]]:
     """Bounds that are the same at every posture, as pairs of rows, and the others."""
     static = [bound for bound in bounds if type(bound) in (tasks.Freeze, tasks.StepLimit)]
-    rows = [((0,), np.array(side, dtype=float)) for bound in static for side in bound.bounds(state, dt)]
+    rows: list[Row] = [((0,), np.array(side, dtype=float)) for bound in static for side in bound.bounds(state, dt)]
     return rows, tuple(bound for bound in bounds if bound not in static)
 
 
 def _measures(
-    measures: Sequence[Measure], model: pin.Model, parts: dict[int, list[tuple[tuple[int, ...], Array]]]
+    measures: Sequence[Measure], model: pin.Model, parts: dict[int, list[Row]]
 ) -> tuple[tuple[Measure, ...], Array]:
     """Write the tables of measures; the measures of other classes, and the curvature (nv,) that is always the same."""
     others: list[Measure] = []
     curvature = np.zeros(model.nv)
     places = coordinates(model)
     for term in measures:
-        if type(term) in (tasks.Effort, tasks.Displacement) and term.distance.straight:
+        if isinstance(term, (tasks.Effort, tasks.Displacement)) and term.distance.straight:
             curvature += term.weight * term.distance.curvature
             for v in np.flatnonzero(term.distance.weights).tolist():
                 q = int(places[v])

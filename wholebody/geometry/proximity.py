@@ -168,7 +168,7 @@ class Proximity:
         """Placements (n, 4, 3) of the pieces with the joints as in `state`; see `Contacts.placements`."""
         pin.updateGeometryPlacements(self.table.model, state.data, self.geometry, self.results)
         if self._placements is not None:
-            return self._placements.copy()
+            return np.array(self._placements)
         return np.array([[*M.rotation.T, M.translation] for M in self.results.oMg], dtype=float).reshape(-1, 4, 3)
 
     def query(self, state: Kinematics, within: float) -> Contacts:
@@ -249,7 +249,7 @@ def compiled_kernel() -> Any:
     proximity_kernel.travel(placement, placement.copy(), one, one.copy())
     proximity_kernel.cull(placement, pairs, one, np.zeros((1, 3)), one, none, np.zeros((1, 3)), 0.0, index)
     proximity_kernel.gather(
-        distance_view(pin.StdVec_DistanceResult()), index, pairs, none, one, none, 0.0, 0.0, np.zeros((0, 10)), index,
+        np.zeros((0, 20))[:, :10], index, pairs, none, one, none, 0.0, 0.0, np.zeros((0, 10)), index,
         pairs,
     )  # fmt: skip
     proximity_kernel.mark(np.zeros((1, 1), dtype=bool, order="F"), pairs, index, index)

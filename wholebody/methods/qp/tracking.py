@@ -136,6 +136,7 @@ class QPTracker:
         self._query_distance = LEAST_WITHIN
         self._alone = OneAtATime("tracker")
         self.workspace = problem.workspace()
+        self._before: _Before | None = None
         self._set_up()
         self._kernel = compiled_kernel()
 
@@ -288,7 +289,7 @@ class QPTracker:
         self._subproblem = Subproblem(problem, self.workspace.state)
         self._lineariser = problem.lineariser(self.workspace, self.dt)
         self._goals = self._signatures(problem.goals)
-        self._before: _Before | None = None
+        self._before = None
 
     def _renew(self) -> None:
         """Take what was replaced of the problem since the last step; where targets moved only, keep what is set up."""
