@@ -32,6 +32,7 @@ ROOMS = (
         "tasks",
         "linearisation",
         "problem",
+        "all_pairs",
         "first_order",
         "assessment",
         "motion_assessment",
