@@ -1,8 +1,8 @@
 """What any method's answer is judged by, computed from the posture alone.
 
 Independent of every method: it looks at all pairs without culling and without memory of earlier postures, and takes
-contact normals' derivatives from Pinocchio's own joint Jacobians. Optimality and what stands in the way are computed when
-they are asked for.
+contact normals' derivatives from Pinocchio's own joint Jacobians. Optimality and what stands in the way are computed
+when they are asked for.
 """
 
 from __future__ import annotations
