@@ -34,6 +34,7 @@ ROOMS = (
         "term_kernel",
         "linearisation",
         "problem",
+        "all_pairs",
         "first_order",
         "assessment",
         "motion_assessment",

@@ -167,21 +167,22 @@ def _restored(model: pin.Model, q: Array) -> State:
 
 def joint_support(model: pin.Model) -> Array:
     """Which columns of the joint Jacobian move which joint: 0/1 array (njoints, n); the world's row is zero."""
-    support = np.zeros((model.njoints, sum(joint.nvExtended for joint in list(model.joints)[1:])))
+    parents, firsts, widths = (vector.tolist() for vector in (model.parents, model.idx_vExtendeds, model.nvExtendeds))
+    support = np.zeros((model.njoints, sum(widths)))
     for joint in range(1, model.njoints):
-        support[joint] = support[model.parents[joint]]
-        first = model.joints[joint].idx_vExtended
-        support[joint, first : first + model.joints[joint].nvExtended] = 1.0
+        support[joint] = support[parents[joint]]
+        support[joint, firsts[joint] : firsts[joint] + widths[joint]] = 1.0
     return support
 
 
 def extended_columns(model: pin.Model) -> NDArray[np.intp] | None:
     """Place in the tangent of each column of the joint Jacobian; None where no joint follows another."""
-    joints = list(model.joints)[1:]
-    if not any(joint.nv != joint.nvExtended for joint in joints):
+    widths, extended = model.nvs.tolist(), model.nvExtendeds.tolist()
+    if widths == extended:
         return None
-    columns = np.zeros(sum(joint.nvExtended for joint in joints), dtype=np.intp)
-    for joint in joints:
-        size = joint.nvExtended
-        columns[joint.idx_vExtended : joint.idx_vExtended + size] = np.arange(joint.idx_v, joint.idx_v + size)
+    places, first = model.idx_vs.tolist(), model.idx_vExtendeds.tolist()
+    columns = np.zeros(sum(extended), dtype=np.intp)
+    for joint in range(1, model.njoints):
+        size = extended[joint]
+        columns[first[joint] : first[joint] + size] = np.arange(places[joint], places[joint] + size)
     return columns
