@@ -30,23 +30,18 @@ def compiled(**options: Any) -> Callable[[F], F]:
     """Let numba compile a function at its first call, and keep the result.
 
     numba keeps it beside the file, or in the user's cache folder where that cannot be written to; NUMBA_CACHE_DIR names
-    another folder. Where no folder can be written to, every process compiles anew. What is kept is read back at once,
-    but for functions whose name begins with an underscore: only other loops call these, and have them in their code.
+    another folder. Where no folder can be written to, every process compiles anew.
 
     Args:
-        options: what `numba.njit` takes.
+        options: what `numba.njit` takes, such as error_model and fastmath.
     """
-    from numba import njit
-
+    loop_type = _loop_type()
     _watch()
 
     def decorate(function: F) -> F:
-        try:
-            loop: F = njit(function, cache=True, **options)
-        except RuntimeError:  # numba: cannot cache function, no locator available
-            return njit(function, **options)  # type: ignore[no-any-return]
-        if not function.__name__.startswith("_"):
-            _read_back(loop)
+        loop: F = loop_type(function, targetoptions={"nopython": True, "boundscheck": None, **options})
+        with suppress(RuntimeError):  # numba: cannot cache function, no locator available
+            loop.enable_caching()  # type: ignore[attr-defined]
         return loop
 
     return decorate
@@ -63,23 +58,26 @@ def compile_seconds() -> float:
     return _compiling["seconds"]
 
 
-def _read_back(loop: Any) -> None:
-    """Take what numba keeps of a function, for all kinds of arguments that it was compiled for.
+@lru_cache(maxsize=1)
+def _loop_type() -> Any:
+    """numba's kind of compiled function, but that what is kept is read back without all that compiling needs.
 
-    numba would do so at the first call, after it has loaded all that it can compile: 0.4 s of 0.5. It has no public
-    way to do without. Where its inner parts are not what is expected here, its own way remains.
+    numba loads its tables of types and functions first, which takes 0.4 of 0.5 s. What compiles loads them by itself.
     """
-    from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.caching import FunctionCache
+    from numba.core.registry import CPUDispatcher
     from numba.core.runtime import rtsys
 
-    with suppress(AttributeError, TypeError, KeyError), global_compiler_lock:
-        context, kept = loop.targetctx, loop._cache
-        rtsys.initialize(context)
-        for signature, *_ in kept._cache_file._load_index():
-            result = kept._load_overload(signature, context)
-            if result is not None:  # None: it was compiled for another processor
-                context.insert_user_function(result.entry_point, result.fndesc, [result.library])
-                loop.add_overload(result)
+    class Kept(FunctionCache):  # type: ignore[misc]
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            rtsys.initialize(target_context)
+            return self._load_overload(sig, target_context)
+
+    class Loop(CPUDispatcher):  # type: ignore[misc]
+        def enable_caching(self) -> None:
+            self._cache = Kept(self.py_func)
+
+    return Loop
 
 
 @lru_cache(maxsize=1)
