@@ -60,7 +60,7 @@ def compile_seconds() -> float:
 
 @lru_cache(maxsize=1)
 def _loop_type() -> Any:
-    """numba's kind of compiled function, but that what is kept is read back without all that compiling needs.
+    """A compiled function of numba, read back from what is kept without all that compiling needs.
 
     numba loads its tables of types and functions first, which takes 0.4 of 0.5 s. What compiles loads them by itself.
     """
