@@ -1,8 +1,8 @@
-"""First-order optimality of a posture, and what stands in its way: which limits, constraints and contacts push back.
+"""First-order optimality of a posture, and its blockers: the limits, constraints and contacts with large multipliers.
 
-At an optimum the objective's gradient is a combination of the gradients of everything at work, with signs where it
-works to one side only (Karush, Kuhn and Tucker). The combination is found by nonnegative least squares; what it leaves
-says how far from an optimum the posture is, and its largest parts say what is in the way.
+At an optimum the objective's gradient is a combination of the gradients of all active constraints, with nonnegative
+multipliers for inequalities (Karush, Kuhn and Tucker). Nonnegative least squares finds the combination. Its residual
+measures the distance from an optimum, and its largest parts are the blockers.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from wholebody.geometry.guesses import Guesses
 from wholebody.problem import Problem
 from wholebody.scene_geometry import SceneGeometry
 
-ACTIVE = 1e-4  # m, rad: nearer to its bound than this a constraint may push back
+ACTIVE = 1e-4  # m, rad: a constraint nearer to its bound than this counts as active
 FLAT = 1e-2  # share of the largest curvature below which a degree of freedom counts as having that much
-MET = 1e-4  # m, rad: goals nearer than this count as met, and what must hold as holding
-WORTH = 0.05  # share of the largest push from which on something counts as being in the way
+MET = 1e-4  # m, rad: goals with smaller errors count as met, and constraints with smaller violations as holding
+WORTH = 0.05  # share of the largest multiplier from which a constraint counts as a blocker
 
 
 @dataclass(frozen=True)
 class Blocker:
-    """Something that keeps a posture from a better one.
+    """A limit, constraint or contact that blocks a better posture.
 
     Attributes:
         kind: "contact" between two owners, "limit" of a joint, "bound" on a joint (as by `Freeze`), or "constraint".
         names: the two segments or objects; the joint; or the constraint as in "constraints[0], Hold".
-        share: how hard it pushes back, from 0 to 1 for the hardest.
-        violated: whether it does not hold here.
-        frame: of a constraint on one frame, its name.
+        share: its part of the gradient, relative to the strongest blocker, from 0 to 1.
+        violated: whether it is violated at the posture.
+        frame: name of the frame of a constraint on one frame.
     """
 
     kind: Literal["contact", "limit", "bound", "constraint"]
@@ -46,7 +46,7 @@ class Blocker:
     frame: str | None = None
 
     def __str__(self) -> str:
-        """Say it in words."""
+        """Describe it in words."""
         if self.kind == "contact":
             return f"{self.names[0]} against {self.names[1]}"
         return {"limit": "the limit of ", "bound": "the bound on ", "constraint": ""}[self.kind] + self.names[0]
@@ -56,7 +56,7 @@ Label = tuple[Literal["contact", "limit", "bound", "constraint"], tuple[str, ...
 
 
 class _Rows:
-    """Gradients of what is at work, with what each belongs to."""
+    """Gradients of active constraints, with their labels."""
 
     def __init__(self, nv: int) -> None:
         self.rows, self.labels = [np.zeros((0, nv))], list[Label]()
@@ -67,7 +67,7 @@ class _Rows:
 
 
 class AllPairs:
-    """All pairs of a scene, at one posture after the other; on data of its own, lent to one judgement at a time."""
+    """All pairs of a scene, at one posture at a time. It has its own data, and one assessment at a time uses it."""
 
     def __init__(self, built: SceneGeometry) -> None:
         """Allocate."""
@@ -78,14 +78,14 @@ class AllPairs:
         self._owners = built.owners
         moves = [piece.parentJoint for piece in self.geometry.geometryObjects]
         sides = [(moves[pair.first], moves[pair.second]) for pair in self.geometry.collisionPairs]
-        self._joints = np.array(sides, dtype=np.intp).reshape(-1, 2)  # that move the pieces of each pair; 0: none
+        self._joints = np.array(sides, dtype=np.intp).reshape(-1, 2)  # joints that carry the pieces of a pair; 0: none
 
     def move(self, q: Array) -> None:
-        """Measure all pairs at the posture q."""
+        """Compute the distances of all pairs at the posture q."""
         self.state.update(q)
-        with self._lock:  # not while a thing is moved, one piece after the other
+        with self._lock:  # not while a thing is being moved, piece by piece
             pin.updateGeometryPlacements(self.model, self.state.data, self.geometry, self.results)
-        self._guesses.forget()  # the judgement of a posture does not depend on the one before
+        self._guesses.forget()  # the assessment of a posture must not depend on the previous one
         pin.computeDistances(self.geometry, self.results)
         self.distance = np.array([result.min_distance for result in self.results.distanceResults])
         if np.isnan(self.distance).any():
@@ -93,7 +93,7 @@ class AllPairs:
         self.least = float(self.distance.min()) if len(self.distance) else float("inf")
 
     def gradients(self, problem: Problem, state: State) -> tuple[Array, list[int]]:
-        """Derivatives (k, nv) of the gaps of all pairs that push, at the corners of their patches; the pairs (k,)."""
+        """Derivatives (k, nv) of the gaps of all active pairs, at the corners of their patches; the pairs (k,)."""
         corners = [
             (pair, normal, point)
             for pair in np.flatnonzero(self.distance < problem.clearances + ACTIVE).tolist()
@@ -114,12 +114,12 @@ class AllPairs:
         return rows, numbers
 
     def label(self, pair: int) -> Label:
-        """What a collision pair is called."""
+        """Label of a collision pair."""
         index = self.geometry.collisionPairs[pair]
         return "contact", (self._owners[index.first], self._owners[index.second])
 
     def _patch(self, pair: int) -> list[tuple[Array, Array]]:
-        """Normal and place of the witness point and of the corners of the contact patch."""
+        """Normal and position of the witness point and of the corners of the contact patch."""
         result = self.results.distanceResults[pair]
         normal = np.array(result.normal)
         if np.linalg.norm(normal) < 0.5:
@@ -139,7 +139,7 @@ class AllPairs:
                     polygon = patch.getContactPatch(number)
                     places += [np.array(polygon.getPoint(i)) for i in range(polygon.size())]
             except (RuntimeError, ValueError):
-                pass  # coal has no patch for this pair of shapes; the witness point stands alone
+                pass  # coal has no patch for this pair of shapes; only the witness point is used
         return [(normal, place) for place in places]
 
     def _placed(self, pair: int) -> tuple[Any, Any, Any, Any]:
@@ -154,7 +154,7 @@ def _dense(part: Wrench | Array, state: State) -> Array:
 
 
 def optimality(problem: Problem, state: State, pairs: AllPairs) -> float:
-    """What is left of the objective's gradient after the best combination of all active gradients; see `Assessment`."""
+    """Residual of the objective's gradient after the best combination of all active gradients; see `Assessment`."""
     nv = state.model.nv
     goals = [(np.atleast_1d(goal.error(state)), _dense(goal.jacobian(state), state), goal) for goal in problem.goals]
     met = all(np.abs(error).max(initial=0.0) <= MET for error, _, _ in goals)
@@ -174,9 +174,9 @@ def optimality(problem: Problem, state: State, pairs: AllPairs) -> float:
 
 
 def blockers(problem: Problem, state: State, pairs: AllPairs) -> tuple[Blocker, ...]:
-    """What keeps a posture from meeting the goals, or from holding what must hold; the hardest first.
+    """The constraints that block the goals, or the repair of violations; the strongest first.
 
-    Where something does not hold, the violated things come first, by how much, then what pushes against mending them.
+    If something is violated, the violated constraints come first, ordered by violation, then those that block repair.
     """
     nv = state.model.nv
     signed, one_sided = _active(problem, state, pairs)
@@ -224,7 +224,7 @@ def _constraint(number: int, constraint: Any) -> Label:
 
 
 def _active(problem: Problem, state: State, pairs: AllPairs) -> tuple[_Rows, _Rows]:
-    """Gradients of everything at work: of what works to both sides, and of what only pushes one way."""
+    """Gradients of all active constraints: those of equalities, and those of inequalities."""
     nv = state.model.nv
     signed, one_sided = _Rows(nv), _Rows(nv)
     rows, numbers = pairs.gradients(problem, state)
@@ -255,7 +255,7 @@ def _of_joint(model: pin.Model, column: int, limited: bool) -> Label:
 
 
 def _balanced(objective: Array, signed: _Rows, one_sided: _Rows) -> tuple[Array, Array]:
-    """How hard each labelled row pushes against the objective's gradient (nv,), and what is left of it (nv,)."""
+    """The part of each labelled row in the objective's gradient (nv,), and the residual (nv,)."""
     from scipy.optimize import nnls
 
     equal, pushing = np.vstack(signed.rows), np.vstack(one_sided.rows)
