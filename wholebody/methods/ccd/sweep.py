@@ -145,8 +145,7 @@ def sweep(limbs: Limbs, aims: Aims, steps: Sequence[tuple[int, tuple[int, ...], 
 def within(best: float, lower: float, upper: float) -> float:
     """The allowed angle nearest to the best one on the circle: the same after whole turns, or the nearer limit.
 
-    The cost is a constant minus A cos - B sin of the angle, so it increases with the angular distance from the best
-    one.
+    The objective A cos + B sin, which is maximised, decreases with the angular distance from the best angle.
     """
     turns = ceil((lower - best) / TURN) if lower > -inf else floor((upper - best) / TURN)
     angle = best + TURN * turns
