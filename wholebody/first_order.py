@@ -1,8 +1,8 @@
-"""First-order optimality of a posture, and what stands in its way: which limits, constraints and contacts push back.
+"""First-order optimality of a posture, and its blockers: the limits, constraints and contacts with large multipliers.
 
-At an optimum the objective's gradient is a combination of the gradients of everything at work, with signs where it
-works to one side only (Karush, Kuhn and Tucker). The combination is found by nonnegative least squares; what it leaves
-says how far from an optimum the posture is, and its largest parts say what is in the way.
+At an optimum the objective's gradient is a combination of the gradients of all active constraints, with nonnegative
+multipliers for inequalities (Karush, Kuhn and Tucker). Nonnegative least squares finds the combination. Its residual
+measures the distance from an optimum, and its largest parts are the blockers.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from wholebody.arrays import Array, Mask
 from wholebody.figures.state import State, Wrench
 from wholebody.problem import Problem
 
-ACTIVE = 1e-4  # m, rad: nearer to its bound than this a constraint may push back
+ACTIVE = 1e-4  # m, rad: a constraint nearer to its bound than this counts as active
 FLAT = 1e-2  # share of the largest curvature below which a degree of freedom counts as having that much
 MET = 1e-4  # m, rad: goals nearer than this count as met, and what must hold as holding
 INDEPENDENT = 1e-9  # share of its length that a direction must have of its own to count as independent of others
@@ -32,14 +32,14 @@ WORTH = 0.05  # share of the largest push from which on something counts as bein
 
 @dataclass(frozen=True)
 class Blocker:
-    """Something that keeps a posture from a better one.
+    """A limit, constraint or contact that blocks a better posture.
 
     Attributes:
         kind: "contact" between two owners, "limit" of a joint, "bound" on a joint (as by `Freeze`), or "constraint".
         names: the two segments or objects; the joint; or the constraint as in "constraints[0], Hold".
-        share: how hard it pushes back, from 0 to 1 for the hardest.
-        violated: whether it does not hold here.
-        frame: of a constraint on one frame, its name.
+        share: its part of the gradient, relative to the strongest blocker, from 0 to 1.
+        violated: whether it is violated at the posture.
+        frame: name of the frame of a constraint on one frame.
     """
 
     kind: Literal["contact", "limit", "bound", "constraint"]
@@ -49,14 +49,14 @@ class Blocker:
     frame: str | None = None
 
     def __str__(self) -> str:
-        """Say it in words."""
+        """Describe it in words."""
         if self.kind == "contact":
             return f"{self.names[0]} against {self.names[1]}"
         return {"limit": "the limit of ", "bound": "the bound on ", "constraint": ""}[self.kind] + self.names[0]
 
 
 class _Rows:
-    """Gradients of what is at work, with what each belongs to."""
+    """Gradients of active constraints, with their labels."""
 
     def __init__(self, nv: int) -> None:
         self.rows, self.labels = [np.zeros((0, nv))], list[Label]()
@@ -132,7 +132,7 @@ def _optimality(problem: Problem, state: State, active: _Active) -> float:
 def _blockers(problem: Problem, state: State, near: NearPairs, clearances: Array) -> tuple[Blocker, ...]:
     """What keeps a posture from meeting the goals, or from holding what must hold; the hardest first.
 
-    Where something does not hold, the violated things come first, by how much, then what pushes against mending them.
+    If something is violated, the violated constraints come first, ordered by violation, then those that block repair.
     """
     nv = state.model.nv
     signed, one_sided, rows, numbers = _active(problem, state, near)

@@ -1,4 +1,4 @@
-"""Discomfort: away from neutral, and close to the limits."""
+"""Measure: discomfort, the distance of joints from neutral and their nearness to limits."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class LimitedJoints(NamedTuple):
     """The n joints that have two limits.
 
     Attributes:
-        idx_q: (n,) places in the posture.
-        idx_v: (n,) places in the tangent.
+        idx_q: (n,) indices in the posture.
+        idx_v: (n,) indices in the tangent vector.
         neutral: (n,) values in the neutral posture.
         weights: (n,) g over the squared range.
         limits: (2, n) upper, then lower limits.
@@ -52,7 +52,7 @@ class Discomfort(Measure):
     ``(sin(5 r + 1.571) / 2 + 1)^100`` is 4e17 at a limit, whereas the text says it goes from 0 to 1. And g
     are the figure's `effort_weights`, which rank the joints as table 3.3 does, over the greatest of them, in place of
     weights of 1 to 1e8 over 1e6: the stiffest joint over its whole range weighs as much as a joint at its limit. Beyond
-    a limit P stays 1, with no slope.
+    a limit P stays 1, with zero slope.
 
     Attributes:
         weight: factor on the measure.
@@ -67,7 +67,7 @@ class Discomfort(Measure):
         object.__setattr__(self, "weight", inputs.weight(self.weight, "Discomfort: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Discomfort:
-        """Take the limits, the neutral posture and the weights of the figure."""
+        """Read the limits, the neutral posture and the weights of the figure."""
         figure = scene.figure
         limits = figure.limits
         moves = (limits.upper > limits.lower) & np.isfinite(limits.upper - limits.lower)

@@ -21,16 +21,16 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution, TraceEntry
 from wholebody.workspace import Workspace
 
-STEP = 0.05  # rad, m: most that a joint or the root moves in one iteration
+STEP = 0.05  # rad, m: largest motion of a joint or the root in one iteration
 NEAR = 0.1  # m: pairs nearer than this have a row; placo's trigger
-SHARE = 0.5  # of the tolerance: to what everything is met, so that the judge, who rounds otherwise, agrees
+SHARE = 0.5  # of the tolerance, to which goals and constraints are met: the assessment rounds differently
 LET_IN = 0.4  # share of the tolerance by which pairs may be nearer than their clearance
-REST = 1e-2  # share of the tolerance: a step smaller than this has come to rest
+REST = 1e-2  # share of the tolerance: a smaller step counts as convergence
 COMFORT = 1e-2  # weight of the measures at the beginning, against goals of weight 1
 DECAY = 0.75  # of that weight from one iteration to the next; less ends sooner and with more effort
 LEAST = 1e-3  # share of the tolerance: least weight of the measures, which goals then miss by less than the tolerance
-REGULAR = 1e-3  # share of the measures' weight: what moving itself costs
-DAMPING = 1e-3  # what moving costs once a step goes back on the one before, against goals of weight 1
+REGULAR = 1e-3  # share of the measures' weight: weight of the motion itself
+DAMPING = 1e-3  # weight of the motion after a step opposed to the previous one, against goals of weight 1
 STIFFER, LOOSER = 4.0, 0.5  # factors on that, after another such step and after any other
 MOST_DAMPING = 10.0
 
@@ -39,12 +39,13 @@ MOST_DAMPING = 10.0
 class Placo:
     """placo's `KinematicsSolver`, by its documented tasks, iterated.
 
-    Goals are soft tasks, holds hard ones; joint limits and its self-collision constraint, to whose model the objects
-    are added, are hard too; the measures are joints tasks whose weight fades. An iteration is one of its programs.
+    Goals are soft tasks and holds hard ones. Joint limits and placo's self-collision constraint, whose model includes
+    the objects, are hard too. The measures are joints tasks with decreasing weight. An iteration is one of its
+    programs.
 
     Takes Point, Frame, Orientation, Axis(direction=...), CenterOfMass, Posture and Relative goals; Hold, Plane with
-    side "on", Balance and Freeze; Effort and Displacement. Everything else is refused by name. There is one
-    start. Where placo finds no solution of a program, the posture before it is the answer, with placo's words.
+    side "on", Balance and Freeze; Effort and Displacement. All other terms are refused by name. There is one
+    start. If placo finds no solution of a program, the answer is the posture before it, and the message quotes placo.
 
     Attributes:
         tolerance: metres and radians to which goals and constraints are met.
@@ -72,12 +73,12 @@ class Placo:
         return "placo"
 
     def accepts(self, problem: Problem) -> str | None:
-        """None where placo has classes for all terms and joints; else the sentence that names what it has none for."""
+        """None if placo has classes for all terms and joints; otherwise the sentence that names the others."""
         check_problem(problem, "Placo.accepts: problem")
         return refusal(self.name, unsupported(problem))
 
     def prepare(self, problem: Problem) -> None:
-        """Build placo's robot for a problem; `solve` does it where this was not called.
+        """Build placo's robot for a problem; `solve` does it if this was not called.
 
         Raises:
             InputError: placo cannot express the problem, or its scene changed after it was stated.
@@ -91,7 +92,7 @@ class Placo:
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
 
         Args:
-            problem: what is asked.
+            problem: the problem.
             progress: see `wholebody.methods.control.Progress`.
 
         Raises:
@@ -114,22 +115,22 @@ class Placo:
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
-        """What follows the goals of a problem by solving every step anew.
+        """A tracker that solves the problem anew at every step.
 
         Raises:
-            InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
+            InputError: dt is not a positive finite number, or the scene changed after the problem was made.
         """
         return SolvingTracker(self, problem, dt)
 
 
 class _Room:
-    """Where the robot that one solve built waits for the next one on the same scene, which may be about the same."""
+    """Keeps the robot of one solve for the next solve on the same scene, which may have a similar problem."""
 
     def __init__(self) -> None:
         self._robot: Robot | None = None
 
     def robot(self, problem: Problem, workspace: Workspace) -> Robot:
-        """Placo's robot for a problem, with things where the workspace sees them."""
+        """The robot for a problem, with the placements of things in the workspace."""
         refused = unsupported(problem)
         if refused:
             raise UnsupportedTermError("placo", refused)
@@ -145,9 +146,9 @@ class _Run:
 
     Attributes:
         q: (nq,) the present posture.
-        programs: how many were solved.
-        rested: whether it ended because nothing moves any more.
-        failure: placo's words where it found no solution.
+        programs: number of solved programs.
+        rested: whether it converged: nothing moves any more.
+        failure: placo's message if it found no solution.
     """
 
     def __init__(self, problem: Problem, workspace: Workspace, robot: Robot, method: Placo, control: Control) -> None:
@@ -167,13 +168,13 @@ class _Run:
         self._solver.enable_joint_limits(True)
         self._solver.enable_velocity_limits(True)
         apart = self._solver.add_avoid_self_collisions_constraint()
-        # rounding alone makes a held foot on a floor infeasible
+        # without it, rounding makes a held foot on a floor infeasible
         apart.self_collisions_margin = -SWELL - LET_IN * method.tolerance
         apart.self_collisions_trigger = NEAR - SWELL
         apart.configure("apart", "hard", 1.0)
 
     def go(self) -> None:
-        """TraceEntry until everything is met, nothing moves, placo gives up or the programs run out."""
+        """Iterate until everything is met, nothing moves, placo fails or the programs run out."""
         method, model = self._method, self._problem.scene.model
         step = 0.0
         while True:
@@ -215,7 +216,7 @@ class _Run:
         return bool((near.distance >= clearances[near.number] - tolerance - COAL_ACCURACY).all())
 
     def _program(self) -> Array | None:
-        """Displacement (nv,) by one of placo's programs, or None where it has no solution."""
+        """Displacement (nv,) from one of placo's programs, or None if it has no solution."""
         weight = max(COMFORT * DECAY**self.programs, LEAST * self._method.tolerance)
         self._tasks.weigh(weight)
         self._regular.set_weight(max(REGULAR * weight, self._damping))
