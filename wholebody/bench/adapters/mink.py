@@ -13,15 +13,14 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
-from wholebody.bench.adapters.loop import GAIN, NEAR, STEP, Loop, StepError, Stepper, kept_apart, pulls
+from wholebody.bench.adapters.loop import GAIN, NEAR, STEP, Loop, Stepper, kept_apart, pulls
 from wholebody.bench.adapters.mjcf import ROOT, mjcf
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
+from wholebody.methods.differential import StepError
 from wholebody.problem import Problem
 from wholebody.tasks import (
     Axis,
     CenterOfMass,
-    Displacement,
-    Effort,
     Frame,
     Freeze,
     Hold,
@@ -29,7 +28,6 @@ from wholebody.tasks import (
     Point,
     Posture,
     Relative,
-    StepLimit,
 )
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
@@ -42,6 +40,7 @@ def mink_adapter() -> Adapter:
     return Adapter(
         name="mink",
         make=MinkLoop,
+        prepare=MinkLoop.prepare,
         loose=(*few(5, 10, 20), *LADDER),
         setup="mink.solve_ik on a MuJoCo model made from ours, with DAQP: FrameTask, RelativeFrameTask, AxisAlignTask, "
         "LookAtTask, ComTask and PostureTask (posture and measures, with a weight that fades) as soft tasks, whole "
@@ -63,20 +62,14 @@ class MinkLoop(Loop):
     """Steps of mink."""
 
     name = "mink"
-
-    def takes(self, term: Any) -> str | None:
-        """What mink has a task for."""
-        if isinstance(term, Hold):
-            return None if term.orientation else "its hard tasks hold whole frames"
-        kinds = (Point, Frame, Orientation, Axis, CenterOfMass, Posture, Relative, Freeze, StepLimit, Effort)
-        return None if isinstance(term, (*kinds, Displacement)) else ""
+    kinds = (*Loop.kinds, Axis)
 
     def build(self, problem: Problem) -> Stepper:
         """Write the model."""
         return _MinkStepper(problem)
 
 
-class _MinkStepper(Stepper):
+class _MinkStepper:
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         self._sites: dict[str, tuple[int, Any]] = {}

@@ -13,21 +13,16 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
-from wholebody.bench.adapters.loop import GAIN, STEP, Loop, StepError, Stepper, kept_apart, pulls
+from wholebody.bench.adapters.loop import GAIN, STEP, Loop, Stepper, kept_apart, pulls
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
+from wholebody.methods.differential import StepError
 from wholebody.problem import Problem
 from wholebody.tasks import (
     CenterOfMass,
-    Displacement,
-    Effort,
-    Frame,
     Freeze,
     Hold,
-    Orientation,
     Point,
     Posture,
-    Relative,
-    StepLimit,
 )
 from wholebody.tasks.residuals import PlacementResidual
 
@@ -42,6 +37,7 @@ def pink_adapter() -> Adapter:
     return Adapter(
         name="pink",
         make=PinkLoop,
+        prepare=PinkLoop.prepare,
         loose=(*few(5, 10, 20), *LADDER),
         setup="pink.solve_ik on our own Pinocchio model, with DAQP: FrameTask, RelativeFrameTask, ComTask and "
         "LinearHolonomicTask (posture and measures, with a weight that fades) as soft tasks, whole holds and frozen "
@@ -66,19 +62,12 @@ class PinkLoop(Loop):
 
     name = "pink"
 
-    def takes(self, term: Any) -> str | None:
-        """What pink has a task for."""
-        if isinstance(term, Hold):
-            return None if term.orientation else "its hard tasks hold whole frames"
-        kinds = (Point, Frame, Orientation, CenterOfMass, Posture, Relative, Freeze, StepLimit, Effort, Displacement)
-        return None if isinstance(term, kinds) else ""
-
     def build(self, problem: Problem) -> Stepper:
         """Copy our models."""
         return _PinkStepper(problem)
 
 
-class _PinkStepper(Stepper):
+class _PinkStepper:
     def __init__(self, problem: Problem) -> None:
         from pink.limits import FloatingBaseVelocityLimit
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.assessment import Assessment, assess
-from wholebody.bench.adapters.base import Adapter, Budget, set_up
+from wholebody.bench.adapters.base import Adapter, Budget
 from wholebody.bench.compare.record import ANSWERED, DEFAULT, FAILED, REFUSED, Record
 from wholebody.bench.problem_sets.case import Case, ProblemSet
 from wholebody.compiled import compile_all
@@ -111,7 +111,7 @@ def solve(adapter: Adapter, level: Budget, made: Ready) -> Record:
         moving = bool(made.case.frames)
         problem = copy.copy(made.case.problem) if moving else made.case.problem  # each moves the goals of its own copy
         began = time.perf_counter()
-        set_up(method, problem)
+        adapter.prepare(method, problem)
         empty = replace(empty, setup_seconds=time.perf_counter() - began, best=made.best)
         gc.disable()
         if moving:

@@ -11,8 +11,7 @@ from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.report import render
 from wholebody.bench.stability.case import Kind
 from wholebody.bench.stability.pictures import Drawn
-from wholebody.bench.stability.rows import Result
-from wholebody.bench.stability.verdict import SYMBOLS, WORDS, Verdict
+from wholebody.bench.stability.verdict import SYMBOLS, WORDS, Result, Verdict
 
 CHART = "stability.svg"
 

@@ -10,9 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.bench.stability.answering import Answer
-from wholebody.bench.stability.case import HardCase, Nonsense, Stream
-from wholebody.bench.stability.rows import Result
+from wholebody.bench.stability.case import Answer, HardCase, Nonsense, Stream
+from wholebody.bench.stability.verdict import Result
 from wholebody.files import Scratch
 from wholebody.problem import Problem
 from wholebody.tasks import Point
@@ -97,7 +96,7 @@ def _failing(case: HardCase, result: Result) -> list[str]:
 
 def _picture(case: HardCase, answer: Answer | None, index: int | None, path: Path, screenshots: Screenshots) -> Path:
     """Draw one posture of an answer; the one that the case wants shown where `index` is None."""
-    question = case.drawn()
+    question = (case.drawn or case.question)()
     problem = question.problem
     if index is None:
         index = question.shown % len(question.frames) if isinstance(question, Stream) else 0
