@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench import plot_style
 from wholebody.bench.chains import TIP, chain, task
-from wholebody.bench.problem_sets import balance, clutter
+from wholebody.bench.problem_sets.registry import SETS
 from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
 from wholebody.problem import Problem
@@ -75,13 +75,9 @@ class DetailRow:
 def rows(cases: int, seed: int) -> Iterator[DetailRow | str]:
     """Measure every case with every model; a sentence where a model cannot be asked."""
     figures = {detail: wb.load("human", detail=detail) for detail in DETAILS}
-    sets: dict[str, Callable[[int, int], Problem]] = {
-        "clutter": lambda number, seed: clutter.make(number, seed).problem,
-        "whole body": lambda number, seed: balance.make(number, seed).problem,
-    }
-    for name, make in sets.items():
+    for name, family in (("clutter", SETS["clutter"]), ("whole body", SETS["balance"])):
         for number in range(cases):
-            given, models = make(number, seed), {}
+            given, models = family.make(number, seed).problem, {}
             for detail, figure in figures.items():
                 try:
                     models[detail] = _with(figure, given)

@@ -15,7 +15,7 @@ import numpy as np
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.problem_sets.bodies import CLEARANCE, TIPS
-from wholebody.bench.problem_sets.clutter import THINGS, reach_among
+from wholebody.bench.problem_sets.reaching import THINGS, reach_among
 from wholebody.bench.report import render
 
 

@@ -79,8 +79,8 @@ def _check_page(arguments: argparse.Namespace) -> None:
 
 
 def _asked(cases: Sequence[HardCase], adapters: Sequence[Adapter], jobs: int) -> Result:
-    from wholebody.bench.stability.verdict import result
     from wholebody.bench.stability.asking import run as ask_all
+    from wholebody.bench.stability.verdict import result
 
     cells = []
     with _bar() as bar:
