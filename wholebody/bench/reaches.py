@@ -17,6 +17,7 @@ from wholebody.arrays import Array
 from wholebody.bench.problem_sets.bodies import CLEARANCE, TIPS
 from wholebody.bench.problem_sets.reaching import THINGS, reach_among
 from wholebody.bench.report import render
+from wholebody.bench.tables import filled
 
 
 @dataclass(frozen=True)
@@ -30,22 +31,15 @@ class Reach:
 
 @dataclass(frozen=True)
 class ReachRow:
-    """What came of one reach.
+    """What came of one reach; errors as judged independently, in m and rad.
 
     Attributes:
         seed: what it was made from.
-        solver: of the QP method.
-        status: as the method said.
         how: "directly", "by homotopy", "from another start", or the message of what was not solved.
-        milliseconds: of the solve.
-        iterations: of the method.
-        goal_error: distance left, as judged independently [m].
-        penetration: deepest overlap, as judged [m].
-        clearance_violation: by how much the worst pair misses its clearance, as judged [m].
-        limit_violation: as judged [rad].
-        constraint_violation: of the feet, as judged [m, rad].
-        measure: effort of the answer.
-        witness_measure: effort of the witness.
+        penetration: deepest overlap.
+        clearance_violation: by how much the worst pair misses its clearance.
+        constraint_violation: of the feet.
+        measure, witness_measure: effort of the answer and of the witness.
     """
 
     seed: int
@@ -84,20 +78,14 @@ def solve_reach(seed: int, solver: str, figure: wb.Figure | None = None) -> Reac
     made = reach(seed, figure)
     solution = wb.QP(solver=solver).solve(made.problem)
     judged = wb.assess(made.problem, solution.q)
-    how = solution.message.removeprefix("solved ")
-    return ReachRow(
+    return filled(
+        ReachRow,
+        solution,
+        judged,
         seed=seed,
         solver=solver,
-        status=solution.status,
-        how=how,
+        how=solution.message.removeprefix("solved "),
         milliseconds=1e3 * solution.seconds,
-        iterations=solution.iterations,
-        goal_error=judged.goal_error,
-        penetration=judged.penetration,
-        clearance_violation=judged.clearance_violation,
-        limit_violation=judged.limit_violation,
-        constraint_violation=judged.constraint_violation,
-        measure=judged.measure,
         witness_measure=wb.assess(made.problem, made.witness).measure,
     )
 

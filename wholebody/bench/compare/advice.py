@@ -12,7 +12,6 @@ from wholebody.bench.compare.paired import Ratio, named
 from wholebody.bench.compare.record import FLOOR
 from wholebody.bench.compare.results import EFFORT_FLOOR, Results, middle
 from wholebody.bench.compare.summary import GOOD, Summary
-from wholebody.bench.intervals import wilson
 from wholebody.bench.report import words
 
 NOTHING = Ratio(nan, 0.0, inf, 0)
@@ -172,10 +171,12 @@ def _in_doubt(results: Results, ranked: Sequence[Standing]) -> str:
 
 def _warning(standing: Standing, rows: Sequence[Summary]) -> list[str]:
     """That a method is not enough, if in no set so many problems that it might be dependable after all are solved."""
+    from scipy.stats import binomtest
+
     mine = [row for row in rows if row.method == standing.method and row.refused < row.cases]
     for row in mine:
-        count = row.cases - row.refused
-        if not row.refused and wilson(round(row.success * count), count)[1] >= GOOD:
+        solved = binomtest(round(row.success * row.cases), row.cases) if not row.refused else None
+        if solved is not None and solved.proportion_ci(method="wilson").high >= GOOD:
             return []
     best = max(mine, key=lambda row: row.success)
     deep = f", and ends up to {standing.deepest_mm:.0f} mm inside of things" if standing.deepest_mm > 1.0 else ""

@@ -25,6 +25,12 @@ from wholebody.runner import allow
 
 BUILDING = 120.0  # s: to build a case and what belongs to its scene; compiling once included
 FRAME_CAP = 0.1  # s: most for a frame, on the average, where goals move; slower than that nobody drags
+JUDGED = (
+    "goal_error", "goal_angle", "penetration", "clearance_violation", "limit_violation", "constraint_violation",
+    "measure", "optimality",
+)  # fmt: skip
+"""Figures of a judgement that records have too."""
+
 GLIMPSE = 3  # frames of a moving case that a method sees before it is timed
 
 
@@ -161,14 +167,4 @@ def _once(method: Any, problem: Problem, empty: Record) -> Record:
 
 def judged(record: Record, judgement: Assessment) -> Record:
     """The record with the figures of a judgement."""
-    return replace(
-        record,
-        goal_error=judgement.goal_error,
-        goal_angle=judgement.goal_angle,
-        penetration=judgement.penetration,
-        clearance_violation=judgement.clearance_violation,
-        limit_violation=judgement.limit_violation,
-        constraint_violation=judgement.constraint_violation,
-        measure=judgement.measure,
-        optimality=judgement.optimality,
-    )
+    return replace(record, **{name: getattr(judgement, name) for name in JUDGED})

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from wholebody.bench.stability.asking import Cell
 from wholebody.bench.stability.case import Answer, HardCase, Kind
 from wholebody.bench.stability.judging import INSIDE, Judged
+from wholebody.bench.tables import filled
 
 BEYOND = 1e-6  # rad, m: farther than this is out of limits
 BROKEN = 1e-4  # m, rad: farther than this a constraint does not hold
@@ -245,11 +246,11 @@ class Result:
 
     def _row(self, case: HardCase, method: str) -> StabilityRow:
         cell, verdict = self.cells[case.name, method], self.verdicts[case.name, method]
-        answer, judged = cell.answer, cell.judged
-        return StabilityRow(
-            case.name, method, verdict.kind, verdict.acceptable, verdict.figure, answer.status, judged.goal_error,
-            self.best.get(case.name, float("nan")), judged.penetration, judged.limit_violation,
-            judged.constraint_violation, len(answer.postures), answer.seconds, answer.refusal or answer.message,
+        answer = cell.answer
+        return filled(
+            StabilityRow, verdict, answer, cell.judged, case=case.name, method=method, verdict=verdict.kind,
+            best=self.best.get(case.name, math.nan), frames=len(answer.postures),
+            sentence=answer.refusal or answer.message,
         )  # fmt: skip
 
 

@@ -23,10 +23,10 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure steps."""
-    from wholebody.bench import charts, step_profile
+    from wholebody.bench import charts
     from wholebody.bench.adapters import chosen_tools, differences
     from wholebody.bench.machine import machine
-    from wholebody.bench.step import goal_lines, measure, step_report
+    from wholebody.bench.step import goal_lines, linearise_us, measure, step_report
     from wholebody.bench.tables import write_rows
     from wholebody.bench.track import VARIANTS, track
 
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
         rows += measured
         times += timed
         if "wholebody/osqp" in tools:
-            shares[name] = step_profile.linearise_us(course, "osqp")
+            shares[name] = linearise_us(course, "osqp")
     report = step_report(rows, facts, {name: differences(name) for name in tools}, shares)
     write_rows(arguments.out / "step.csv", facts, rows)
     write_rows(arguments.out / "step-times.csv", facts, times)
