@@ -36,22 +36,18 @@ INSIDE = 1e-4  # m: deeper than this an answer is inside something
 
 @dataclass(frozen=True)
 class DetailRow:
-    """One case by one model.
+    """One case by one model; what an answer gets wrong is judged in the finest model.
 
     Attributes:
         task: "clutter", "whole body" or "arm".
-        case: its number.
         detail: "spheres", "capsules", "hulls", or "own" for a robot.
         level: what was left out.
         freedoms, pairs: of the model that was solved.
         status: of the answer, as its own model says.
-        solve_ms: the solve without its judgement, the faster of two, by the clock [ms].
-        judge_ms: the judgement, by the clock [ms].
-        prepare_ms: to leave out what is left out [ms].
-        penetration_mm: how deep the answer is inside something in the finest model [mm].
-        lack_mm: by how much the worst pair misses its clearance there [mm].
-        goal_error_mm: what is left to the goals [mm].
-        effort: of the answer.
+        solve_ms, judge_ms: the solve without its judgement, and the judgement, the faster of two, by the clock.
+        prepare_ms: to leave out what is left out.
+        lack_mm: by how much the worst pair misses its clearance.
+        goal_error_mm: what is left to the goals.
         above: effort above the finest model's own answer, as a share of it; nan where that one was not solved.
     """
 
@@ -157,10 +153,10 @@ class Summary(NamedTuple):
     task: str
     detail: str
     level: str
-    freedoms: int
-    pairs: int
     cases: int
     solved: int
+    freedoms: int
+    pairs: int
     solve_ms: float
     judge_ms: float
     prepare_ms: float
@@ -178,19 +174,20 @@ def summaries(rows: Sequence[DetailRow]) -> list[Summary]:
     for name, kind, level in dict.fromkeys((row.task, row.detail, row.level) for row in rows):
         mine = [row for row in rows if (row.task, row.detail, row.level) == (name, kind, level)]
         solved = [row for row in mine if row.status == "solved"]
-        above = [row.above for row in solved if np.isfinite(row.above)]
+        above = [row.above for row in solved if np.isfinite(row.above)] or [float("nan")]
+        middles: dict[str, Any] = {
+            each: np.median([getattr(row, each) for row in mine]) for each in Summary._fields[5:10]
+        }
+        sizes: dict[str, Any] = {each: int(middles.pop(each)) for each in ("freedoms", "pairs")}
+        worst: dict[str, Any] = {
+            f"worst_{each}": max((getattr(row, each) for row in solved), default=0.0)
+            for each in ("penetration_mm", "lack_mm", "goal_error_mm")
+        }
+        inside = sum(row.penetration_mm > 1e3 * INSIDE for row in solved)
         found.append(
             Summary(
-                name, kind, level, int(np.median([row.freedoms for row in mine])),
-                int(np.median([row.pairs for row in mine])), len(mine), len(solved),
-                float(np.median([row.solve_ms for row in mine])), float(np.median([row.judge_ms for row in mine])),
-                float(np.median([row.prepare_ms for row in mine])),
-                sum(row.penetration_mm > 1e3 * INSIDE for row in solved),
-                max((row.penetration_mm for row in solved), default=0.0),
-                max((row.lack_mm for row in solved), default=0.0),
-                max((row.goal_error_mm for row in solved), default=0.0),
-                float(np.median(above)) if above else float("nan"),
-                max(above, default=float("nan")),
+                name, kind, level, len(mine), len(solved), **sizes, **middles, **worst, inside=inside,
+                above=float(np.median(above)), worst_above=max(above),
             )
         )  # fmt: skip
     return found

@@ -212,7 +212,7 @@ def agreement_rows(repeats: int) -> list[AgreementRow]:
         times = [1e-3 * median_us(partial(method.solve, problem), max(3, repeats // 30)) for method in (ours, theirs)]
         apart = float(np.abs(pin.difference(problem.scene.model, ends[0].q, ends[1].q)).max())
         least = [end.assessment.measure for end in ends]
-        rows.append(AgreementRow(case, *times, apart, abs(least[0] - least[1]) / least[1]))
+        rows.append(AgreementRow(case, times[0], times[1], apart, abs(least[0] - least[1]) / least[1]))
     return rows
 
 

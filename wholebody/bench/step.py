@@ -16,10 +16,9 @@ from wholebody.bench import track as setting
 from wholebody.bench.adapters import make_tool
 from wholebody.bench.adapters.base import Tool
 from wholebody.bench.adapters.own import WholebodyTool
-from wholebody.bench.judge import Verdict, judge
 from wholebody.bench.report import render
 from wholebody.bench.tables import filled
-from wholebody.bench.track import CLEARANCE, DT, Track
+from wholebody.bench.track import CLEARANCE, DT, Track, Verdict, judge
 
 REFERENCE = "placo"
 JUDGED = ("free", "contact")  # reaches for which a figure was asked
