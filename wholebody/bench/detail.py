@@ -175,10 +175,8 @@ def summaries(rows: Sequence[DetailRow]) -> list[Summary]:
         mine = [row for row in rows if (row.task, row.detail, row.level) == (name, kind, level)]
         solved = [row for row in mine if row.status == "solved"]
         above = [row.above for row in solved if np.isfinite(row.above)] or [float("nan")]
-        middles: dict[str, Any] = {
-            each: np.median([getattr(row, each) for row in mine]) for each in Summary._fields[5:10]
-        }
-        sizes: dict[str, Any] = {each: int(middles.pop(each)) for each in ("freedoms", "pairs")}
+        sizes: dict[str, Any] = {each: int(_median(mine, each)) for each in ("freedoms", "pairs")}
+        times: dict[str, Any] = {each: _median(mine, each) for each in ("solve_ms", "judge_ms", "prepare_ms")}
         worst: dict[str, Any] = {
             f"worst_{each}": max((getattr(row, each) for row in solved), default=0.0)
             for each in ("penetration_mm", "lack_mm", "goal_error_mm")
@@ -186,11 +184,15 @@ def summaries(rows: Sequence[DetailRow]) -> list[Summary]:
         inside = sum(row.penetration_mm > 1e3 * INSIDE for row in solved)
         found.append(
             Summary(
-                name, kind, level, len(mine), len(solved), **sizes, **middles, **worst, inside=inside,
+                name, kind, level, len(mine), len(solved), **sizes, **times, **worst, inside=inside,
                 above=float(np.median(above)), worst_above=max(above),
             )
         )  # fmt: skip
     return found
+
+
+def _median(rows: Sequence[DetailRow], name: str) -> float:
+    return float(np.median([getattr(row, name) for row in rows]))
 
 
 def chart(rows: Sequence[DetailRow], path: Path) -> tuple[Path, Path]:

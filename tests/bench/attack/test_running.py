@@ -14,8 +14,7 @@ from wholebody.bench.attack import running
 from wholebody.bench.attack.case import KINDS, PATTERN, SCRIPT, Case, Verdict, Written, kind_of
 from wholebody.bench.attack.mutations import mutated
 from wholebody.bench.attack.report import Row, keep, percentiles, report
-from wholebody.bench.attack.running import Ended, attack
-from wholebody.bench.attack.writing import write
+from wholebody.bench.attack.running import Ended, attack, write
 from wholebody.errors import UnknownNameError
 from wholebody.runner import Child
 

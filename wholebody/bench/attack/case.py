@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -11,6 +12,9 @@ import numpy as np
 Outcome = Literal["right", "refused", "gave up", "wrong"]
 
 SCRIPT = "repeat.py"
+CORPUS = Path(__file__).parent / "corpus"
+"""Small files of every kind that people give to the package, each right as it stands, and calls that are right."""
+
 PATTERN = (
     ("file", "solve", "file", "argument") * 4
     + ("file", "sweep", "file", "solve") * 3

@@ -27,7 +27,7 @@ INDEX = "README.md"
 UNWRITTEN = '''"""A case that cannot be written."""
 
 from wholebody.bench.attack.case import Case
-from wholebody.bench.attack.writing import write
+from wholebody.bench.attack.running import write
 
 write(Case({seed}, {number}, {kind!r}))
 '''

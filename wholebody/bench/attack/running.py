@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from wholebody.bench.attack.case import SCRIPT, Case, Verdict, Written
-from wholebody.bench.attack.writing import write
-from wholebody.errors import WholebodyError
+from wholebody.bench.attack import arguments, files, solves, streams, sweeps
+from wholebody.bench.attack.case import KINDS, SCRIPT, Case, Verdict, Written
+from wholebody.errors import UnknownNameError, WholebodyError
 from wholebody.files import Scratch
 from wholebody.runner import ONE_THREAD, Child, EndedError, Job, allow, run_jobs, tell
 
@@ -89,6 +89,23 @@ def _attacked(case: Case, deadline: float) -> Verdict:
     tell(prepared)
     allow(deadline)
     return run(prepared)
+
+
+WRITERS = {
+    "argument": arguments.written, "file": files.written, "solve": solves.written, "stream": streams.written,
+    "sweep": sweeps.written,
+}  # fmt: skip
+
+
+def write(case: Case) -> Written:
+    """Write a case out, from its seed and number and from nothing else.
+
+    Raises:
+        UnknownNameError: there is no such kind.
+    """
+    if case.kind not in WRITERS:
+        raise UnknownNameError("kind of case", case.kind, KINDS)
+    return WRITERS[case.kind](case.rng())
 
 
 def run(prepared: Written) -> Verdict:

@@ -48,8 +48,8 @@ def written(rng: np.random.Generator) -> Written:
             thing = clear(rng, placed, figure.size, 0.0, [1])
         if thing is not None and np.abs(thing.at[:3]).max() < 99.0:
             things.append(thing)
-    text = opening(f"a way of {figure.figure.name} among {len(things)} things", figure, q, things, Asked())
-    return Written(text.replace("import claims", "import sweeps") + TAIL.format(end=end.tolist()), figure.files)
+    text = opening(f"a way of {figure.figure.name} among {len(things)} things", figure, q, things, Asked(), "sweeps")
+    return Written(text + TAIL.format(end=end.tolist()), figure.files)
 
 
 def verdict(scene: Scene, start: Array, end: Array, found: FirstContact | None, seconds: float) -> Verdict:
