@@ -1,4 +1,4 @@
-"""The report of a comparison: what to choose when, the charts, the figures, and what was left out."""
+"""What a comparison leaves: every solve as CSV, charts, and the report of what to choose when and what was left out."""
 
 from __future__ import annotations
 
@@ -6,22 +6,26 @@ import base64
 import gzip
 import json
 import re
-from collections.abc import Mapping, Sequence
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from wholebody.bench.compare.advice import advice, choices, effort, error, reference, slowness, standings
-from wholebody.bench.compare.exclusions import exclusions
+from wholebody.bench.compare.charts import draw_all
 from wholebody.bench.compare.front import MOST, OURS, Rival, fronts
 from wholebody.bench.compare.paired import algorithms
 from wholebody.bench.compare.record import COARSE, DEFAULT
 from wholebody.bench.compare.results import Results
-from wholebody.bench.compare.scenes import OPENING, Scene
+from wholebody.bench.compare.scenes import OPENING, Scene, chosen, draw
 from wholebody.bench.compare.settings import Settings
-from wholebody.bench.compare.store import Chunk
-from wholebody.bench.compare.summary import GOOD, Summary, summaries
+from wholebody.bench.compare.store import Chunk, Store
+from wholebody.bench.compare.summary import GOOD, Summary, exclusions, summaries
 from wholebody.bench.report import formatted, render
+from wholebody.bench.tables import replace_section, write_rows, write_text
 
+PAGE = "report.html"
 FEW = 10  # problems below which a share is no share
 LONG = 35  # letters of a table's cell that is a text and no figure
 PICTURE = re.compile(r'<p><img src="[^"]*?([^"/]+)\.svg" alt="([^"]*)" ?/?></p>')
@@ -57,6 +61,58 @@ def material(
         records, [family.name for family in settings.sets], [adapter.name for adapter in settings.adapters]
     )
     return Material(settings, chunks, results, summaries(results), facts, missing)
+
+
+def publish(
+    settings: Settings,
+    store: Store,
+    folder: Path,
+    facts: Mapping[str, str],
+    missing: Mapping[str, str],
+    docs: Path | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Material:
+    """Write everything that is made from the records of a run.
+
+    Args:
+        settings: what was compared.
+        store: what was found.
+        folder: where it goes.
+        facts: of the machine and the run.
+        missing: methods that are not installed, and what installs them.
+        docs: folder of the documentation, to write its part too.
+        say: is told what is being made.
+
+    Raises:
+        FileFormatError: the documentation has no place for it.
+    """
+    given = material(settings, store.chunks, facts, missing)
+    write_rows(folder / "solves.csv", facts, store.records)
+    write_rows(folder / "summary.csv", facts, given.rows)
+    front = fronts(given.results)
+    if front:
+        write_rows(folder / "front.csv", facts, front)
+    say("charts and scenes")
+    families = {family.name: family for family in settings.sets}
+    methods = {adapter.name: adapter for adapter in settings.adapters}
+    with ThreadPoolExecutor(1) as pool:  # scenes are drawn in a process of their own, charts in this one
+        drawn = pool.submit(draw, chosen(given.results), families, methods, settings.seed, settings.cap)
+        titles = [(family.name, family.title) for family in settings.sets]
+        charts = draw_all(given.results, titles, folder / "charts")
+        scenes = drawn.result()
+    say("report")
+    subtitle = f"{len(settings.sets)} problem sets, {len(settings.adapters)} methods, {len(store.records)} solves. " + (
+        f"Measured {facts.get('date', '')} with wholebody {facts.get('wholebody', '')} on {facts.get('processor', '')}."
+    )
+    write_text(folder / PAGE, as_page(given, charts, scenes, subtitle) + "\n")
+    short = as_markdown(given, False, "assets/bench")
+    write_text(folder / "compare.md", short + "\n")
+    if docs is not None:
+        replace_section(docs / "results.md", "compare", short)
+        (docs / "assets" / "bench").mkdir(parents=True, exist_ok=True)
+        for svg, _ in charts.values():
+            shutil.copyfile(svg, docs / "assets" / "bench" / svg.name)
+    return given
 
 
 def as_markdown(given: Material, whole: bool, charts: str) -> str:

@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.adapters import missing
     from wholebody.bench.compare import run as comparison
     from wholebody.bench.compare.advice import advice
-    from wholebody.bench.compare.publish import PAGE, publish
+    from wholebody.bench.compare.report import PAGE, publish
 
     jobs = _jobs(arguments)
     settings = _settings(arguments)
