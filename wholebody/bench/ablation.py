@@ -22,6 +22,7 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.bench.problem_sets.registry import SETS
+from wholebody.bench.report import render
 from wholebody.bench.stability.case import Posed
 from wholebody.bench.stability.catalogue import cases
 from wholebody.methods.solve import method_named
@@ -226,32 +227,11 @@ def _replaced(places: Sequence[tuple[Any, str]], value: Any) -> Iterator[None]:
 
 def report(method: str, given: int, whole: Outcome, rows: Sequence[Row], compiled: Sequence[str]) -> str:
     """The counts as Markdown: mechanisms, constants that matter by what they change, and those that change nothing."""
-    lines = [
-        f"{method} on {given} problems: {whole.solved} solved, {whole.iterations} iterations, {whole.left:.4g} m and "
-        "rad left. The columns are changes of these, and how many answers differ in any digit.",
-        "",
-        "| switched off | answers that differ | solved | iterations | left [m, rad] |",
-        "| --- | ---: | ---: | ---: | ---: |",
-    ]
-    lines += [_line(row) for row in rows if row.change == "off"]
-    lines += [
-        "",
-        "| constant | answers that differ | solved | iterations | left [m, rad] |",
-        "| --- | ---: | ---: | ---: | ---: |",
-    ]
     changed = [row for row in rows if row.change != "off"]
-    lines += [_line(row) for row in changed if row.differ]
-    names = dict.fromkeys(row.what for row in changed)
-    idle = [name for name in names if not any(row.differ for row in changed if row.what == name)]
-    lines += [
-        "",
-        f"Ten times and a tenth of these changed no answer: {', '.join(f'`{name}`' for name in idle) or 'none'}.",
-    ]
-    if compiled:
-        lines += ["", f"Compiled in, and not changed: the constants of {', '.join(f'`{name}`' for name in compiled)}."]
-    return "\n".join(lines)
-
-
-def _line(row: Row) -> str:
-    what = row.what if row.change == "off" else f"`{row.what}`, {row.change}"
-    return f"| {what} | {row.differ} | {row.solved:+d} | {row.iterations:+d} | {row.left:+.3g} |"
+    matter = {row.what for row in changed if row.differ}
+    idle = dict.fromkeys(row.what for row in changed if row.what not in matter)
+    tables = {
+        "switched off": [row for row in rows if row.change == "off"],
+        "constant": [row for row in changed if row.differ],
+    }
+    return render("ablation.md", method=method, given=given, whole=whole, tables=tables, idle=idle, compiled=compiled)

@@ -166,21 +166,15 @@ def audited(case: str, method: str, verdict: Verdict) -> Verdict:
 
 @dataclass(frozen=True)
 class StabilityRow:
-    """One method's answer to one case.
+    """One method's answer to one case; errors in m and rad.
 
     Attributes:
-        case, method: who was asked what.
         verdict: "solved", "honest", "refusal", "adapter" or "wrong".
         acceptable: whether the case accepts it.
         figure: the worst figure, in a few words.
         status: what the method says.
-        goal_error: largest goal error left [m, rad].
-        best: that of the best answer known [m, rad].
-        penetration: deepest overlap [m].
-        limit_violation: [rad, m].
-        constraint_violation: [m, rad].
+        goal_error, best: largest goal error left, and that of the best answer known.
         frames: postures that were judged.
-        seconds: wall time of the method.
         sentence: what the method says in words, or its refusal.
     """
 
