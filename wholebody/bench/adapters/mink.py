@@ -16,6 +16,7 @@ from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adap
 from wholebody.bench.adapters.loop import GAIN, NEAR, STEP, Loop, Stepper, kept_apart, pulls
 from wholebody.bench.adapters.mjcf import ROOT, mjcf
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
+from wholebody.figures.figure import Figure
 from wholebody.methods.differential import StepError
 from wholebody.problem import Problem
 from wholebody.tasks import (
@@ -107,7 +108,7 @@ class _MinkStepper:
         import mink
 
         configuration = self._configuration
-        configuration.update(self._theirs(q))
+        configuration.update(self._order.theirs(q))
         for task, site, place in self._points:
             turn = configuration.get_transform_frame_to_world(site, "site").rotation()
             task.set_target(mink.SE3.from_rotation_and_translation(turn, place))
@@ -160,11 +161,8 @@ class _MinkStepper:
 
         problem, model = self._problem, self._mujoco
         figure = problem.scene.figure
-        joints = [(model.joint(name), figure.model.joints[figure.joint_id(name)]) for name in figure.joints]
-        self._addresses = [(int(theirs.qposadr[0]), ours) for theirs, ours in joints]
-        self._dof = np.arange(figure.model.nv)
-        for theirs, ours in joints:
-            self._dof[ours.idx_v] = int(theirs.dofadr[0])
+        self._order = _Order(figure, model)
+        self._dof = self._order.dof
         limits = [
             mink.ConfigurationLimit(model, gain=1.0),
             mink.VelocityLimit(model, dict.fromkeys(figure.joints, STEP)),
@@ -185,16 +183,6 @@ class _MinkStepper:
             )
             limits.append(apart)
         return limits
-
-    def _theirs(self, q: Array) -> Array:
-        """Posture in MuJoCo's order, from ours (nq,)."""
-        theirs = np.zeros(self._mujoco.nq)
-        if self._problem.scene.figure.root == "free":
-            theirs[:3], theirs[3], theirs[4:7] = q[:3], q[6], q[3:6]
-        for address, joint in self._addresses:
-            part = q[joint.idx_q : joint.idx_q + joint.nq]
-            theirs[address] = part[0] if joint.nq == 1 else np.arctan2(part[1], part[0])
-        return theirs
 
     def _spread(self, ours: Array) -> Array:
         """Values (nv,) by degree of freedom, in MuJoCo's order."""
@@ -243,8 +231,42 @@ class _MinkStepper:
         import mink
 
         task = mink.PostureTask(self._mujoco, cost=0.0)
-        task.set_target(self._theirs(reference))
+        task.set_target(self._order.theirs(reference))
         return task
+
+
+class _Order:
+    """Postures and degrees of freedom in the order of MuJoCo's model.
+
+    Attributes:
+        dof: (nv,) MuJoCo's place of each of ours.
+    """
+
+    def __init__(self, figure: Figure, model: Any) -> None:
+        self._size, self._free = (figure.model.nq, model.nq), figure.root == "free"
+        pairs = [(model.joint(name), figure.model.joints[figure.joint_id(name)]) for name in figure.joints]
+        self._addresses = [(int(theirs.qposadr[0]), ours) for theirs, ours in pairs]
+        self.dof = np.arange(figure.model.nv)
+        for theirs, ours in pairs:
+            self.dof[ours.idx_v] = int(theirs.dofadr[0])
+
+    def theirs(self, q: Array) -> Array:
+        """Posture in MuJoCo's order, from ours (nq,)."""
+        there = np.zeros(self._size[1])
+        if self._free:
+            there[:3], there[3], there[4:7] = q[:3], q[6], q[3:6]
+        for address, joint in self._addresses:
+            part = q[joint.idx_q : joint.idx_q + joint.nq]
+            there[address] = part[0] if joint.nq == 1 else np.arctan2(part[1], part[0])
+        return there
+
+    def ours(self, there: Array) -> Array:
+        """Our posture (nq,), of a figure on a free root whose joints have limits, from MuJoCo's."""
+        q = np.empty(self._size[0])
+        q[:3], q[3:6], q[6] = there[:3], there[4:7], there[3]
+        for address, joint in self._addresses:
+            q[joint.idx_q] = there[address]
+        return q
 
 
 class MinkTool(Tool):
@@ -265,9 +287,7 @@ class MinkTool(Tool):
         self._mink = mink
         model = self._mujoco_model = mujoco.MjModel.from_xml_string(mjcf(track.scene, (track.tip, *track.feet)))
         figure = track.scene.figure
-        self._order = [(int(model.joint(name).qposadr[0]), figure.model.joints[figure.joint_id(name)].idx_q)
-                       for name in figure.joints]  # fmt: skip
-        self._size = figure.model.nq
+        self._order = _Order(figure, model)
         self.reset(track.start)
         self._reach = self._task(track.tip, REACH_COST, 0.0)
         self._at = np.eye(4)
@@ -299,11 +319,7 @@ class MinkTool(Tool):
 
     def reset(self, q: Array) -> None:
         """Go to a posture."""
-        there = np.zeros(self._mujoco_model.nq)
-        there[:3], there[3], there[4:7] = q[:3], q[6], q[3:6]
-        for theirs, ours in self._order:
-            there[theirs] = q[ours]
-        self._configuration = self._mink.Configuration(self._mujoco_model, q=there)
+        self._configuration = self._mink.Configuration(self._mujoco_model, q=self._order.theirs(q))
         self.failures = 0
 
     def step(self, target: Array) -> None:
@@ -321,12 +337,7 @@ class MinkTool(Tool):
 
     def posture(self) -> Array:
         """Where it is."""
-        there = self._configuration.q
-        q = np.empty(self._size)
-        q[:3], q[3:6], q[6] = there[:3], there[4:7], there[3]
-        for theirs, ours in self._order:
-            q[ours] = there[theirs]
-        return q
+        return self._order.ours(self._configuration.q)
 
     def remarks(self) -> dict[str, float]:
         """How many pairs it looks at."""
