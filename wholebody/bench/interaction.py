@@ -198,12 +198,9 @@ class WorstFrames:
         row: the whole run.
         deepest, slowest, farthest, sudden: frames with the deepest overlap left, the longest time of the processor, the
             greatest distance between shown and tracked joints, and the greatest jerk.
-        milliseconds: of the slowest.
-        query_percent: its share of collision queries.
-        iterations: its programs, goals or displacements.
-        pairs: the overlapping pairs of its tracked posture.
-        distance_rad: of the farthest.
-        tracked_mm: how deep the farthest's tracked posture is inside of something.
+        milliseconds, query_percent, iterations, pairs: of the slowest: time, share of collision queries in it,
+            programs, goals or displacements, and overlapping pairs of the tracked posture.
+        distance_rad, tracked_mm: of the farthest; the second is how deep its tracked posture is inside of something.
         picture: the frame to look at where something is missed, else -1.
     """
 

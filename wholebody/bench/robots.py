@@ -43,15 +43,12 @@ class Loaded:
         seconds: CPU time of `wholebody.load`, packages imported before.
         refused: the sentence it was refused with; empty where it was loaded.
         kind: "URDF" or "MJCF".
-        nv: degrees of freedom.
-        pieces: convex pieces.
-        pairs: pairs that can touch.
+        nv, pieces, pairs: degrees of freedom, convex pieces, and pairs that can touch.
         notes: sentences on what was changed about the geometry.
         left_out: pairs that overlap at zero and could not be parted.
         free: least distance of any pair in the default posture, metres; inf without pairs.
         solved: reaches that ended `solved`.
-        times: CPU seconds of each reach.
-        statuses: status of each reach.
+        times, statuses: CPU seconds and status of each reach.
     """
 
     seconds: float

@@ -16,7 +16,8 @@ from wholebody.arrays import Array
 from wholebody.bench.attack.bodies import Body, body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Judged, Pairs, judge
-from wholebody.bench.attack.things import Placed, Thing, clear, inside, seven
+from wholebody.bench.attack.things import Thing, clear, inside, seven
+from wholebody.bench.problem_sets.things import Occupied
 from wholebody.methods import METHODS, installed_methods
 from wholebody.methods.solve import method_named
 from wholebody.problem import Problem
@@ -118,7 +119,7 @@ def around(
     figure: Body, start: Array, witness: Array | None, clearance: float, rng: np.random.Generator
 ) -> list[Thing]:
     """Return things: clear of the witness, some of them in the figure where it starts."""
-    placed = Placed(figure, [start] if witness is None else [start, witness])
+    placed = Occupied(figure.figure, [start] if witness is None else [start, witness])
     count = CROWD if rng.random() < 0.05 else int(rng.integers(0, MOST + 1))
     room = clearance + 1e-3 * figure.size
     found: list[Thing | None] = []
@@ -134,7 +135,7 @@ def around(
 
 
 def _clear(figure: Body, witness: Array, things: list[Thing], clearance: float) -> bool:
-    placed = Placed(figure, [witness])
+    placed = Occupied(figure.figure, [witness])
     return all(placed.distance(thing.shape, thing.placement, 0) > clearance for thing in things)
 
 

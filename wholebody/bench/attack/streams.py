@@ -13,7 +13,8 @@ from wholebody.bench.attack.bodies import Body, body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs, judge
 from wholebody.bench.attack.solves import Asked, opening, three
-from wholebody.bench.attack.things import Placed, Thing, clear, seven
+from wholebody.bench.attack.things import Thing, clear, seven
+from wholebody.bench.problem_sets.things import Occupied
 from wholebody.errors import WholebodyError
 from wholebody.problem import Problem
 
@@ -144,7 +145,7 @@ def written(rng: np.random.Generator) -> Written:
 
 
 def _things(figure: Body, start: Array, rng: np.random.Generator) -> list[Thing]:
-    placed = Placed(figure, [start])
+    placed = Occupied(figure.figure, [start])
     count = int(rng.integers(0, 8))
     found = (clear(rng, placed, figure.size, 1e-3 * figure.size, [0]) for _ in range(count))
     return [thing for thing in found if thing is not None]

@@ -10,7 +10,8 @@ from wholebody.bench.attack.bodies import body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs
 from wholebody.bench.attack.solves import Asked, opening
-from wholebody.bench.attack.things import Placed, clear, inside
+from wholebody.bench.attack.things import clear, inside
+from wholebody.bench.problem_sets.things import Occupied
 from wholebody.geometry.continuous.sweep import TOLERANCE, FirstContact
 from wholebody.scene import Scene
 
@@ -37,7 +38,7 @@ def written(rng: np.random.Generator) -> Written:
     free = list(range(figure.figure.model.nv)) if rng.random() < 0.3 else None
     end = figure.near(q, share, rng, free)
     middle = np.asarray(pin.interpolate(figure.figure.model, q, end, float(rng.uniform(0.2, 0.8))))
-    placed = Placed(figure, [middle, q])
+    placed = Occupied(figure.figure, [middle, q])
     things = []
     for _ in range(int(rng.integers(0, 6))):
         if rng.random() < 0.5:

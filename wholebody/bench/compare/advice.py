@@ -21,7 +21,6 @@ class Choice(NamedTuple):
     """What to choose for one set. Methods that cannot be told apart stand together; none where none is dependable.
 
     Attributes:
-        set: which.
         fastest: dependable methods with the least time; the median milliseconds of the first.
         exact: dependable methods with the least error at any of their budgets; the median error of the first.
         cheapest: dependable methods with the least effort; the median effort of the first above the best known.
@@ -43,7 +42,6 @@ class Standing(NamedTuple):
     """A method over all sets.
 
     Attributes:
-        adapter: its name.
         taken: sets of which it takes every case.
         dependable: sets of which it solves at least 98 %.
         worst_set, worst_share: where it solves least of what it takes.

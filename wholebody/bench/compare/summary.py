@@ -22,19 +22,15 @@ class Summary:
     """One method in one set.
 
     Attributes:
-        set, adapter: which.
-        cases: given to it; fewer than asked for where it is too slow for the time there is.
-        swept: of these, solved at all its budgets.
+        cases, swept: given to it, fewer than asked for where it is too slow; and of these solved at all its budgets.
         refused, failed, overtime: cases without an answer: said so, broke, or took too long.
         said: the first refusal or exception.
         success, success_fine: share of the cases not refused that are solved to 1e-3 and to 1e-4, as judged.
         false_claims: answers called solved that are off by more than 1 mm.
-        median_ms, p95_ms: of a call (of a frame where goals move) [ms], over all answers.
-        cpu_median_ms: of the processor.
-        setup_ms: to build a model of its own, median.
-        iterations: median.
+        median_ms, p95_ms, cpu_median_ms: of a call (of a frame where goals move), over all answers.
+        setup_ms, iterations: medians; the first to build a model of its own.
         worst_median: median of the worst error [m or rad].
-        deepest_mm: deepest overlap of all answers [mm].
+        deepest_mm: deepest overlap of all answers.
         effort: above the best known, median over the successes, as a share.
         frame_p95_ms, error_mm, jerk, turns: where goals move: 95 % of the frames, tracking error, trembling.
     """
