@@ -6,6 +6,7 @@ import time
 from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple, Protocol
 
+import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.methods import differential
@@ -15,19 +16,6 @@ from wholebody.methods.control import Control, Progress
 from wholebody.methods.differential import Iteration, Settings
 from wholebody.problem import Problem
 from wholebody.solution import Solution
-from wholebody.tasks import (
-    CenterOfMass,
-    Displacement,
-    Effort,
-    Frame,
-    Freeze,
-    Hold,
-    Orientation,
-    Point,
-    Posture,
-    Relative,
-    StepLimit,
-)
 
 STEP = 0.025  # rad, m: most that anything moves in one iteration; twice that leaves pink no solution more often
 NEAR = 0.1  # m: pairs nearer than this have a row, where a tool has such a setting
@@ -66,7 +54,8 @@ class Loop(ABC):
 
     name: str
     kinds: ClassVar[tuple[type, ...]] = (
-        CenterOfMass, Displacement, Effort, Frame, Freeze, Orientation, Point, Posture, Relative, StepLimit,
+        wb.CenterOfMass, wb.Displacement, wb.Effort, wb.Frame, wb.Freeze, wb.Orientation, wb.Point, wb.Posture,
+        wb.Relative, wb.StepLimit,
     )  # fmt: skip
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
@@ -131,7 +120,7 @@ class Loop(ABC):
         """What the tool cannot express, each with the reason where it is not plain."""
         refused = []
         for where, term in named_terms(problem):
-            if isinstance(term, Hold):
+            if isinstance(term, wb.Hold):
                 refused += [] if term.orientation else [f"{where} (its hard tasks hold whole frames)"]
             elif not isinstance(term, self.kinds):
                 refused.append(where)
@@ -142,7 +131,7 @@ def pulls(problem: Problem) -> list[Pull]:
     """The measures, with weights of at most 1."""
     found = []
     for measure in problem.measures:
-        if isinstance(measure, (Effort, Displacement)):
+        if isinstance(measure, (wb.Effort, wb.Displacement)):
             weights = measure.distance.weights
             found.append(Pull(measure.distance.reference, measure.weight * weights / max(float(weights.max()), 1e-12)))
     return found
@@ -157,7 +146,7 @@ def kept_apart(problem: Problem) -> list[tuple[int, int, float]]:
     pieces = problem.scene.geometry.geometryObjects
     still = {0}
     for term in problem.constraints:
-        if isinstance(term, Hold) and term.relative_to is None and term.orientation:
+        if isinstance(term, wb.Hold) and term.relative_to is None and term.orientation:
             still.add(term.residual.place.joint)
     pairs = zip(problem.scene.geometry.collisionPairs, problem.clearances.tolist(), strict=True)
     return [

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
+import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
 from wholebody.bench.adapters.loop import GAIN, NEAR, STEP, Loop, Stepper, kept_apart, pulls
@@ -19,17 +20,6 @@ from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_T
 from wholebody.figures.figure import Figure
 from wholebody.methods.differential import StepError
 from wholebody.problem import Problem
-from wholebody.tasks import (
-    Axis,
-    CenterOfMass,
-    Frame,
-    Freeze,
-    Hold,
-    Orientation,
-    Point,
-    Posture,
-    Relative,
-)
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
@@ -63,7 +53,7 @@ class MinkLoop(Loop):
     """Steps of mink."""
 
     name = "mink"
-    kinds = (*Loop.kinds, Axis)
+    kinds = (*Loop.kinds, wb.Axis)
 
     def build(self, problem: Problem) -> Stepper:
         """Write the model."""
@@ -75,11 +65,11 @@ class _MinkStepper:
         self._problem = problem
         self._sites: dict[str, tuple[int, Any]] = {}
         for term in (*problem.goals, *problem.constraints):
-            if isinstance(term, Point):
+            if isinstance(term, wb.Point):
                 self._site(term.place, term.resolved_offset)
-            elif isinstance(term, Axis):
+            elif isinstance(term, wb.Axis):
                 self._site(term.place)
-            elif isinstance(term, (Frame, Orientation, Relative, Hold)):
+            elif isinstance(term, (wb.Frame, wb.Orientation, wb.Relative, wb.Hold)):
                 self._site(term.residual.place)
                 self._site(term.residual.base)
         self._compile()
@@ -94,8 +84,8 @@ class _MinkStepper:
         model = self._mujoco
         self._points: list[tuple[Any, str, Array]] = []
         self._tasks = [self._goal(goal) for goal in problem.goals]
-        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, Hold)]
-        frozen = [bound for bound in problem.bounds if isinstance(bound, Freeze)]
+        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, wb.Hold)]
+        frozen = [bound for bound in problem.bounds if isinstance(bound, wb.Freeze)]
         if frozen:
             dofs = {self._dof[dof] for bound in frozen for dof in scene.figure.dofs(bound.joints).tolist()}
             self._hard.append(mink.DofFreezingTask(model, sorted(dofs)))
@@ -194,18 +184,18 @@ class _MinkStepper:
         import mink
 
         cost = goal.weight**0.5
-        if isinstance(goal, Point):
+        if isinstance(goal, wb.Point):
             site = self._site(goal.place, goal.resolved_offset)
             task = mink.FrameTask(site, "site", position_cost=cost, orientation_cost=0.0)
             self._points.append((task, site, np.array(goal.resolved_target)))
-        elif isinstance(goal, Axis):
+        elif isinstance(goal, wb.Axis):
             kind = mink.AxisAlignTask if goal.toward is None else mink.LookAtTask
             task = kind(self._site(goal.place), "site", axis=np.array(goal.basis[2]), cost=cost)
             task.set_target(np.array(goal.resolved_target))
-        elif isinstance(goal, CenterOfMass):
+        elif isinstance(goal, wb.CenterOfMass):
             task = mink.ComTask(cost=np.array([cost, cost, cost if goal.axes == "xyz" else 0.0]))
             task.set_target(np.array((*goal.resolved_target, 0.0)[:3]))
-        elif isinstance(goal, Posture):
+        elif isinstance(goal, wb.Posture):
             task = self._joints(goal.resolved_target)
             costs = np.zeros(self._mujoco.nv)
             costs[self._dof[np.asarray(goal.dofs)]] = cost

@@ -11,19 +11,13 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
 from wholebody.bench.adapters.loop import GAIN, STEP, Loop, Stepper, kept_apart, pulls
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 from wholebody.methods.differential import StepError
 from wholebody.problem import Problem
-from wholebody.tasks import (
-    CenterOfMass,
-    Freeze,
-    Hold,
-    Point,
-    Posture,
-)
 from wholebody.tasks.residuals import PlacementResidual
 
 NEAREST = 60  # pairs that its barrier looks at in a solve; it gets slower with more, and loses contacts with fewer
@@ -74,7 +68,7 @@ class _PinkStepper:
         self._problem, figure = problem, problem.scene.figure
         self._model = model = figure.model.copy()  # pink hangs attributes onto it
         for goal in problem.goals:
-            if isinstance(goal, Point):
+            if isinstance(goal, wb.Point):
                 _offset_frame(model, goal)
         model.velocityLimit = np.full(model.nv, STEP)
         if figure.root == "free":
@@ -92,8 +86,8 @@ class _PinkStepper:
             self._geometry.geometryObjects[number].placement = scene.geometry.geometryObjects[ours].placement * shift
         self._points: list[tuple[Any, Array]] = []
         self._tasks = [self._goal(goal) for goal in problem.goals]
-        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, Hold)]
-        frozen = [figure_dof for bound in problem.bounds if isinstance(bound, Freeze)
+        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, wb.Hold)]
+        frozen = [figure_dof for bound in problem.bounds if isinstance(bound, wb.Freeze)
                   for figure_dof in scene.figure.dofs(bound.joints).tolist()]  # fmt: skip
         if frozen:
             self._hard.append(self._joints(problem.start, sorted(set(frozen)), np.ones(len(set(frozen)))))
@@ -133,15 +127,15 @@ class _PinkStepper:
         from pink.tasks import ComTask, FrameTask
 
         cost = goal.weight**0.5
-        if isinstance(goal, Point):
+        if isinstance(goal, wb.Point):
             task = FrameTask(_offset_name(goal), position_cost=cost, orientation_cost=0.0)
             self._points.append((task, np.array(goal.resolved_target)))
             return task
-        if isinstance(goal, CenterOfMass):
+        if isinstance(goal, wb.CenterOfMass):
             task = ComTask(cost=[cost, cost, cost if goal.axes == "xyz" else 0.0])
             task.set_target(np.array((*goal.resolved_target, 0.0)[:3]))
             return task
-        if isinstance(goal, Posture):
+        if isinstance(goal, wb.Posture):
             dofs = np.asarray(goal.dofs)
             return self._joints(goal.resolved_target, dofs, np.full(len(dofs), cost))
         return self._placement(goal.residual, cost)
@@ -162,11 +156,11 @@ class _PinkStepper:
         return LinearHolonomicTask(np.eye(self._model.nv)[dofs], np.zeros(len(dofs)), np.array(reference), cost=cost)
 
 
-def _offset_name(goal: Point) -> str:
+def _offset_name(goal: wb.Point) -> str:
     return f"{goal.frame} at {goal.resolved_offset.tolist()}"
 
 
-def _offset_frame(model: Any, goal: Point) -> None:
+def _offset_frame(model: Any, goal: wb.Point) -> None:
     frame = model.frames[goal.place.frame]
     there = frame.placement * pin.SE3(np.eye(3), goal.resolved_offset)
     if not model.existFrame(_offset_name(goal)):
