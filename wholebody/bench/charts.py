@@ -84,9 +84,7 @@ def reach_times(rows: Sequence[ReachRow], path: Path) -> tuple[Path, Path]:
         color = plot_style.COLORS.get(f"wholebody/{solver}", "#000000")
         axis.step(times, share, where="post", color=color, linewidth=1.8, label=f"wholebody/{solver}")
     plot_style.plain_log(axis)
-    axis.set_ylim(0.0, 103.0)
-    axis.set_xlabel("time of a solve [ms]")
-    axis.set_ylabel("reaches solved [%]")
+    axis.set(ylim=(0.0, 103.0), xlabel="time of a solve [ms]", ylabel="reaches solved [%]")
     axis.legend(loc="lower right", frameon=False)
     return plot_style.save(chart, path)
 

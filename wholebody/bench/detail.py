@@ -218,8 +218,7 @@ def chart(rows: Sequence[DetailRow], path: Path) -> tuple[Path, Path]:
         below.set_ylim(min(-1.0, 2.0 * min(worst, default=0.0)), max(2.0, 2.0 * max(worst, default=0.0)))
         times = [one.solve_ms + one.judge_ms for one in found if one.task == name]
         for axis in (above, below):
-            axis.set_xscale("log")
-            axis.set_xlim(0.7 * min(times), 1.4 * max(times))
+            axis.set(xscale="log", xlim=(0.7 * min(times), 1.4 * max(times)))
             plot_style.plain_log(axis)
         below.axhline(0.0, color="#666666", linewidth=0.8)
         above.set_title(TITLES[name], loc="left")

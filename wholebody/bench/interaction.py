@@ -171,15 +171,13 @@ def frame_chart(rows: Sequence[FrameRow], path: Path) -> tuple[Path, Path]:
     above.plot(frame, time, color=plot_style.COLORS["wholebody/osqp"], linewidth=0.8, label="whole frame")
     queries = [row.contact_ms for row in rows]
     above.plot(frame, queries, color="#d55e00", linewidth=0.8, label="collision queries")
-    above.set_ylim(0.0, 1.25 * max(float(np.quantile(time, 0.995)), 1e-3))
-    above.set_ylabel("frame time [ms]")
+    above.set(ylim=(0.0, 1.25 * max(float(np.quantile(time, 0.995)), 1e-3)), ylabel="frame time [ms]")
     above.legend(loc="upper right", frameon=False, ncols=2, fontsize=8)
     above.set_title(f"{rows[0].scene.replace('_', ' ')}, overlap removed by {rows[0].overlap}", loc="left")
     tracked = [row.tracked_depth_mm for row in rows]
     below.plot(frame, tracked, color="#666666", linewidth=1.0, label="tracked posture")
     below.plot(frame, [row.depth_mm for row in rows], color="#009e73", linewidth=1.4, label="shown posture")
-    below.set_ylabel("deepest overlap [mm]")
-    below.set_xlabel("frame (shaded: the tracked posture is inside of something)")
+    below.set(ylabel="deepest overlap [mm]", xlabel="frame (shaded: the tracked posture is inside of something)")
     below.legend(loc="upper right", frameon=False, ncols=2, fontsize=8)
     return plot_style.save(chart, path)
 

@@ -212,8 +212,7 @@ def chart(rows: Sequence[ScalingRow], path: Path) -> tuple[Path, Path]:
         ):
             below.plot([row.size for row in whole], values, ":", color=color, marker=".", linewidth=1.5, label=label)
         for axis in (above, below):
-            axis.set_xscale("log")
-            axis.set_yscale("log")
+            axis.set(xscale="log", yscale="log")
             plot_style.plain_log(axis)
         above.set_title(f"more {NAMES[name]}", loc="left")
         below.set_xlabel(NAMES[name])

@@ -39,7 +39,6 @@ class Adapter:
         loose: budgets from cheap to exact, that draw its curve of speed against accuracy; those of first fit go before.
         setup: how it was set up, for reports.
         differences: what it cannot express, or does otherwise; one sentence each.
-        package: what has to be installed for it; None where it comes with wholebody.
         prepare: builds what a solve of a problem needs, so that it is not timed with it; raises InputError where the
             method cannot express the problem.
         hindered: a method, from a tolerance, whose quadratic programs are never finished, or that has one iteration;
@@ -51,7 +50,6 @@ class Adapter:
     loose: tuple[Budget, ...]
     setup: str
     differences: tuple[str, ...] = ()
-    package: str | None = None
     prepare: Callable[[Any, Problem], None] = _nothing
     hindered: Callable[..., Method] | None = None
 

@@ -45,7 +45,6 @@ def mink_adapter() -> Adapter:
             "mink minimises Effort and Displacement only",
             "its model is written for free roots, turning and sliding joints, and for all shapes but ellipsoids",
         ),
-        package="mink",
     )
 
 

@@ -42,7 +42,7 @@ _NEWTON_SETUPS = {
 }
 
 
-def qp_adapter(solver: str, package: str | None = None) -> Adapter:
+def qp_adapter(solver: str) -> Adapter:
     """The QP method with one of its solvers."""
     return Adapter(
         name=f"qp/{solver}",
@@ -52,7 +52,6 @@ def qp_adapter(solver: str, package: str | None = None) -> Adapter:
         setup=f"wb.QP(solver={solver!r}), all else as it comes: stages and seeded starts follow where the first "
         "descent does not reach the goals. Budgets of first fit are wb.QP(measures=False), those of "
         "few iterations have one descent only.",
-        package=package,
     )
 
 

@@ -47,7 +47,6 @@ def pink_adapter() -> Adapter:
             "pink has no task for Axis, no Balance, Plane or ReachCones, and holds whole frames only",
             "pink minimises Effort and Displacement only",
         ),
-        package="pin-pink",
     )
 
 

@@ -38,7 +38,6 @@ def placo_adapter() -> Adapter:
             "placo has one row a pair, between the two nearest points",
             "placo finds no solution where hard tasks repeat each other, as in a redundant closed loop",
         ),
-        package="placo",
     )
 
 

@@ -50,12 +50,10 @@ class Written:
     Attributes:
         script: Python; it leaves a `Verdict` in the name `verdict` and prints it.
         files: what the script reads, by names beside it.
-        timed: whether the case is a solve, of which the time counts.
     """
 
     script: str
     files: Mapping[str, bytes] = field(default_factory=dict)
-    timed: bool = False
 
 
 @dataclass(frozen=True)

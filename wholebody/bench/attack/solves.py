@@ -89,7 +89,7 @@ def written(rng: np.random.Generator) -> Written:
     measures = MEASURES[int(rng.integers(len(MEASURES)))]
     title = f"{figure.figure.name} among {len(things)} things; {'a posture that fits is known' if known else 'made up'}"
     tail = TAIL.format(measures=measures, clearance=clearance, method=chosen, witness=known)
-    return Written(opening(title, figure, start, things, asked, "solves") + tail, figure.files, timed=True)
+    return Written(opening(title, figure, start, things, asked, "solves") + tail, figure.files)
 
 
 def opening(title: str, figure: Body, start: Array, things: list[Thing], asked: Asked, judge: str) -> str:

@@ -60,8 +60,7 @@ def matrix(result: Result, path: Path) -> tuple[Path, Path]:
             continue
         for column, method in enumerate(result.methods):
             _cell(axis, row, column, result.verdicts[case, method])
-    axis.set_xlim(-0.5, len(result.methods) - 0.5)
-    axis.set_ylim(len(lines) - 0.5, -0.5)
+    axis.set(xlim=(-0.5, len(result.methods) - 0.5), ylim=(len(lines) - 0.5, -0.5))
     axis.set_xticks(range(len(result.methods)), [name.replace("/", "\n") for name in result.methods], fontsize=8.5)
     axis.xaxis.tick_top()
     rows = [number for number, (case, _) in enumerate(lines) if case is not None]
