@@ -17,6 +17,7 @@ SHARES = (0.25, 0.15, 0.15, 0.1, 0.12, 0.12, 0.1, 0.01)
 THINNEST = 2e-4  # m
 LEAST, MOST = 2e-4, 300.0  # m: of a size
 FAR = 60.0  # m: things stand nearer than this
+TRIES = 20  # things that are tried for one that is clear
 HALVINGS = 60  # of a way, until a depth is met
 
 
@@ -100,11 +101,9 @@ def _extent(placed: Occupied) -> tuple[Array, float]:
     return middle, float(np.linalg.norm(placed.centres - middle, axis=1).max(initial=0.0))
 
 
-def clear(
-    rng: np.random.Generator, placed: Occupied, size: float, room: float, postures: list[int], tries: int = 20
-) -> Thing | None:
+def clear(rng: np.random.Generator, placed: Occupied, size: float, room: float, postures: list[int]) -> Thing | None:
     """Return a thing that leaves some room, metres, around a figure in some of its postures; None if none was found."""
-    for _ in range(tries):
+    for _ in range(TRIES):
         made, call = shape(rng, size)
         at = somewhere(rng, placed, size)
         if all(placed.distance(made, at, posture) > room for posture in postures):

@@ -21,6 +21,7 @@ JOINTS = {
 
 TURN = 2.9  # rad: limit of a joint if nothing else is said
 SLIDE = 2.0  # m
+THICK = 0.04  # m: radius of an arm in space
 COLOR = (0.62, 0.66, 0.70, 1.0)
 
 
@@ -111,7 +112,7 @@ def planar_arm(
     return builder.figure()
 
 
-def spatial_arm(radius: float = 0.04) -> Figure:
+def spatial_arm() -> Figure:
     """An arm of six joints that stands upright at zero: base, shoulder, elbow and three of a wrist; frame "tip"."""
     builder, joint, at = Builder("arm of six joints"), 0, 0.15
     for kind, name, length, share in (
@@ -119,18 +120,18 @@ def spatial_arm(radius: float = 0.04) -> Figure:
         ("rz", "roll", 0.15, 0.8), ("ry", "pitch", 0.1, 0.7), ("rz", "hand", 0.08, 0.6),
     ):  # fmt: skip
         joint = builder.joint(kind, name, parent=joint, at=(0.0, 0.0, at))
-        builder.rod(joint, (0.0, 0.0, length), share * radius)
+        builder.rod(joint, (0.0, 0.0, length), share * THICK)
         at = 0.2 if name == "base" else length  # the shoulder is a little above the end of the base
     builder.frame(joint, "tip", (0.0, 0.0, at))
     return builder.figure()
 
 
-def sliding_tool(*pieces: tuple[Shape, pin.SE3], turning: bool = False) -> Figure:
-    """A tool that slides along x, y and z, and turns about them where asked; frame "tool" at its middle."""
+def sliding_tool(*pieces: tuple[Shape, pin.SE3]) -> Figure:
+    """A tool that slides along x, y and z; frame "tool" at its middle."""
     builder = Builder("sliding tool")
     joint = 0
-    for kind in ("px", "py", "pz", *(("rz", "ry", "rx") if turning else ())):
-        joint = builder.joint(kind, f"{'slide' if kind[0] == 'p' else 'turn'}_{kind[1]}", parent=joint)
+    for kind in ("px", "py", "pz"):
+        joint = builder.joint(kind, f"slide_{kind[1]}", parent=joint)
     for shape, place in pieces:
         builder.shape(joint, shape, place)
     builder.frame(joint, "tool", (0.0, 0.0, 0.0))
