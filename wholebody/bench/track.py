@@ -28,7 +28,7 @@ CLEARANCE = 0.010  # m
 WITHIN = 0.070  # m: pairs nearer than this count for every tool that has such a setting
 JOINT_SPEED = 4.0  # rad/s
 ROOT_SPEED, ROOT_TURN = 1.0, 2.0  # m/s, rad/s
-SEED = 7
+SEED = 7  # of the objects
 BOXES, SPHERES, HULLS, HULL_POINTS = 7, 6, 7, 100
 BLOCK = ((0.20, 0.24, 0.20), (0.44, -0.44, 1.05))  # edges and place of the box that the contact reach is asked into
 INSIDE = ((0.38, -0.48, 1.02), (0.42, -0.38, 1.08))  # m: the targets go from one of these to the other, inside the box
@@ -66,13 +66,12 @@ class Track:
         return len(self.scene.geometry.collisionPairs)
 
 
-def track(name: str, steps: int = 200, seed: int = SEED) -> Track:
+def track(name: str, steps: int = 200) -> Track:
     """Build a reach.
 
     Args:
         name: "free", "contact" or "alone".
         steps: of the way.
-        seed: of the objects.
 
     Raises:
         UnknownNameError: another name.
@@ -91,7 +90,7 @@ def track(name: str, steps: int = 200, seed: int = SEED) -> Track:
     free = smooth_way(np.vstack([tip, FREE]), 400)
     scene = wb.Scene(figure)
     if name != "alone":
-        add_objects(scene, start, free, np.random.default_rng(seed))
+        add_objects(scene, start, free, np.random.default_rng(SEED))
     if name != "contact":
         return Track(name, scene, start, smooth_way(np.vstack([tip, FREE]), steps))
     chest = thorax + (CHEST, 0.0, 0.0)
