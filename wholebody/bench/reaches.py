@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 import wholebody as wb
 from wholebody.arrays import Array
+from wholebody.bench import plot_style
 from wholebody.bench.problem_sets.bodies import CLEARANCE, TIPS
 from wholebody.bench.problem_sets.reaching import THINGS, reach_among
 from wholebody.bench.report import render
@@ -107,3 +109,19 @@ def run(seeds: range, solver: str, jobs: int = 1) -> Iterator[ReachRow]:
 def reaches_report(rows: Sequence[ReachRow], facts: Mapping[str, str], jobs: int) -> str:
     """Table of the random reaches, and what was not solved."""
     return render("reaches.md", rows=rows, facts=facts, jobs=jobs, things=THINGS, clearance=CLEARANCE)
+
+
+def reach_times(rows: Sequence[ReachRow], path: Path) -> tuple[Path, Path]:
+    """Share of the random reaches that were answered within a time."""
+    chart, axes = plot_style.figure(1, 1, (6.4, 3.4))
+    axis = axes[0][0]
+    for solver in dict.fromkeys(row.solver for row in rows):
+        mine = [row for row in rows if row.solver == solver]
+        times = np.sort([row.milliseconds for row in mine if row.status == "solved"])
+        share = 100.0 * np.arange(1, len(times) + 1) / len(mine)
+        color = plot_style.COLORS.get(f"wholebody/{solver}", "#000000")
+        axis.step(times, share, where="post", color=color, linewidth=1.8, label=f"wholebody/{solver}")
+    plot_style.plain_log(axis)
+    axis.set(ylim=(0.0, 103.0), xlabel="time of a solve [ms]", ylabel="reaches solved [%]")
+    axis.legend(loc="lower right", frameon=False)
+    return plot_style.save(chart, path)
