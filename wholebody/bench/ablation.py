@@ -87,10 +87,9 @@ class Row:
 
 
 def constants(method: str) -> tuple[list[Constant], list[str]]:
-    """Constants of a method but those of tracking, and modules whose constants are compiled in and cannot be changed.
+    """Constants of a method, a package of `wholebody.methods`, but those of tracking.
 
-    Args:
-        method: name of a package of `wholebody.methods`.
+    Modules whose constants are compiled in and cannot be changed are the second part.
     """
     package = import_module(f"wholebody.methods.{method}")
     names = [f"{package.__name__}.{found.name}" for found in pkgutil.walk_packages(package.__path__)]
@@ -134,16 +133,10 @@ def ablation(
     mechanisms: Mapping[str, tuple[Any, str, Any]],
     tell: Callable[[str], None],
 ) -> tuple[Outcome, list[Row]]:
-    """Change one thing after the other.
+    """Change one thing after the other; return what the method does unchanged, and a row a change.
 
-    Args:
-        method: its name.
-        given: the problems.
-        mechanisms: names to what is switched off: an owner, its attribute, and what takes its place.
-        tell: told of every row.
-
-    Returns:
-        What the method does unchanged, and a row a change.
+    `mechanisms` are what is switched off by name: an owner, its attribute, and what takes its place. `tell` is told
+    of every row.
     """
     outcome(method, given[:1])  # what is compiled at first use
     whole = outcome(method, given)

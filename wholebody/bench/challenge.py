@@ -53,10 +53,7 @@ def measure(
 ) -> tuple[list[ChallengeRow], dict[str, list[DragFrameRow]]]:
     """Drag by each method; a row each, and the rows of all frames by method.
 
-    Args:
-        task: sit_on_chair.toml, with its path beside it.
-        frames: of the way.
-        say: takes a line about each method.
+    The task is sit_on_chair.toml, with its path beside it; `say` takes a line about each method.
     """
     problem = read_task(task).problem
     places = spread(np.vstack([present_place(problem), read_path(task.with_suffix(".csv"))]), frames)

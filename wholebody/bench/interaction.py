@@ -266,10 +266,5 @@ def worst_frames(row: InteractionRow, recording: Recording, judged: Judgement) -
 
 
 def failures(worst: Sequence[WorstFrames], pictures: Sequence[tuple[WorstFrames, str]]) -> str:
-    """The part of the page: a table, and a picture where a line is missed.
-
-    Args:
-        worst: of every scene and method.
-        pictures: those with a picture, and where it is, as seen from the page.
-    """
+    """The part of the page: a table, and a picture, given by its path from the page, where a line is missed."""
     return render("interaction_failures.md", worst=worst, pictures=pictures)

@@ -65,12 +65,7 @@ class ReachRow:
 
 
 def reach(seed: int, figure: wb.Figure | None = None) -> Reach:
-    """Make one reach; the same seed makes the same one.
-
-    Args:
-        seed: of everything random in it.
-        figure: the human, if it is loaded already.
-    """
+    """Make one reach; the same seed makes the same one. The human may be given if it is loaded already."""
     problem, witness = reach_among(figure or wb.load("human"), TIPS[seed % len(TIPS)], np.random.default_rng(seed))
     return Reach(seed, problem, witness)
 

@@ -76,12 +76,7 @@ class Loaded:
 
 
 def examine(path: str, reaches: int) -> Loaded:
-    """Load a description, and reach.
-
-    Args:
-        path: of the description.
-        reaches: how many; 0 loads only.
-    """
+    """Load a description, and make some reaches; 0 loads only."""
     import wholebody as wb
     from wholebody.figures.rest_posture import UNPARTED
     from wholebody.geometry import convex, meshes
@@ -183,11 +178,9 @@ def _is_mjcf(path: Path) -> bool:
 
 
 def measure(folder: Path, reaches: int) -> Iterator[Robot]:
-    """Load every description twice, each time in a process of its own, and reach with it.
+    """Load every description of a folder twice, each time in a process of its own, and reach with it the second time.
 
-    Args:
-        folder: that holds the descriptions; it and its parents are looked up for packages.
-        reaches: of each robot.
+    The folder and its parents are looked up for packages.
     """
     for path in descriptions(folder):
         with Scratch() as cache:

@@ -232,13 +232,7 @@ def chart(rows: Sequence[ScalingRow], path: Path) -> tuple[Path, Path]:
 
 
 def report(rows: Sequence[ScalingRow], left_out: Sequence[str], facts: Mapping[str, str]) -> str:
-    """Exponents, then the times at every size.
-
-    Args:
-        rows: measured.
-        left_out: sentences on methods that were not asked at some size.
-        facts: of the machine.
-    """
+    """Exponents, then the times at every size; `left_out` are sentences on methods that were not asked at some size."""
     methods = [name for name in LOOKS if any(row.method == name for row in rows)]
     keys = dict.fromkeys((row.series, row.size) for row in rows)
     sizes = [{"series": series, "size": size, "rows": _by_method(rows, methods, series, size)} for series, size in keys]

@@ -107,17 +107,11 @@ class _Run:
 def measure(
     track: Track, tools: Sequence[str], repeats: int, say: Callable[[str], None] = lambda text: None
 ) -> tuple[list[StepRow], list[StepTime]]:
-    """Let every tool make a reach a number of times.
+    """Let every tool make a reach a number of times; `say` takes a line about each repeat.
 
     In every repeat each tool makes the whole reach once, from a fresh set-up and from standing; the order of the tools
     rotates from repeat to repeat. One step of each set-up is made before the clock starts. A first round, in which
     code and data come into the caches, is not counted.
-
-    Args:
-        track: the reach.
-        tools: names.
-        repeats: timed runs of each.
-        say: takes a line about each repeat.
     """
     runs: dict[str, list[_Run]] = {name: [] for name in tools}
     for repeat in range(repeats + 1):
@@ -246,11 +240,8 @@ def step_report(
 ) -> str:  # fmt: skip
     """Tables of the tracking steps.
 
-    Args:
-        rows: of all tools and reaches.
-        facts: of the machine.
-        differences: tool -> what it cannot express.
-        profile: reach -> median of a whole step and of its linearisation [us].
+    `differences` are what tools cannot express; `profile` is the median of a whole step and of its linearisation, by
+    reach [us].
     """
     tools = dict.fromkeys(row.tool for row in rows)
     stated = [line for name in tools for line in differences.get(name, ())]

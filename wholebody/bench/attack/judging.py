@@ -95,13 +95,9 @@ class Pairs:
 
 
 def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q: Array) -> Judged:
-    """Measure a posture.
+    """Measure a posture (nq,) against goals, constraints and bounds as they were given.
 
-    Args:
-        problem: what was asked; only its scene, start and clearance are read, and Balance and ReachCones.
-        goals: as they were given.
-        constraints: as they were given, with bounds.
-        q: (nq,) the posture.
+    Of the problem only the scene, the start and the clearance are read, and Balance and ReachCones.
     """
     scene, start = problem.scene, problem.start
     q = np.asarray(q, dtype=float)

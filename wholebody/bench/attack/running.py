@@ -40,14 +40,10 @@ class Ended:
 
 
 def attack(cases: Iterator[Case], jobs: int, going: Callable[[], bool], deadline: float = DEADLINE) -> Iterator[Ended]:
-    """Run cases, and return them as they end.
+    """Run cases, `jobs` at a time, and return them as they end; no more are begun once `going` says no.
 
-    Args:
-        cases: what is run.
-        jobs: processes at a time. Their libraries have one thread, whose CPU time is what a call takes on an idle
-            machine.
-        going: asked before each case; no more are begun once it says no.
-        deadline: seconds for a case.
+    The libraries of a process have one thread, whose CPU time is what a call takes on an idle machine. A case that
+    takes longer than the deadline, seconds, is run once more before it counts as one that hangs.
     """
     again: deque[Case] = deque()
     repeated: set[Case] = set()

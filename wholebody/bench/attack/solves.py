@@ -242,16 +242,9 @@ def verdict(
     witness: bool,
     seconds: float,
 ) -> Verdict:
-    """Judge an answer.
+    """Judge an answer that a method, by name or configured, gave in seconds of CPU time; what was asked is as in `judge`.
 
-    Args:
-        problem: what was asked, as in `judge`.
-        goals: as they were given.
-        constraints: as they were given.
-        solution: the answer.
-        method: that gave it, by name or configured.
-        witness: whether the problem was made from a posture that solves it.
-        seconds: CPU time that the answer took.
+    `witness` says whether the problem was made from a posture that solves it.
     """
     found = judge(problem, goals, constraints, solution.q)
     words, said = _words(found), f"{solution.method} says {solution.status!r}"

@@ -60,14 +60,7 @@ class Watch:
     """Looks at every step of a stream, and at the way between two postures."""
 
     def __init__(self, problem: Problem, constraints: Sequence[Any], *, speed: float, dt: float) -> None:
-        """Begin.
-
-        Args:
-            problem: what is asked.
-            constraints: as they were given.
-            speed: most that a joint may move [rad/s or m/s]; inf for any.
-            dt: seconds a step.
-        """
+        """Begin; joints may move at `speed` [rad/s or m/s], inf for any, and a step takes `dt` seconds."""
         self._problem, self._constraints, self._most = problem, constraints, speed * dt
         self._frame = 0
         self._wrongs: list[str] = []

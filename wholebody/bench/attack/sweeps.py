@@ -54,15 +54,7 @@ def written(rng: np.random.Generator) -> Written:
 
 
 def verdict(scene: Scene, start: Array, end: Array, found: FirstContact | None, seconds: float) -> Verdict:
-    """Judge a sweep.
-
-    Args:
-        scene: with the figure and things.
-        start: (nq,) where the way begins.
-        end: (nq,) where it ends.
-        found: what the sweep found.
-        seconds: CPU time that it took.
-    """
+    """Judge what a sweep found on the way from one posture (nq,) to another, and took in seconds of CPU time."""
     pairs = Pairs(scene)
     rounding = ROUNDING * max(1.0, pairs.size)
     shares = np.linspace(0.0, 1.0, PARTS + 1)

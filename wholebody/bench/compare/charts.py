@@ -138,13 +138,7 @@ def _legend(chart: Any, results: Results, drawn: dict[str, Any]) -> None:
 
 
 def draw_all(results: Results, titles: Iterable[tuple[str, str]], folder: Path) -> dict[str, tuple[Path, Path]]:
-    """All charts of a comparison: name -> its SVG and PNG.
-
-    Args:
-        results: what was found.
-        titles: name and title of every set.
-        folder: where they go.
-    """
+    """All charts of a comparison, by name; `titles` are name and title of every set."""
     drawn = {}
     for family, title in titles:
         name = family.replace("_", "-")

@@ -72,16 +72,9 @@ def publish(
     docs: Path | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> Material:
-    """Write everything that is made from the records of a run.
+    """Write everything that is made from the records of a run into a folder, and its part of the docs where given.
 
-    Args:
-        settings: what was compared.
-        store: what was found.
-        folder: where it goes.
-        facts: of the machine and the run.
-        missing: methods that are not installed, and what installs them.
-        docs: folder of the documentation, to write its part too.
-        say: is told what is being made.
+    `missing` are methods that are not installed, and what installs them; `say` is told what is being made.
 
     Raises:
         FileFormatError: the documentation has no place for it.
@@ -116,13 +109,7 @@ def publish(
 
 
 def as_markdown(given: Material, whole: bool, charts: str) -> str:
-    """The report as Markdown.
-
-    Args:
-        given: what it is written from.
-        whole: everything, or only the part that the documentation shows.
-        charts: folder of the charts, as seen from the page.
-    """
+    """The report as Markdown, or only the part that the documentation shows; `charts` is the folder of the charts."""
     results, settings = given.results, given.settings
     wall, processor, dependable = fronts(results), fronts(results.by_processor()), fronts(results, share=MOST)
     by_cpu, by_most = ({(rival.set, rival.quantity): rival for rival in rivals} for rivals in (processor, dependable))
@@ -146,11 +133,7 @@ def as_markdown(given: Material, whole: bool, charts: str) -> str:
 def as_page(given: Material, charts: Mapping[str, tuple[Path, Path]], scenes: Sequence[Scene], subtitle: str) -> str:
     """The whole report as one HTML file that needs no network: charts within, scenes unpacked when they are seen.
 
-    Args:
-        given: what it is written from.
-        charts: name -> SVG and PNG; the SVG goes into the page.
-        scenes: to look at.
-        subtitle: below the title: when, on what.
+    `charts` are SVG and PNG by name, of which the SVG goes into the page; the subtitle says when and on what.
     """
     from markdown_it import MarkdownIt
 

@@ -32,14 +32,7 @@ class Cell:
 
 
 def run(cases: Sequence[HardCase], adapters: Sequence[Adapter], jobs: int = 1, cap: float = CAP) -> Iterator[Cell]:
-    """Every case by every method, as they end.
-
-    Args:
-        cases: what is asked.
-        adapters: who is asked.
-        jobs: processes at a time.
-        cap: seconds for an answer, or for a frame of one.
-    """
+    """Every case by every method, as they end, in `jobs` processes; `cap` is seconds for an answer, or for a frame."""
     _warm()
     left = (Job((case, adapter.name), _cell, (case, adapter, cap), cap) for case in cases for adapter in adapters)
     for outcome in run_jobs(lambda: next(left, None), [Child(forked=True) for _ in range(jobs)]):

@@ -22,15 +22,7 @@ def report(result: Result, facts: Mapping[str, str]) -> str:
 
 
 def page(result: Result, adapters: Sequence[Adapter], facts: Mapping[str, str], drawn: Drawn, folder: str) -> str:
-    """The section of the page that is written by the command.
-
-    Args:
-        result: all cells.
-        adapters: who was asked.
-        facts: of the machine.
-        drawn: pictures by case.
-        folder: of the pictures, relative to the page.
-    """
+    """The section of the page that is written by the command; `folder` has the pictures, seen from the page."""
     return render(
         "stability.md", page=True, result=result, kinds=WORDS, facts=facts, adapters=adapters, drawn=drawn,
         folder=folder, chart=CHART,

@@ -31,15 +31,7 @@ Drawn = dict[str, list[tuple[Path, str]]]
 
 
 def draw(result: Result, folder: Path, progress: Callable[[], None] = lambda: None) -> Drawn:
-    """Draw a picture of each case, and of answers that fail.
-
-    Args:
-        result: all cells.
-        folder: where the pictures are written.
-        progress: called after each case.
-
-    Returns:
-        Paths and captions by the case's name, the case's own picture first.
+    """Draw a picture of each case into a folder, and of answers that fail; a case's own picture comes first.
 
     Raises:
         MissingPackageError: there is no Chromium.

@@ -54,13 +54,9 @@ class Verdict(NamedTuple):
 
 
 def decide(case: HardCase, answer: Answer, judged: Judged, best: float | None = None) -> Verdict:
-    """The verdict on an answer.
+    """The verdict on an answer and what it measures.
 
-    Args:
-        case: what was asked.
-        answer: what came.
-        judged: what it measures.
-        best: goal error of the best answer that any method found, for a case that knows none itself [m, rad].
+    `best` is the goal error of the best answer that any method found, for a case that knows none itself [m, rad].
     """
     wrong, brief = _wrong(case, answer, judged)
     if wrong:
