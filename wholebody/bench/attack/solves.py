@@ -242,7 +242,7 @@ def verdict(
     witness: bool,
     seconds: float,
 ) -> Verdict:
-    """Judge an answer that a method, by name or configured, gave in seconds of CPU time; what was asked is as in `judge`.
+    """Judge what a method, by name or configured, answered in seconds of CPU time; what was asked is as in `judge`.
 
     `witness` says whether the problem was made from a posture that solves it.
     """
