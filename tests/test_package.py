@@ -31,6 +31,7 @@ ROOMS = (
         "scene",
         "tasks",
         "term_plan",
+        "residual_kernel",
         "term_kernel",
         "linearisation",
         "problem",
