@@ -102,7 +102,7 @@ def test_a_frame_by_quadratic_programs_is_as_near_as_it_is_asked_for(scene: wb.S
                 assert wb.assess(problem, q).goal_error < tolerance
         spent.append(programs)
         measures.append(wb.assess(problem, q).measure)
-    assert spent[0] < spent[1] < spent[2]
+    assert spent[0] < spent[1] <= spent[2]
     assert max(measures) < 1.01 * min(measures)
 
 

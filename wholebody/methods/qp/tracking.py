@@ -227,9 +227,8 @@ class QPTracker:
             shift[goals:] = rows.soft_error[goals:] - before.foreseen[goals:]
             error = float(np.linalg.norm(at.goal_error))
             damping = DAMPING * min(1.0, before.left / max(error, 1e-12))
-        program = self._subproblem.program(
-            at, rows, RADIUS, PULL * RADIUS, damping, shift, measures, min(1.0, self.dt / SETTLING)
-        )
+        gain = min(1.0, self.dt / SETTLING) if goals else 1.0  # without goals the measures are the task
+        program = self._subproblem.program(at, rows, RADIUS, PULL * RADIUS, damping, shift, measures, gain)
         return at, rows, program, self._working_set.solve(program, rows.key)
 
     def _looked_after(
