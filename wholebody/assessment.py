@@ -1,22 +1,25 @@
 """The assessment of any method's answer, computed from the posture alone.
 
-It is independent of every method: it looks at all pairs without culling, reads Pinocchio's and coal's results through
-their official getters, and computes derivatives of distances from Pinocchio's own joint Jacobians.
+Independent of every method: it looks at all pairs without culling and without memory of earlier postures, and takes
+contact normals' derivatives from Pinocchio's own joint Jacobians. Optimality and what stands in the way are computed
+when they are asked for.
 """
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from math import inf
+from typing import Any
 
 import numpy as np
 
+from wholebody.all_pairs import AllPairs
 from wholebody.arrays import Array
 from wholebody.checks import a, number, posture
 from wholebody.errors import InputError
 from wholebody.figures.state import State
-from wholebody.first_order import MET, AllPairs, Blocker, blockers, optimality
+from wholebody.first_order import MET, Blocker, FirstOrder
 from wholebody.problem import Problem
 
 STILL = 1e-2  # rad, m: optimality below which a posture counts as the nearest to goals that it does not meet
@@ -36,14 +39,9 @@ class Assessment:
         limit_violation: largest violation of a joint limit, radians or metres.
         constraint_violation: largest violation of a constraint, metres or radians.
         measure: weighted sum of the measures.
-        optimality: first-order optimality, radians or metres, 0 at an optimum. It is the largest entry of the residual
-            of the objective's gradient after subtracting the best combination of the gradients of goals, limits,
-            constraints and contacts, divided by the objective's curvature. The objective is the measures if the goals
-            are met, otherwise the squared goal errors.
         goal_errors: (goals,) norm of each goal's error, metres or radians (whichever is larger).
-        blockers: the limits, constraints and contacts that block the goals or the repair of violations, the strongest
-            first; empty if goals are met and everything holds.
-        seconds: wall time of the assessment itself; a method's own time is its solution's minus this.
+        first_order: optimality and blockers, computed when they are asked for.
+        seconds: wall time that the judgement itself took; a method's own time is its solution's less this.
     """
 
     goal_error: float
@@ -54,10 +52,28 @@ class Assessment:
     limit_violation: float
     constraint_violation: float
     measure: float
-    optimality: float
     goal_errors: tuple[float, ...]
-    blockers: tuple[Blocker, ...] = ()
+    first_order: FirstOrder = field(compare=False, repr=False)
     seconds: float = field(default=0.0, compare=False, repr=False)
+
+    @property
+    def optimality(self) -> float:
+        """First-order optimality, radians or metres, 0 at a perfect posture.
+
+        What no goal, limit, constraint or contact balances of the objective's gradient, divided by the objective's
+        curvature; largest entry. The objective is the measures where the goals are met, else the squared goal errors.
+        """
+        return self.first_order.optimality
+
+    @property
+    def blockers(self) -> tuple[Blocker, ...]:
+        """What stands in the way, the hardest first; none where goals are met and everything holds."""
+        return self.first_order.blockers
+
+    def summary(self) -> dict[str, Any]:
+        """All of it as plain numbers, texts, lists and dictionaries."""
+        numbers = {part.name: getattr(self, part.name) for part in fields(self) if part.name != "first_order"}
+        return {**numbers, "optimality": self.optimality, "blockers": [asdict(blocker) for blocker in self.blockers]}
 
     def holds(self, tolerance: float) -> bool:
         """Whether limits, constraints and clearances hold to a tolerance, metres and radians."""
@@ -119,9 +135,8 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
         limit_violation=_limit_violation(problem, q),
         constraint_violation=missed,
         measure=sum(term.weight * term.value(state) for term in problem.measures),
-        optimality=optimality(problem, state, pairs),
         goal_errors=each,
-        blockers=() if fits else blockers(problem, state, pairs),
+        first_order=FirstOrder(problem, pairs, fits),
         seconds=time.perf_counter() - began,
     )
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from importlib import import_module
 from typing import Any, TypeVar
@@ -15,8 +16,11 @@ from typing import Any, TypeVar
 LOOPS = (
     "wholebody.geometry.contact_rows",
     "wholebody.geometry.continuous.moved_pairs",
+    "wholebody.geometry.proximity",
+    "wholebody.linearisation",
     "wholebody.methods.newton.linear_algebra.gram",
     "wholebody.methods.qp.active_set",
+    "wholebody.methods.qp.subproblem",
 )
 """Modules with compiled loops; each has a function `compiled_kernel`, which compiles or loads them."""
 
@@ -32,17 +36,15 @@ def compiled(**options: Any) -> Callable[[F], F]:
     folder. If no folder is writable, every process compiles anew.
 
     Args:
-        options: options of `numba.njit`.
+        options: what `numba.njit` takes, such as error_model and fastmath.
     """
-    from numba import njit
-
+    loop_type = _loop_type()
     _watch()
 
     def decorate(function: F) -> F:
-        try:
-            loop: F = njit(function, cache=True, **options)
-        except RuntimeError:  # numba: cannot cache function, no locator available
-            loop = njit(function, **options)
+        loop: F = loop_type(function, targetoptions={"nopython": True, "boundscheck": None, **options})
+        with suppress(RuntimeError):  # numba: cannot cache function, no locator available
+            loop.enable_caching()  # type: ignore[attr-defined]
         return loop
 
     return decorate
@@ -57,6 +59,28 @@ def compile_all() -> None:
 def compile_seconds() -> float:
     """Processor time of all compilation so far, seconds; time limits of solves do not count it."""
     return _compiling["seconds"]
+
+
+@lru_cache(maxsize=1)
+def _loop_type() -> Any:
+    """A compiled function of numba, read back from what is kept without all that compiling needs.
+
+    numba loads its tables of types and functions first, which takes 0.4 of 0.5 s. What compiles loads them by itself.
+    """
+    from numba.core.caching import FunctionCache
+    from numba.core.registry import CPUDispatcher
+    from numba.core.runtime import rtsys
+
+    class Kept(FunctionCache):  # type: ignore[misc]
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            rtsys.initialize(target_context)
+            return self._load_overload(sig, target_context)
+
+    class Loop(CPUDispatcher):  # type: ignore[misc]
+        def enable_caching(self) -> None:
+            self._cache = Kept(self.py_func)
+
+    return Loop
 
 
 @lru_cache(maxsize=1)

@@ -15,10 +15,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.all_pairs import AllPairs
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
-from wholebody.first_order import AllPairs
 from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones

@@ -158,7 +158,7 @@ class Problem:
         """
         return Lineariser(
             workspace,
-            self.scene.figure.tangent_bounds,
+            self.scene.figure.limits,
             self.goals,
             self.constraints,
             self.bounds,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
 from wholebody.geometry.large_models import geometry_model
-from wholebody.geometry.proximity import PairTable, Proximity
+from wholebody.geometry.proximity import Joints, PairTable, Proximity
 from wholebody.pool import Pool
 
 if TYPE_CHECKING:
@@ -175,7 +175,9 @@ def _leaning(
     rest = figure.posture(figure.postures[0])
     data = figure.model.createData()
     pin.forwardKinematics(figure.model, data, rest)
-    touching = {(owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).near(data, RESTING).pair}
+    touching = {
+        (owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(Joints(data), RESTING).pair
+    }
 
     found: dict[tuple[str, str], str] = {}
     for name, thing in carried.items():

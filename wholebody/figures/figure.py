@@ -112,6 +112,7 @@ class Figure:
         self.root = "free" if first is not None and first.nq == 7 else "fixed"
         self._frame_ids = {frame.name: index for index, frame in reversed(list(enumerate(model.frames)))}
         self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
+        self._joints = tuple(name for name in self._joint_ids if name != ROOT_JOINT)
         self.limits = limits_of(model)
         self.followers = MappingProxyType(followers_of(model))
         root = slice(0, 6 if self.root == "free" else 0)
@@ -141,7 +142,7 @@ class Figure:
     @property
     def joints(self) -> tuple[str, ...]:
         """Names of the joints in the model's order, without the free root."""
-        return tuple(name for name in list(self.model.names)[1:] if name != ROOT_JOINT)
+        return self._joints
 
     @property
     def postures(self) -> tuple[str, ...]:

@@ -112,8 +112,7 @@ class _Parting:
             self.movable[:6] = False
 
     def contacts(self, q: Array, within: float) -> Contacts:
-        self.state.update(q)
-        return self.proximity.near(self.state.data, within)
+        return self.proximity.query(self.state.update(q), within)
 
     def away_from(self, q: Array) -> _Try:
         """Correct until nothing is nearer than `APART`; otherwise return the posture with the fewest overlaps."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,14 @@ from wholebody.geometry.pieces import check_length
 from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE
 from wholebody.methods.newton.assembly_solution import AssemblySolution, solved
-from wholebody.methods.newton.equations import EquationSet, axes_along
+from wholebody.methods.newton.batches import Batch, Key
+from wholebody.methods.newton.equations import EquationSet, axes_along, unit_lengths
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.joint_register import JointRegister
+from wholebody.methods.newton.kkt import kkt_algebra
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
 from wholebody.methods.newton.linear_algebra.choice import NAMES, linear_algebra
+from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.system import ActiveSystem, System, unit
 from wholebody.pool import OneAtATime
 from wholebody.tasks.inputs import direction, point, target_placement
@@ -29,6 +33,32 @@ from wholebody.tasks.inputs import direction, point, target_placement
 WORLD = "world"
 UNIT_TOLERANCE = 1e-3  # largest deviation of a quaternion from unit length; more is refused as a mistake
 FINEST = 1e-12  # m, rad: least tolerance; below it only rounding remains
+
+
+@dataclass
+class _Prepared:
+    """What solves of one pattern share.
+
+    Attributes:
+        algebra: name of the factorisation that was asked for.
+        laid: types and bodies of the goals.
+        held: batches of what must hold.
+        system: all equations; their numbers follow the goals.
+        factor: the analysed factorisation.
+    """
+
+    algebra: str
+    laid: tuple[tuple[Key, bytes], ...]
+    held: list[tuple[Batch, Key]]
+    system: System
+    factor: LinearAlgebra
+    _nearest: QuasiDefinite | None = None
+
+    def nearest(self) -> QuasiDefinite:
+        """The analysed factorisation for the nearest place."""
+        if self._nearest is None:
+            self._nearest = kkt_algebra(self.system)
+        return self._nearest
 
 
 class Assembly:
@@ -46,8 +76,9 @@ class Assembly:
         self._places: list[Array] = []
         self._sizes: list[float] = []
         self._joints = JointRegister()
-        self._equations = EquationSet()
-        self._prepared: tuple[str, System, LinearAlgebra] | None = None
+        self._holding, self._goals = EquationSet(), EquationSet()
+        self._prepared: _Prepared | None = None
+        self._retargeted = False
         self._alone = OneAtATime("assembly")
         self.structures = 0
 
@@ -100,7 +131,7 @@ class Assembly:
         """A point of one body stays at a point of the other. Takes `at`, or `at_first` and `at_second`."""
         a, b = self._pair(first, second, "spherical joint")
         ends = self._ends(a, b, "spherical joint", first, second, **where)
-        self._equations.coincide(a, b, f"the spherical joint of {first!r} and {second!r}", *ends)
+        self._holding.coincide(a, b, f"the spherical joint of {first!r} and {second!r}", *ends)
         return self._changed()
 
     def revolute(
@@ -138,10 +169,10 @@ class Assembly:
         basis_a = axes_along(ours)
         # the second body's axes agree with the first's at the present placements, so that the angle is zero now
         basis_b = (turn_b.inverse() * turn_a * basis_a) if axis_second is None else axes_along(theirs)
-        self._equations.coincide(a, b, what, *ends)
-        self._equations.turn(a, b, what, basis_a, basis_b, 2)
+        self._holding.coincide(a, b, what, *ends)
+        self._holding.turn(a, b, what, basis_a, basis_b, 2)
         if limits is not None:
-            self._equations.limit(a, b, f"the limit of {what[4:]}", basis_a, basis_b, low, high)
+            self._holding.limit(a, b, f"the limit of {what[4:]}", basis_a, basis_b, low, high)
         return self._changed()
 
     def prismatic(self, first: str, second: str, *, axis: ArrayLike) -> Assembly:
@@ -152,10 +183,10 @@ class Assembly:
         self._joints.add("prismatic joint", first, second)
         turn_a, turn_b = pin.Quaternion(self._place(a)[3:]), pin.Quaternion(self._place(b)[3:])
         basis = axes_along(turn_a.inverse() * along)
-        self._equations.turn(a, b, what, basis, turn_b.inverse() * turn_a * basis, 3)
+        self._holding.turn(a, b, what, basis, turn_b.inverse() * turn_a * basis, 3)
         way = turn_a.inverse() * (self._place(b)[:3] - self._place(a)[:3])
         for side in basis.toRotationMatrix().T[:2]:
-            self._equations.slide(a, b, what, side, np.zeros(3), float(side @ way))
+            self._holding.slide(a, b, what, side, np.zeros(3), float(side @ way))
         return self._changed()
 
     def fixed(self, first: str, second: str, *, placement_second: PlacementLike | None = None) -> Assembly:
@@ -165,8 +196,8 @@ class Assembly:
         here = pin.XYZQUATToSE3(self._place(a)).actInv(pin.XYZQUATToSE3(self._place(b)))
         wanted = here if placement_second is None else target_placement(placement_second, what)
         self._joints.add("fixed joint", first, second)
-        self._equations.coincide(a, b, what, np.array(wanted.translation), np.zeros(3))
-        self._equations.turn(a, b, what, pin.Quaternion(wanted.rotation), pin.Quaternion.Identity(), 3)
+        self._holding.coincide(a, b, what, np.array(wanted.translation), np.zeros(3))
+        self._holding.turn(a, b, what, pin.Quaternion(wanted.rotation), pin.Quaternion.Identity(), 3)
         return self._changed()
 
     def on_plane(
@@ -189,7 +220,7 @@ class Assembly:
             raise InputError(f"{what}: a body cannot stay on a plane of its own; name another one")
         unit = direction(normal, f"{what}: normal")
         height = float(unit @ point(through, f"{what}: through"))
-        self._equations.slide(a, b, what, unit, point(place, f"{what}: place"), height, above=side == "above")
+        self._holding.slide(a, b, what, unit, point(place, f"{what}: place"), height, above=side == "above")
         return self._changed()
 
     # ---- goals
@@ -198,32 +229,31 @@ class Assembly:
         """Move a point of a body, (3,) in its frame, to a position in the world (3,), if possible."""
         what = f"the goal of {shown(body)}"
         ends = point(place, f"{what}: place"), point(target, f"{what}: target")
-        self._equations.coincide(self._moved(body, what), -1, what, *ends, goal=True)
-        return self._changed()
+        self._goals.coincide(self._moved(body, what), -1, what, *ends, goal=True)
+        return self._changed_goals()
 
     def frame_goal(self, body: str, target: PlacementLike) -> Assembly:
         """Move a body to a placement in the world, if possible."""
         what = f"the goal of {shown(body)}"
         wanted, index = target_placement(target, what), self._moved(body, what)
-        self._equations.coincide(index, -1, what, np.zeros(3), np.array(wanted.translation), goal=True)
+        self._goals.coincide(index, -1, what, np.zeros(3), np.array(wanted.translation), goal=True)
         identity = pin.Quaternion.Identity()
-        self._equations.turn(index, -1, what, identity, pin.Quaternion(wanted.rotation), 3, goal=True)
-        return self._changed()
+        self._goals.turn(index, -1, what, identity, pin.Quaternion(wanted.rotation), 3, goal=True)
+        return self._changed_goals()
 
     def drop_goals(self) -> Assembly:
-        """Remove all goals."""
-        self._equations = self._equations.without_goals()
-        return self._changed()
+        """Take all goals out.
+
+        Where others of the same bodies come in their place, what earlier solves laid out and analysed serves again.
+        """
+        self._goals = EquationSet()
+        return self._changed_goals()
 
     # ---- solving
 
     def system(self) -> System:
-        """The present equations."""
-        if not self._places:
-            raise InputError("the assembly has no bodies; add some with body(...)")
-        rims = np.repeat((2.0 * np.array(self._sizes)) ** 2, 4).reshape(-1, 4)
-        weight = np.concatenate([np.ones((len(rims), 3)), rims], axis=1).ravel()
-        return self._equations.system(len(self._places), list(self._names), weight)
+        """The equations as they stand."""
+        return System(len(self._places), [*self._held(), *self._goals.batches(len(self._places))], self._weight())
 
     def variables(self) -> Array:
         """(7 n,) the placements of the bodies."""
@@ -273,22 +303,51 @@ class Assembly:
         choice(inequalities, KINDS, "inequalities")
         flag(nearest, "nearest")
         with self._alone:
-            if self._prepared is None or self._prepared[0] != algebra:
-                system = self.system()
-                self._prepared = (algebra, system, linear_algebra(system.pattern, algebra))
-                self.structures += 1
-            _, system, factor = self._prepared
-            if nearest and system.inequality.any():
+            prepared = self._ready(algebra)
+            if nearest and prepared.system.inequality.any():
                 raise InputError("nearest is for assemblies without limits and one-sided planes; leave it out")
             x, solution = solved(
-                list(self._names), ActiveSystem(system, factor), self.variables(),
-                tolerance=tolerance, iterations=iterations, kind=inequalities, nearest=nearest,
+                list(self._names), ActiveSystem(prepared.system, prepared.factor), self.variables(),
+                tolerance=tolerance, iterations=iterations, kind=inequalities,
+                nearest=prepared.nearest() if nearest else None,
             )  # fmt: skip
             self._places = list(x.reshape(-1, 7))
             return solution
 
+    def _ready(self, algebra: str) -> _Prepared:
+        """The equations as they stand; what was laid out and analysed serves while their pattern stays."""
+        found = self._prepared
+        if found is not None and not self._retargeted and found.algebra == algebra:
+            return found
+        goals = self._goals.batches(len(self._places))
+        laid = tuple((key, batch.bodies.tobytes()) for batch, key in goals)
+        if found is None or (found.algebra, found.laid) != (algebra, laid):
+            held = self._held()
+            system = System(len(self._places), [*held, *goals], self._weight())
+            found = self._prepared = _Prepared(algebra, laid, held, system, linear_algebra(system.pattern, algebra))
+            self.structures += 1
+        else:
+            found.system.renew([*found.held, *goals])
+        self._retargeted = False
+        return found
+
+    def _held(self) -> list[tuple[Batch, Key]]:
+        """What must hold, in batches."""
+        if not self._places:
+            raise InputError("the assembly has no bodies; add some with body(...)")
+        return [unit_lengths(list(self._names)), *self._holding.batches(len(self._places))]
+
+    def _weight(self) -> Array:
+        """(7 n,) of each variable in the least motion."""
+        rims = np.repeat((2.0 * np.array(self._sizes)) ** 2, 4).reshape(-1, 4)
+        return np.concatenate([np.ones((len(rims), 3)), rims], axis=1).ravel()
+
     def _changed(self) -> Assembly:
         self._prepared = None
+        return self
+
+    def _changed_goals(self) -> Assembly:
+        self._retargeted = True
         return self
 
     def _index(self, name: str, where: str) -> int:

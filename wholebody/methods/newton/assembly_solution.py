@@ -12,6 +12,7 @@ from wholebody.arrays import Array
 from wholebody.methods.newton.feasibility import reach
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.kkt import settle
+from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.system import ActiveSystem, unit
 from wholebody.solution import Status
 
@@ -60,14 +61,17 @@ def solved(
     tolerance: float,
     iterations: int,
     kind: Kind,
-    nearest: bool,
+    nearest: QuasiDefinite | None,
 ) -> tuple[Array, AssemblySolution]:
-    """Solve from the variables `before` (7 n,); returns the new variables and the solution."""
+    """Solve from the variables `before` (7 n,); where the bodies end, as variables and in words.
+
+    With `nearest`, the factorisation of the system's KKT matrix, they end at the place nearest to `before`.
+    """
     found = reach(active_system, before, tolerance=tolerance, iterations=iterations, kind=kind)
     system, x = active_system.system, found.x
     nearness: tuple[float, ...] = ()
-    if nearest and found.met:
-        settled = settle(system, x, before, tolerance=max(tolerance, FINEST), iterations=iterations)
+    if nearest is not None and found.met:
+        settled = settle(system, nearest, x, before, tolerance=max(tolerance, FINEST), iterations=iterations)
         x, nearness = (unit(settled.x) if settled.met else x), settled.errors
     residual = system.residual(x)
     size = np.abs(np.where(system.inequality, np.minimum(residual, 0.0), residual))

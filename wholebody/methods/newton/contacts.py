@@ -9,6 +9,7 @@ import numpy as np
 from wholebody.arrays import Array, Indices
 from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.geometry.continuous.passing_through import passes_through
+from wholebody.geometry.proximity import Joints
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Coincide
 from wholebody.problem import Problem
@@ -49,8 +50,8 @@ class ContactSet:
         self._there: Placed | None = None
 
     def look(self, data: Any) -> None:
-        """Compute contacts at the joint placements in `data` (Pinocchio's), at the end of a step."""
-        self._there = Placed(self.workspace.proximity.near(data, self._within), self._within)
+        """Measure at the joints' places in `data` (Pinocchio's), where a step leads."""
+        self._there = Placed(self.workspace.proximity.query(Joints(data), self._within), self._within)
 
     def runs_into(self) -> bool:
         """Whether a pair that is no inequality overlaps at the end of the step; such pairs become inequalities."""
@@ -89,7 +90,7 @@ class ContactSet:
         self._here = self._there
         contacts = self._here.contacts
         if len(self._forced) and not np.isin(self._forced, contacts.number).all():
-            contacts = self.workspace.proximity.near(data, FAR + self._largest)
+            contacts = self.workspace.proximity.query(Joints(data), FAR + self._largest)
         spare = contacts.distance - self.clearances[contacts.number]
         member = np.zeros(len(self.clearances), dtype=bool)
         member[self.pairs] = True

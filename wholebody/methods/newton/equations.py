@@ -12,7 +12,6 @@ from wholebody.arrays import Array
 from wholebody.methods.newton.angles import Angle
 from wholebody.methods.newton.batches import Batch, Coincide, Key, Slide, Turn, Unit
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
-from wholebody.methods.newton.system import System
 
 
 class Row(NamedTuple):
@@ -86,13 +85,6 @@ class EquationSet:
         parts = (first.coeffs(), second.coeffs(), center, value, 1.0)
         self._add("angle", a, b, label, *parts, goal=True, weight=weight)
 
-    def without_goals(self) -> EquationSet:
-        """A copy without goals."""
-        result = EquationSet()
-        result.rows = {key: list(rows) for key, rows in self.rows.items() if not key.goal}
-        result.made = [(make, key) for make, key in self.made if not key.goal]
-        return result
-
     def yielding(self) -> EquationSet:
         """A copy whose equalities are goals."""
         result = EquationSet()
@@ -100,12 +92,6 @@ class EquationSet:
             result.rows.setdefault(key._replace(goal=not key.one_sided), []).extend(rows)
         result.made = [(make, key._replace(goal=not key.one_sided)) for make, key in self.made]
         return result
-
-    def system(self, count: int, names: list[str], weight: Array) -> System:
-        """The system of all equations for `count` bodies."""
-        units = [f"the Euler parameters of {name!r}" for name in names]
-        first = (Unit(np.arange(count)[:, None], units), Key("unit", False, False, 1.0))
-        return System(count, [first, *self.batches(count)], weight)
 
     def batches(self, count: int) -> list[tuple[Batch, Key]]:
         """The groups of `count` bodies in batches."""
@@ -124,6 +110,12 @@ class EquationSet:
         weight: float = 1.0,
     ) -> None:
         self.rows.setdefault(Key(kind, goal, one_sided, weight), []).append(Row(a, b, label, numbers))
+
+
+def unit_lengths(names: list[str]) -> tuple[Batch, Key]:
+    """Euler parameters of unit length, of all bodies with these names."""
+    labels = [f"the Euler parameters of {name!r}" for name in names]
+    return Unit(np.arange(len(names))[:, None], labels), Key("unit", False, False, 1.0)
 
 
 def _batch(kind: str, rows: list[Row], count: int) -> Batch:

@@ -44,18 +44,25 @@ class Settled(NamedTuple):
     met: bool
 
 
-def settle(system: System, x: Array, anchor: Array, *, tolerance: float, iterations: int) -> Settled:
-    """Move x, which satisfies the equations at least nearly, to the state nearest to the anchor (both (7 n,)).
+def kkt_algebra(system: System) -> QuasiDefinite:
+    """The factorisation of the KKT matrix of a system's equations, analysed."""
+    rows, columns, _ = system.curvature(system.weight, np.zeros(system.pattern.height))
+    return QuasiDefinite(system.pattern, (rows, columns))
+
+
+def settle(
+    system: System, algebra: QuasiDefinite, x: Array, anchor: Array, *, tolerance: float, iterations: int
+) -> Settled:
+    """Move x, which meets the equations or nearly so, to the nearest place to the anchor (both (7 n,)).
 
     Args:
-        system: the equations, without inequalities.
-        x: the start.
-        anchor: the distance from it, with the system's weights, is minimised.
+        system: equations; those with inequalities are not for this iteration.
+        algebra: `kkt_algebra` of the system.
+        x: where to begin.
+        anchor: what it is to be near to, by the system's weights.
         tolerance: of every equation of the KKT system.
         iterations: most iterations.
     """
-    rows, columns, _ = system.curvature(x, np.zeros(system.pattern.height))
-    algebra = QuasiDefinite(system.pattern, (rows, columns))
     damping = np.full(system.pattern.height, DAMPING)
     y = np.zeros(system.pattern.height)
     residual, values = system.residual(x), system.values(x)

@@ -41,6 +41,7 @@ class System:
         self.batches = [batch for batch, _ in batches if len(batch)]
         self.weight = weight
         self._seen: tuple[Array, Array] | None = None
+        self._found: tuple[Array, Array] | None = None
         sizes = [len(batch) * batch.size for batch in self.batches]
         self.starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
         self.goal = np.repeat([key.goal for key in keys], sizes).astype(bool)
@@ -63,7 +64,8 @@ class System:
         self._curvature_places: tuple[Indices, Indices, list[Indices]] | None = None
 
     def renew(self, batches: Sequence[tuple[Batch, Key]]) -> None:
-        """Replace the parameters of equations of the same pattern."""
+        """Take other numbers for equations of the same pattern."""
+        self._found = None
         self.batches = [batch for batch, _ in batches if len(batch)]
 
     def bodies(self, x: Array) -> Array:
@@ -73,9 +75,13 @@ class System:
         return self._seen[1]
 
     def residual(self, x: Array) -> Array:
-        """(m,) residuals, metres and radians."""
-        bodies = self.bodies(x)
-        return np.concatenate([np.zeros(0), *(batch.residual(bodies).ravel() for batch in self.batches)])
+        """(m,) metres and radians; read only, as the same array answers the same question until `renew`."""
+        if self._found is None or self._found[0] is not x:
+            bodies = self.bodies(x)
+            found = np.concatenate([np.zeros(0), *(batch.residual(bodies).ravel() for batch in self.batches)])
+            found.flags.writeable = False
+            self._found = (x, found)
+        return self._found[1]
 
     def values(self, x: Array) -> Array:
         """Values (nnz,) of the Jacobian in the order of the pattern."""
