@@ -20,18 +20,18 @@ LEVELS = {"lowest board": 0.08, "low board": 0.36, "high board": 0.64, "top boar
 X, Y, Z = np.eye(3)
 
 LOOSE = {
-    "left side": (0.0, 0.5 * (WIDTH - THICK), 0.5 * HEIGHT),  # this one stands already
+    "left side": (0.0, 0.5 * (WIDTH - THICK), 0.5 * HEIGHT),  # this part is in place already
     "right side": (0.25, -0.95, 0.46, *pin.Quaternion(pin.rpy.rpyToMatrix(0.5, 0.25, 0.5)).coeffs()),
     "lowest board": (0.75, 0.35, 0.06, *pin.Quaternion(pin.rpy.rpyToMatrix(0.12, 0.0, 0.5)).coeffs()),
     "low board": (0.95, -0.25, 0.09, *pin.Quaternion(pin.rpy.rpyToMatrix(-0.1, 0.15, -0.6)).coeffs()),
     "high board": (0.70, -0.50, 0.35, *pin.Quaternion(pin.rpy.rpyToMatrix(0.6, 0.3, 0.3)).coeffs()),
     "top board": (0.55, 0.85, 0.40, *pin.Quaternion(pin.rpy.rpyToMatrix(-0.7, 0.2, -0.4)).coeffs()),
 }
-"""Where the parts lie about, metres and quaternions."""
+"""Placements of the loose parts, metres and quaternions."""
 
 
 def build() -> wb.Assembly:
-    """All parts, loose but for the left side."""
+    """All parts, loose except the left side."""
     assembly = wb.Assembly()
     for name, place in LOOSE.items():
         assembly.body(name, place, size=0.5)
@@ -60,7 +60,7 @@ def attach_right_side(assembly: wb.Assembly) -> None:
 
 
 def assemble(assembly: wb.Assembly) -> list[dict[str, pin.SE3]]:
-    """Attach part by part; where all parts are before the first and after each.
+    """Attach part by part; returns the placements of all parts before the first and after each.
 
     Raises:
         WholebodyError: a part cannot be attached.

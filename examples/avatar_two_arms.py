@@ -1,4 +1,4 @@
-"""Walk an avatar into a wall, both arms ahead: it bends its arms and spreads its hands instead of going through."""
+"""Walk an avatar into a wall, both arms ahead: it bends its arms and spreads its hands, and does not penetrate."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import wholebody as wb
 from wholebody.interaction import Recording, Track, follow
 from wholebody.interaction.scripts import script
 
-WALL = 1.2  # m in front of where the avatar begins
+WALL = 1.2  # m: distance of the wall in front of the avatar's start
 REACHING = {"shoulder_flexion": 85.0, "elbow_flexion": 12.0, "shoulder_abduction": 10.0, "wrist_flexion": -35.0}
 
 
 def build() -> tuple[wb.Scene, Track]:
-    """An avatar before a wall, and a tracker that leads its hands 10 cm into it and back."""
+    """An avatar in front of a wall, and a tracker that moves its hands 10 cm into it and back."""
     avatar = wb.load("avatar")
     scene = wb.Scene(avatar)
     scene.add(wb.HalfSpace(), name="floor")

@@ -1,4 +1,4 @@
-"""Reach behind the back to a pouch on the belt, round the body and never through it."""
+"""Reach behind the back to a pouch on the belt, around the body."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ BUCKLE = (-0.199, -0.02, 0.10)  # m: on the back of the pouch, in the axes of th
 
 
 def build() -> wb.Problem:
-    """State the problem; tasks/behind_the_back.toml says the same."""
+    """State the problem; tasks/behind_the_back.toml states the same."""
     scene = wb.Scene(wb.load("human", sex="female", stature=1.65, mass=62.0))
     scene.add(wb.HalfSpace(), name="floor")
     scene.attach(wb.Box((0.06, 0.18, 0.12)), to="pelvis", name="pouch", at=POUCH, color=LEATHER)

@@ -1,4 +1,4 @@
-"""Carry a box in both hands past a table and the vase on it, with both feet where they are and in balance."""
+"""Carry a box in both hands past a table and the vase on it, with both feet held and in balance."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ SIZE = (0.24, 0.22, 0.36)  # m: of the box; the last from palm to palm
 GRIP = 0.001  # m: between a palm and the box
 MIDDLE = (0.09, 0.0, 0.5 * SIZE[2] + GRIP)  # m: of the box, in the axes of the right palm
 OTHER_PALM = (0.0, 0.0, SIZE[2] + 2.0 * GRIP, 1.0, 0.0, 0.0, 0.0)  # across the box, turned to face the right one
-PLACE = (0.42, 0.03, 1.0)  # m: where the middle of the box goes, close beside the vase
+PLACE = (0.42, 0.03, 1.0)  # m: target of the middle of the box, close beside the vase
 
 VASE = (0.50, -0.22, 0.94)  # m: its middle
 
 
 def build() -> wb.Problem:
-    """State the problem; tasks/carry_box_past_table.toml says the same."""
+    """State the problem; tasks/carry_box_past_table.toml states the same."""
     person = wb.load("human", sex="male", stature=1.75, mass=78.0)
     scene = wb.Scene(person)
     scene.add(wb.HalfSpace(), name="floor")

@@ -1,7 +1,7 @@
 """Sit on a chair with the hands on the thighs.
 
-The chair is the mesh chair.obj (KayKit Dungeon Remastered, CC0) where it is present: in the folder that WHOLEBODY_DATA
-names, or in ../shared/data beside the checkout. Else it is made of boxes.
+The chair is the mesh chair.obj (KayKit Dungeon Remastered, CC0) if it is present in the folder that WHOLEBODY_DATA
+names, or in ../shared/data beside the checkout. Otherwise it is made of boxes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PALM = (0.067, 0.0, -0.32)  # m: on the thigh, in its axes
 
 
 def mesh() -> Path | None:
-    """The chair's file, or None where it is not present."""
+    """The chair's file, or None if it is not present."""
     data = Path(os.environ.get("WHOLEBODY_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
     path = data / "props" / "chair.obj"
     return path if path.is_file() else None

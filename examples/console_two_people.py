@@ -15,7 +15,7 @@ PEOPLE = {
     "small woman": {"sex": "female", "stature": 1.525, "mass": 51.3},
     "large man": {"sex": "male", "stature": 1.87, "mass": 110.69},
 }
-CONTROLS = {  # m: where a fingertip has to be
+CONTROLS = {  # m: targets of a fingertip
     "lever": ("left_index_tip", (0.46, 0.30, 0.96)),
     "screen": ("right_index_tip", (0.70, -0.05, 1.30)),
     "breaker": ("right_index_tip", (0.60, -0.25, 1.98)),
@@ -34,7 +34,7 @@ def console(person: str) -> wb.Scene:
 
 
 def build(scene: wb.Scene, control: str) -> wb.Problem:
-    """Ask for one control: touch it and look at it, both feet where they are, in balance."""
+    """The problem of one control: touch it and look at it, with both feet held, in balance."""
     fingertip, place = CONTROLS[control]
     return wb.Problem(
         scene,
@@ -60,7 +60,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> dict[tuple[str,
 
 
 def said(solution: wb.Solution) -> str:
-    """What a solution means for the console."""
+    """The result for one control in words."""
     return "reached" if solution.solved else f"{1e3 * solution.assessment.goal_error:.0f} mm out of reach"
 
 

@@ -1,4 +1,4 @@
-"""Turn the crank of a four-bar linkage once: a closed loop, checked against its closed form."""
+"""Turn the crank of a four-bar linkage once: a closed loop, compared with its closed-form solution."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def build() -> wb.Assembly:
 
 
 def turn(assembly: wb.Assembly) -> tuple[Array, list[dict[str, pin.SE3]]]:
-    """Drive the crank once round: crank angles (n,), and where the bars are at each."""
+    """Turn the crank once: returns crank angles (n,), and the placements of the bars at each."""
     angles, places = np.linspace(0.0, 2.0 * np.pi, STEPS + 1), []
     for angle in angles:
         tip = CRANK * np.array((np.cos(angle), 0.0, np.sin(angle)))
@@ -84,7 +84,7 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> list[dict[str, 
 
 
 def shapes() -> Parts:
-    """What the bars look like; "post" stands for the ground."""
+    """Shapes of the bars; "post" represents the ground."""
     upright = (0.0, 0.5**0.5, 0.0, 0.5**0.5)  # the capsule's z along the bar's x
 
     def rod(length: float, color: tuple[float, float, float, float], y: float) -> Part:

@@ -1,4 +1,4 @@
-"""Move a tracked hand through a table: the one that is shown slides along it."""
+"""Move a tracked hand through a table: the shown hand slides along it."""
 
 from __future__ import annotations
 

@@ -9,11 +9,11 @@ from presenting import LIGHT, STEEL, command_line, picture, report
 import wholebody as wb
 
 LAMP = (0.28, 0.12, 2.10)  # m: its middle
-BELOW = (0.28, 0.12, 2.039)  # m: its lowest point, and a millimetre
+BELOW = (0.28, 0.12, 2.039)  # m: a millimetre below its lowest point
 
 
 def build() -> wb.Problem:
-    """State the problem; tasks/look_and_touch_overhead.toml says the same."""
+    """State the problem; tasks/look_and_touch_overhead.toml states the same."""
     scene = wb.Scene(wb.load("human", sex="male", stature=1.75, mass=78.0))
     scene.add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((1.40, 1.40, 0.04)), name="ceiling", at=(0.20, 0.0, 2.30), color=STEEL)

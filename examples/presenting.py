@@ -1,4 +1,4 @@
-"""What the examples share: a short report, a picture, a page, and the options of the command line."""
+"""Functions that the examples share: a short report, a picture, a page, and the options of the command line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LIGHT: Color = (0.98, 0.93, 0.70, 1.0)
 
 
 def report(title: str, problem: wb.Problem, solution: wb.Solution) -> None:
-    """Print what became of a problem: status, errors, least distance and time, as `wb.assess` finds them."""
+    """Print the result of a problem: status, errors, least distance and time, from `wb.assess`."""
     judged = wb.assess(problem, solution.q)
     print(f"{title}: {solution.status} in {solution.seconds:.2f} s, {solution.iterations} iterations")
     print(f"  {solution.message}")
@@ -34,7 +34,7 @@ def report(title: str, problem: wb.Problem, solution: wb.Solution) -> None:
 
 
 def nearest(scene: wb.Scene, solution: wb.Solution, within: float = 0.03, count: int = 4) -> str:
-    """The pairs that are nearest to each other, one line; what stands on the floor is left out."""
+    """The nearest pairs, in one line; pairs with the floor are left out."""
     contacts, owner = scene.contacts(solution.q, within), scene.piece_owner
     found: dict[tuple[str, str], float] = {}
     for (first, second), distance in zip(contacts.pair, contacts.distance, strict=True):
@@ -64,12 +64,12 @@ def picture(
 
     Args:
         name: of the two files.
-        problem: whose scene and goals are shown.
-        solution: whose posture is shown.
-        out: folder, made if it is not there.
-        eye: where the camera is, metres.
+        problem: its scene and goals are shown.
+        solution: its posture is shown.
+        out: folder, made if it does not exist.
+        eye: position of the camera, metres.
         target: the middle of the picture, metres.
-        see_through: things that would hide the figure.
+        see_through: things to draw transparent.
     """
     out.mkdir(parents=True, exist_ok=True)
     with wb.Viewer(problem.scene, see_through=see_through, title=name) as viewer:
@@ -83,7 +83,7 @@ def picture(
 
 
 def report_frames(title: str, scene: wb.Scene, recording: Recording) -> None:
-    """Print what became of a tracked motion, as `wholebody.interaction.judge` finds it."""
+    """Print the assessment of a tracked motion, from `wholebody.interaction.judge`."""
     judged = judge(scene, recording)
     inside = int((judged.tracked_depth > 1e-5).sum())
     milliseconds = 1e3 * recording.seconds

@@ -13,7 +13,7 @@ GRIP = (0.83, 0.14, 0.41, 0.0, 0.5**0.5, 0.0, 0.5**0.5)  # m: at the part; finge
 
 
 def build() -> wb.Problem:
-    """State the problem; tasks/robot_arm_among_obstacles.toml says the same."""
+    """State the problem; tasks/robot_arm_among_obstacles.toml states the same."""
     scene = wb.Scene(wb.load(ARM))
     scene.add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.03, 0.90, 0.25)), name="below the window", at=(0.50, 0.0, 0.125), color=STEEL)

@@ -1,4 +1,4 @@
-"""Reach into a shelf between two boards, and look at what the fingertip touches."""
+"""Reach into a shelf between two boards, and look at the fingertip's target."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PLACE = (0.72, -0.28, 1.16)  # m: between the boards, in front of the jar
 
 
 def build() -> wb.Problem:
-    """State the problem; tasks/shelf.toml says the same."""
+    """State the problem; tasks/shelf.toml states the same."""
     scene = wb.Scene(wb.load("human", sex="male", stature=1.75, mass=78.0))
     scene.add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.40, 0.02, 1.90)), name="left side", at=(0.70, 0.20, 0.95), color=OAK)

@@ -1,7 +1,7 @@
 """Drag a standing person down onto a chair by the pelvis, with the feet held: by newton and by qp.
 
-The challenge of Choi and Cremer, "Geometrically-aware interactive object manipulation" (1999), figure 1. On its way the
-pelvis is dragged into the seat; contact stops it, and no posture of the motion goes into anything.
+The challenge of Choi and Cremer, "Geometrically-aware interactive object manipulation" (1999), figure 1. During the
+motion the pelvis is dragged into the seat; contact stops it, and no posture of the motion penetrates anything.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ STAGES = (0.0, 0.3, 0.55, 0.8, 1.0)  # of the motion, in the picture
 
 
 def build() -> wb.Problem:
-    """State the problem; tasks/sit_on_chair.toml says the same."""
+    """State the problem; tasks/sit_on_chair.toml states the same."""
     person = wb.load("human", sex="male", stature=1.75, mass=78.0)
     scene = wb.Scene(person)
     scene.add(wb.HalfSpace(), name="floor")
@@ -48,7 +48,7 @@ def build() -> wb.Problem:
 
 
 def report(problem: wb.Problem, dragged: Dragged) -> None:
-    """Print what became of the motion, judged independently in every posture and between them."""
+    """Print the assessment of the motion, in every posture and between them."""
     judged, end = judge_drag(problem, dragged), dragged.q[-1]
     contacts, owner = problem.scene.contacts(end, within=0.03), problem.scene.piece_owner
     touching: dict[str, float] = {}

@@ -1,14 +1,14 @@
-"""`wholebody demo`: pose one of the tasks that come with the package."""
+"""`wholebody demo`: pose one of the packaged tasks."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-HELP = "pose a task that comes with the package"
+HELP = "pose a packaged task"
 DESCRIPTION = """\
-Pose a task that comes with the package (by default a person who reaches between the boards of a shelf), and say where
-the pictures are. The task file is a good one to copy and change."""
+Pose a packaged task (by default a person who reaches between the boards of a shelf), and print where the pictures are.
+You can copy and change the task file."""
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -17,7 +17,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser = commands.add_parser("demo", help=HELP, description=DESCRIPTION, formatter_class=shape)
     parser.add_argument("name", nargs="?", default="shelf", metavar="NAME", help="which task (default: shelf)")
     parser.add_argument("--list", action="store_true", help="list the tasks")
-    parser.add_argument("--out", type=Path, default=Path("demo"), metavar="DIR", help="where to write (default: demo)")
+    parser.add_argument("--out", type=Path, default=Path("demo"), metavar="DIR", help="folder (default: demo)")
     parser.set_defaults(run=run)
 
 

@@ -1,4 +1,4 @@
-"""`wholebody doctor`: print whether this installation is sound."""
+"""`wholebody doctor`: check this installation and print the result."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import argparse
 
 HELP = "check this installation: versions, methods, QP solvers, tools"
 DESCRIPTION = """\
-Print the versions of all packages, use every method and QP solver once, and name wrong combinations and search paths
-with what mends them; and say what is kept on disk of the convex pieces of meshes. Ends with exit code 1 when something
-is wrong; what is absent but not needed is no fault."""
+Print the versions of all packages, use every method and QP solver once, and name wrong combinations of versions and
+wrong search paths with their repairs. Print the folder and size of the cache of mesh pieces. The exit code is 1 if
+something is wrong; an absent optional package is no fault."""
 
 _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[red]broken[/]"}
 
@@ -20,13 +20,13 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser.add_argument(
         "--clear-cache",
         action="store_true",
-        help="throw away the pieces of meshes that are kept on disk, and end",
+        help="empty the cache of mesh pieces, and end",
     )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Examine and print; 1 where there are faults."""
+    """Examine and print; 1 if there are faults."""
     if arguments.clear_cache:
         return _clear_cache()
     from rich.console import Console
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     console = Console()
     if not console.is_terminal:
-        console.width = 140  # a file or a log need not be folded
+        console.width = 140  # a file or a log needs no wrapping
     with console.status("trying everything once (about ten seconds)"):
         report = examine()
     console.print(f"[bold]wholebody {__version__}[/], {report.python}", highlight=False, soft_wrap=True)

@@ -1,4 +1,4 @@
-"""`wholebody drag`: a goal of a task is dragged along a path, frame by frame, by any method."""
+"""`wholebody drag`: drag a goal of a task along a path, frame by frame, by any method."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ if TYPE_CHECKING:
 
 HELP = "drag a goal of a task along a path, frame by frame"
 DESCRIPTION = """\
-Drag a goal of a task file (its first point or frame, or the one that --goal names) along a path at an even speed; a
-frame keeps its orientation. The figure follows frame by frame and at the end meets the goal to 1e-5 m. Prints a table
-of times and of what is left, judged independently in every frame and between frames, and writes into a folder the
+Drag a goal of a task file (its first point or frame, or the one that --goal names) along a path at a constant speed; a
+frame keeps its orientation. The figure follows frame by frame and at the end meets the goal to 1e-5 m. Print a table
+of times and remaining errors, assessed independently in every frame and between frames. Write into a folder the
 table (Markdown), the numbers of every frame (CSV), a chart of the frame times (PNG, SVG) and the animation (HTML, opens
 without a network).
 
 paths:
-  line      from where the dragged frame starts to --to, or to the goal's own place
-  circle    from there to a circle of radius --size round the goal's own place, in the plane across --normal
-  FILE      from there through the places of a text file: x y z in metres, one place a line"""
+  line      from the start of the dragged frame to --to, or to the goal's target
+  circle    from the start to a circle of radius --size around the goal's target, normal to --normal
+  FILE      from the start through the points of a text file: x y z in metres, one point a line"""
 EPILOG = """\
 examples:
   wholebody drag sit_on_chair.toml --path line --method newton
   wholebody drag shelf.toml --path circle --size 0.05 --method qp
   wholebody drag shelf.toml --path corners.csv --frames 300 --out out/shelf
-exit code: 1 if the end is not met, or if a frame or the way to the next overlaps by more than 1 mm or leaves a limit"""
+exit code: 1 if the end is not met, or if the overlap in a frame or between two exceeds 1 mm, or a limit is violated"""
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -39,14 +39,14 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("drag", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
     parser.add_argument("task", type=Path, metavar="TASK.toml", help="the task file")
-    parser.add_argument("--path", required=True, metavar="FILE|circle|line", help="along what the goal moves")
+    parser.add_argument("--path", required=True, metavar="FILE|circle|line", help="path of the goal")
     parser.add_argument("--method", default="newton", metavar="NAME", help=f"{', '.join(METHODS)} (default: newton)")
     parser.add_argument("--goal", type=int, metavar="N", help="which goal, from 0 (default: first point or frame)")
-    parser.add_argument("--frames", type=int, metavar="N", help="frames (default: so that it moves at 0.5 m/s)")
+    parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: 0.5 m/s)")
     parser.add_argument("--size", type=float, default=0.1, metavar="M", help="radius of a circle, m (default: 0.1)")
     parser.add_argument(
         "--normal", type=float, nargs=3, default=(1.0, 0.0, 0.0), metavar=("X", "Y", "Z"),
-        help="across a circle's plane (default: 1 0 0, which faces the figure)",
+        help="normal of a circle's plane (default: 1 0 0, which faces the figure)",
     )  # fmt: skip
     parser.add_argument("--to", type=float, nargs=3, metavar=("X", "Y", "Z"), help="end of a line, m")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to (default: out/drag/NAME-OF-TASK)")
@@ -54,7 +54,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Drag, judge, report and write; 1 where the end is not met or something was penetrated."""
+    """Drag, assess, report and write; 1 if the end is not met or something was penetrated."""
     from wholebody.bench.drag import drag_chart, drag_frames, drag_report, drag_summary
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_rows, write_text
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def followed(problem: Problem, places: Any, method: str, goal: int, label: str) -> tuple[Dragged, DragJudgement]:
-    """Drag and judge, with a bar that shows how far it is."""
+    """Drag and assess, with a progress bar."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -128,7 +128,7 @@ def _goal(problem: Problem, number: int | None) -> int:
 
 
 def _corners(problem: Problem, goal: int, arguments: argparse.Namespace) -> Any:
-    """Corners (k, 3) of the path, from where the dragged frame is."""
+    """Corners (k, 3) of the path, from the position of the dragged frame."""
     import numpy as np
 
     from wholebody.errors import FileFormatError

@@ -8,7 +8,7 @@ from typing import Any
 
 HELP = "describe a figure, or write a person as a URDF"
 DESCRIPTION = """\
-List the joints with their limits, the frames to reach with, groups and postures of a figure:
+List the joints with their limits, the frames for goals, groups and postures of a figure:
 human, avatar, hand, or the path of a URDF. With --out, write a person as a URDF instead."""
 EPILOG = """\
 examples:
@@ -22,11 +22,11 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("figure", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
     parser.add_argument("name", metavar="FIGURE", help="human, avatar, hand, or the path of a URDF")
-    parser.add_argument("--sex", choices=("male", "female"), help="of a person (default: male)")
+    parser.add_argument("--sex", choices=("male", "female"), help="sex of a person (default: male)")
     parser.add_argument("--stature", type=float, metavar="M", help="height of a person, m (default: median)")
-    parser.add_argument("--mass", type=float, metavar="KG", help="of a person, kg (default: what the stature suggests)")
+    parser.add_argument("--mass", type=float, metavar="KG", help="mass of a person, kg (default: from the stature)")
     parser.add_argument(
-        "--detail", choices=("spheres", "capsules", "hulls"), help="of the geometry (default: capsules)"
+        "--detail", choices=("spheres", "capsules", "hulls"), help="detail of the geometry (default: capsules)"
     )
     parser.add_argument("--out", type=Path, metavar="FILE.urdf", help="write a person's URDF to this file")
     parser.set_defaults(run=run)

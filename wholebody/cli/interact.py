@@ -1,4 +1,4 @@
-"""`wholebody interact`: a tracked figure goes into things frame by frame; the shown one does not."""
+"""`wholebody interact`: a tracked figure penetrates things frame by frame; the shown figure does not."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ if TYPE_CHECKING:
     from wholebody.bench.interaction import InteractionRow, WorstFrames
     from wholebody.interaction import InteractionScene, Judgement, Recording
 
-HELP = "follow a tracker frame by frame through a gallery without going into walls"
+HELP = "follow a tracker frame by frame through a gallery without penetration"
 DESCRIPTION = """\
-Run a scene: a scripted tracker moves a hand or an avatar into walls, tables and itself, and the figure that is shown
-follows as far as contact allows. Prints a table of times and of what is left of the overlap, judged independently, and
-writes per frame numbers (CSV), a chart of the frame times (PNG, SVG) and the animation with the tracked posture as a
-ghost (HTML, opens without a network)."""
+Run a scene: a scripted tracker moves a hand or an avatar into walls, tables and itself, and the shown figure follows as
+far as contact allows. Print a table of times and remaining overlap, assessed independently. Write the numbers of every
+frame (CSV), a chart of the frame times (PNG, SVG) and the animation with the tracked posture as a ghost (HTML, opens
+without a network)."""
 EPILOG = """\
 examples:
   wholebody interact --list
   wholebody interact two_arms
   wholebody interact all --out out/interact
-exit code: 1 if a frame overlaps by more than is allowed, passes through something or leaves a joint limit or cone"""
+exit code: 1 if a frame overlaps by more than the tolerance, passes through something or leaves a joint limit or cone"""
 
 
 CHARTED = ("hand_on_table", "two_arms")
@@ -32,11 +32,11 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("interact", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
-    parser.add_argument("scene", nargs="?", metavar="SCENE", help="which scene, or all")
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help="name of the scene, or all")
     parser.add_argument("--list", action="store_true", help="list the scenes")
     parser.add_argument("--overlap", default="qp", metavar="METHOD", help="qp, ccd or all (default: qp)")
-    parser.add_argument("--frames", type=int, metavar="N", help="cut or repeat the script (default: all of it, once)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is random (default: 0)")
+    parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the whole script, once)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)")
     parser.add_argument(
         "--out", type=Path, default=Path("out/interact"), metavar="DIR", help="folder (default: out/interact)"
     )
@@ -89,7 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _check_writable(out: Path, docs: Path | None) -> None:
-    """Make the folder, and see that the pages are there, before anything is computed."""
+    """Make the folder, and check that the pages exist, before anything is computed."""
     import os
 
     from wholebody.errors import InputError
@@ -120,7 +120,7 @@ def _run_one(
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
         gc.collect()
-        gc.freeze()  # or Python looks through all that was loaded once in a run, which takes a frame 80 ms
+        gc.freeze()  # otherwise the garbage collector visits all objects once in a run, which delays a frame by 80 ms
         task = bar.add_task(f"{scene.name}, {overlap}", total=len(scene.track))
         recording = follow(
             scene.scene, scene.track, overlap=overlap, seed=seed, rigid=scene.rigid,
@@ -139,7 +139,7 @@ def _run_one(
 
 
 def _picture(scene: InteractionScene, recording: Recording, frame: int, path: Path) -> None:
-    """Draw the frame in which something is missed, with the tracked posture as a ghost; none if nothing is."""
+    """Draw the frame that misses a requirement, with the tracked posture as a ghost; none if all are met."""
     from wholebody.errors import MissingPackageError
     from wholebody.view import Viewer
 

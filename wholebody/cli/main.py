@@ -1,4 +1,4 @@
-"""The entry of the command `wholebody`: finds the command, runs it, and turns errors into one sentence."""
+"""The entry point of `wholebody`: it runs a subcommand and prints errors as one sentence."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from wholebody.errors import WholebodyError
 from wholebody.version import __version__
 
 DESCRIPTION = """\
-Pose whole bodies among things: people, avatars, hands and robots, in contact and never inside.
+Pose people, avatars, hands and robots among objects, in contact and without penetration.
 
-A task file (TOML) names a figure, the things around it and what to reach; `wholebody pose` finds a posture that
-reaches it, touches and never penetrates, judges it independently, and draws it. Begin with: wholebody demo"""
+A task file (TOML) names a figure, the things around it and the goals; `wholebody pose` finds a posture that meets the
+goals and penetrates nothing, assesses it independently, and draws it. Begin with: wholebody demo"""
 
 EXIT_CODES = """\
 exit codes:
   0  done
-  1  done, but the answer is not what was asked for: a goal out of reach, an unsound installation
-  2  something in the command, a task or another file is wrong; the message says what, where, and how to mend it"""
+  1  done, but the result is negative: a goal out of reach, a faulty installation
+  2  the command, a task or another file is wrong; the message says what, where, and how to correct it"""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -40,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Args:
-        argv: the arguments; those of the process if left out.
+        argv: the arguments; by default those of the process.
 
     Returns:
         The exit code: 0, 1 or 2 (see `EXIT_CODES`), 130 after Ctrl-C.
@@ -54,13 +54,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
-    except BrokenPipeError:  # the reader of our output, such as head, has had enough
+    except BrokenPipeError:  # the reader of our output, such as head, has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
 
 
 def _tell_progress() -> None:
-    """Write to stderr what takes seconds, such as the decomposition of a mesh; the library itself only logs it."""
+    """Report long steps, such as the decomposition of a mesh, to stderr; the library itself only logs them."""
     told = logging.getLogger("wholebody")
     if not any(isinstance(handler, logging.StreamHandler) for handler in told.handlers):
         told.addHandler(logging.StreamHandler())

@@ -30,7 +30,7 @@ def make_folder(folder: Path) -> None:
 
 
 def viewer_of(problem: Problem, view: View, title: str, **served: Any) -> Viewer:
-    """A viewer of the problem's scene, its camera as the task asks; `served` is the viewer's host and port."""
+    """A viewer of the problem's scene with the task's camera; `served` is the viewer's host and port."""
     from wholebody.view import Viewer
 
     viewer = Viewer(problem.scene, see_through=view.see_through, title=title, **served)
@@ -42,18 +42,18 @@ def viewer_of(problem: Problem, view: View, title: str, **served: Any) -> Viewer
 def draw(
     problem: Problem, q: NDArray[np.float64], view: View, folder: Path, title: str, *, picture: bool = True
 ) -> tuple[list[Path], str]:
-    """Write scene.html and, where that is asked for and there is a Chromium, scene.png.
+    """Write scene.html and, if requested and if there is a Chromium, scene.png.
 
     Args:
-        problem: whose scene and goals are drawn.
+        problem: its scene and goals are drawn.
         q: (nq,) the posture.
         view: the camera.
-        folder: where to write; it exists.
+        folder: an existing folder.
         title: of the page.
-        picture: whether scene.png is asked for.
+        picture: whether to draw scene.png.
 
     Returns:
-        The files, and a sentence for people where a picture could not be drawn.
+        The files, and a sentence if the picture could not be drawn.
     """
     with viewer_of(problem, view, title) as viewer:
         viewer.show(q, problem=problem)

@@ -15,7 +15,7 @@ Find a posture for a task file, print how good it is, and write into a folder:
   scene.html    the scene, for any browser, without a network
   scene.png     a picture of it (needs Chromium; not with --json or --no-picture)
 
-docs/taskfile.md lists all that a task file can say."""
+docs/taskfile.md lists everything that a task file can contain."""
 EPILOG = """\
 examples:
   wholebody pose shelf.toml
@@ -28,15 +28,15 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("pose", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
     parser.add_argument("task", type=Path, metavar="TASK.toml", help="the task file")
-    parser.add_argument("--method", metavar="NAME", help=f"instead of the file's: {', '.join(METHODS)}")
+    parser.add_argument("--method", metavar="NAME", help=f"method, in place of the file's: {', '.join(METHODS)}")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)")
     parser.add_argument("--json", action="store_true", help="print the result as JSON instead of tables; no picture")
-    parser.add_argument("--no-picture", action="store_true", help="leave scene.png out, which takes seconds")
+    parser.add_argument("--no-picture", action="store_true", help="do not draw scene.png, which takes seconds")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Pose, report and write; 1 where the posture is not a solution."""
+    """Pose, report and write; 1 if the posture is not a solution."""
     out = arguments.out or Path("out") / arguments.task.stem
     picture = not (arguments.no_picture or arguments.json)
     return pose(arguments.task, arguments.method, out, as_json=arguments.json, draw=picture)
@@ -47,10 +47,10 @@ def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False, dr
 
     Args:
         path: the task file.
-        method: name of the method, None for what the file asks for.
+        method: name of the method, None for that of the file.
         out: folder to write to; made if absent.
         as_json: print the result as JSON instead of tables.
-        draw: draw scene.png too.
+        draw: whether to draw scene.png too.
 
     Returns:
         The exit code.
@@ -70,7 +70,7 @@ def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False, dr
     text = result.as_json(result.describe(task, solution, out))
     files.write(out / "result.json", text)
 
-    from rich.console import Console  # what only tables and pictures need comes after the answer is written
+    from rich.console import Console  # needed only for tables and pictures, so imported after the result is written
 
     console = Console()
     notes = Console(stderr=True) if as_json else console

@@ -1,4 +1,4 @@
-"""A posture as a file: result.json, written after posing and read to look at it again."""
+"""The file result.json: written after posing, and read to show the posture again."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from wholebody.version import __version__
 
 
 class GoalLeft(NamedTuple):
-    """What is left of one goal.
+    """Remaining error of one goal.
 
     Attributes:
-        name: its type and what it moves.
-        distance: metres left; None where it has no place to reach.
-        angle: radians left; None where it has no direction to reach.
+        name: its type and its frame.
+        distance: metres; None for a goal without a position.
+        angle: radians; None for a goal without a direction.
     """
 
     name: str
@@ -36,7 +36,7 @@ class GoalLeft(NamedTuple):
 
 
 def goals_left(task: Task, q: Array) -> list[GoalLeft]:
-    """What is left of every goal at the posture q, shape (nq,)."""
+    """Remaining error of every goal at the posture q, shape (nq,)."""
     state = State(task.problem.scene.model).update(q)
     found = []
     for name, goal in zip(task.goal_names, task.problem.goals, strict=True):
@@ -48,12 +48,12 @@ def goals_left(task: Task, q: Array) -> list[GoalLeft]:
 
 
 def describe(task: Task, solution: Solution, folder: Path) -> dict[str, Any]:
-    """Return what result.json says.
+    """Return the content of result.json.
 
     Args:
-        task: what was asked.
-        solution: what was answered.
-        folder: where the file will be; the task file is named relative to it.
+        task: the task.
+        solution: its solution.
+        folder: the folder of the file; the path of the task file is relative to it.
     """
     figure, q = task.problem.scene.figure, solution.q
     state = State(figure.model).update(q)
@@ -77,15 +77,15 @@ def describe(task: Task, solution: Solution, folder: Path) -> dict[str, Any]:
 
 
 def as_json(description: dict[str, Any]) -> str:
-    """Return JSON; numbers that are not finite (the least distance where nothing can touch) become null."""
+    """Return JSON; numbers that are not finite (the least distance without pairs) become null."""
     return json.dumps(_finite(description), indent=2, allow_nan=False) + "\n"
 
 
 def read(path: Path) -> tuple[Task, Array]:
-    """Read a result: the task it belongs to, and its posture (nq,).
+    """Read a result: its task, and its posture (nq,).
 
     Raises:
-        FileFormatError: it is not a result, or not of the task as it is now.
+        FileFormatError: it is not a result, or does not fit the present task.
         WholebodyError: its task cannot be read.
     """
     text = read_text(path, "result")

@@ -1,4 +1,4 @@
-"""`wholebody show`: look at a figure, a task before it is solved, or a result."""
+"""`wholebody show`: show a figure, the start of a task, or a result."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from wholebody.taskfile.task import View
 
 LOCAL = "127.0.0.1"
-HELP = "look at a figure, a task or a result"
+HELP = "show a figure, a task or a result"
 DESCRIPTION = """\
-Show in a browser. It waits for the first tab, however late, and ends when the last one is closed, or with Ctrl-C:
+Show in a browser. The command waits for the first tab, and ends when the last one is closed, or with Ctrl-C:
 
   a figure   human, avatar, hand, or the path of a URDF
-  a task     a task file, as it starts, with its goals
-  a result   result.json, as `wholebody pose` wrote it"""
+  a task     the start of a task file, with its goals
+  a result   result.json, written by `wholebody pose`"""
 EPILOG = """\
 examples:
   wholebody show human --posture sitting
@@ -35,20 +35,20 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("show", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
     parser.add_argument("what", metavar="FIGURE|TASK|RESULT", help="what to show")
-    parser.add_argument("--posture", metavar="NAME", help="a posture of the figure by name")
+    parser.add_argument("--posture", metavar="NAME", help="name of a posture of the figure")
     parser.add_argument("--save", type=Path, metavar="FILE", help="write FILE.html or FILE.png; open no browser")
     parser.add_argument(
-        "--port", type=int, default=0, metavar="N", help="of the live page (default: a free one from 7000)"
+        "--port", type=int, default=0, metavar="N", help="port of the live page (default: a free one from 7000)"
     )
     parser.add_argument(
         "--host", default=LOCAL, metavar="ADDRESS",
-        help=f"of this machine to serve the page at (default: {LOCAL}; 0.0.0.0 lets everybody who reaches it look on)",
+        help=f"address of the live page (default: {LOCAL}; 0.0.0.0 allows access from other machines)",
     )  # fmt: skip
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Show, wait for the first tab, and until the last one is closed."""
+    """Show, and wait until the first tab is opened and the last one is closed."""
     from wholebody.cli.picture import viewer_of
     from wholebody.errors import InputError
 
@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _subject(what: str) -> tuple[Problem, NDArray[np.float64], View, str]:
-    """Problem, posture, view and title of what is to be shown."""
+    """Problem, posture, view and title of the subject."""
     from wholebody.cli import result
     from wholebody.figures import load
     from wholebody.problem import Problem

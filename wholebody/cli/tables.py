@@ -1,4 +1,4 @@
-"""Tables for people: goals, contacts, measures, figures."""
+"""Tables for the terminal: goals, contacts, measures, figures."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _measures(problem: Problem, solution: Solution) -> Table:
 
 
 def show_figure(console: Console, figure: Figure) -> None:
-    """Print what a figure is: size, names of joints, frames, groups and postures."""
+    """Describe a figure: size, names of joints, frames, groups and postures."""
     model = figure.model
     mass = sum(inertia.mass for inertia in model.inertias)
     console.print(

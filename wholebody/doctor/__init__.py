@@ -1,4 +1,4 @@
-"""Whether this installation can do its work, and what to do where it cannot."""
+"""Checks of an installation, with repairs for every fault."""
 
 from wholebody.doctor.examination import Entry, Report, examine
 

@@ -1,7 +1,7 @@
-"""Whether packages, QP solvers and methods work: each is used for real, in another process.
+"""Checks of packages, QP solvers and methods: each is really used, in a child process.
 
-A binary package of the wrong version can crash the process that imports it. So a child tries one name after the other;
-when it dies, the name it was at is what killed it, and a new child goes on with the rest.
+A binary package of the wrong version can crash the process that imports it. So a child process tries one name after the
+other. If it crashes, the present name caused the crash, and a new child process continues with the others.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from typing import NamedTuple
 from wholebody.runner import Child, EndedError
 
 TIMEOUT = 300.0
-"""Seconds for a check; it takes one or two, on a machine that is busy more, and the first compiles the loops."""
+"""Time limit of a check, seconds; a check takes one or two, more on a busy machine; the first compiles the loops."""
 
 
 class Outcome(NamedTuple):
-    """What came of a check.
+    """The outcome of a check.
 
     Attributes:
-        works: whether it did what it should.
-        detail: what was found, or why it failed, in a few words.
+        works: whether the check succeeded.
+        detail: the finding, or the reason of the failure, in a few words.
     """
 
     works: bool
@@ -29,7 +29,7 @@ class Outcome(NamedTuple):
 
 
 def import_module(name: str) -> str:
-    """Import a module; return the file it was found in."""
+    """Import a module; return its file."""
     from importlib import import_module as load
 
     return str(load(name).__file__)
@@ -104,8 +104,8 @@ def run(kind: str, names: Sequence[str], timeout: float = TIMEOUT) -> dict[str, 
 
     Args:
         kind: a key of `CHECKS`.
-        names: what to try.
-        timeout: seconds after which a check is ended.
+        names: names to try.
+        timeout: time limit of a check, seconds.
 
     Returns:
         An outcome for every name.
@@ -127,8 +127,8 @@ def run(kind: str, names: Sequence[str], timeout: float = TIMEOUT) -> dict[str, 
 
 
 def attempt(kind: str, name: str) -> tuple[bool, str]:
-    """Try a name in this process: whether it works, and what was found or why it failed."""
+    """Try a name in this process: whether it works, and the finding or the reason of the failure."""
     try:
         return True, CHECKS[kind](name)
-    except Exception as error:  # any failure at all is what is being looked for
+    except Exception as error:  # the check reports every failure
         return False, f"{type(error).__name__}: {error}".strip().splitlines()[0]

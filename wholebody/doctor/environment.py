@@ -1,4 +1,4 @@
-"""What around Python can harm: its own version, and search paths that hide packages and libraries."""
+"""Faults of the environment: Python's version, and search paths that hide packages and libraries."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 OLDEST, NEWEST = (3, 10), (3, 13)
 LIBRARIES = ("libpinocchio", "libcoal", "libhpp-fcl", "libeigenpy", "libboost_python", "liburdfdom", "libassimp")
-"""Shared libraries whose other versions break the ones that the wheels bring."""
+"""Shared libraries of which other versions break those of the wheels."""
 
 
 def python_fault(version: tuple[int, int] = sys.version_info[:2]) -> str | None:
@@ -20,7 +20,7 @@ def python_fault(version: tuple[int, int] = sys.version_info[:2]) -> str | None:
 
 
 def shadowing_folders(environ: Mapping[str, str], modules: Iterable[str]) -> dict[str, list[str]]:
-    """Folders of PYTHONPATH that hold modules of these names, as sourcing ROS or another workspace does.
+    """Folders of PYTHONPATH with modules of these names, for example after sourcing ROS or another workspace.
 
     Returns:
         Folder -> the modules in it.

@@ -1,4 +1,4 @@
-"""The whole examination: what is there, what works, and every fault with its repair."""
+"""The whole examination: installed parts, working parts, and every fault with its repair."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from wholebody.methods import EXTRAS as OF_METHODS
 State = Literal["works", "absent", "broken"]
 
 SOLVERS = {"osqp": "osqp", "daqp": "daqp", "quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
-"""QP solvers: name -> the distribution that brings it."""
+"""QP solvers: name -> the distribution that provides it."""
 
 TOOLS = {
     "chromium": ("draws pictures and movies; scenes as HTML need none", "apt-get install chromium"),
     "ffmpeg": ("writes MP4; GIF needs none", "apt-get install ffmpeg"),
 }
-"""Programs beside Python: name -> what it is for, and how it is had on Debian and Ubuntu."""
+"""Programs outside Python: name -> its purpose, and its installation on Debian and Ubuntu."""
 
 AGAIN = "pip install --force-reinstall wholebody"
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One thing that was looked at.
+    """One examined part.
 
     Attributes:
         kind: "package", "QP solver", "method", "tool" or "cache".
         name: its name.
         state: "works", "absent" or "broken".
         detail: version, time, place or reason.
-        needed: whether wholebody cannot do without it.
-        repair: the command or the deed that repairs it; empty where nothing is to be done.
+        needed: whether wholebody requires it.
+        repair: the command or action that repairs it; empty if none is needed.
     """
 
     kind: str
@@ -49,12 +49,12 @@ class Entry:
 
 @dataclass(frozen=True)
 class Report:
-    """What the examination found.
+    """The result of the examination.
 
     Attributes:
-        python: version and place of the interpreter.
-        entries: everything that was looked at.
-        faults: what is wrong, with its repair: (sentence, repair).
+        python: version and path of the interpreter.
+        entries: all examined parts.
+        faults: the faults with their repairs: (sentence, repair).
     """
 
     python: str
@@ -63,15 +63,15 @@ class Report:
 
     @property
     def healthy(self) -> bool:
-        """Whether nothing is wrong: what is absent but not needed does not count."""
+        """Whether there are no faults; an absent part that is not required is no fault."""
         return not self.faults
 
 
 def examine(environ: Mapping[str, str] = os.environ) -> Report:
-    """Look at everything; takes about ten seconds, because methods and solvers are really used.
+    """Examine everything; this takes about ten seconds, because methods and solvers are really used.
 
     Args:
-        environ: the environment variables to judge.
+        environ: the environment variables to examine.
     """
     have = packages.installed(["wholebody", *MODULES, *EXTRAS])
     entries = [*_packages(have), *_solvers(have), *_methods(), *_tools(), _cache()]

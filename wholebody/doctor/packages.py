@@ -1,4 +1,4 @@
-"""Which packages are installed, which contradict each other, and which are hidden by others of the same name."""
+"""Installed packages, conflicts between them, and packages that are hidden by others of the same name."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MODULES = {
     "platformdirs": "platformdirs",
     "rich": "rich",
 }
-"""What wholebody needs: distribution -> the module it brings."""
+"""Required packages: distribution -> its module."""
 
 EXTRAS = {
     "placo": "placo",
@@ -39,18 +39,18 @@ EXTRAS = {
     "mink": "compare",
     "mujoco": "compare",
 }
-"""What wholebody can use: distribution -> the extra that installs it."""
+"""Optional packages: distribution -> the extra that installs it."""
 
 _EXACT = re.compile(r"^\s*(?P<name>[\w.-]+)\s*==\s*(?P<version>[\w.+!-]+)\s*$")
 
 
 class Distribution(NamedTuple):
-    """What is installed under one name.
+    """An installed distribution.
 
     Attributes:
         version: its version.
         requires: its requirements, as its metadata states them.
-        files: absolute paths of what it installed; empty where its metadata does not say.
+        files: absolute paths of its files; empty if its metadata does not list them.
     """
 
     version: str
@@ -59,12 +59,12 @@ class Distribution(NamedTuple):
 
 
 class Conflict(NamedTuple):
-    """Two packages that cannot work together.
+    """Two incompatible packages.
 
     Attributes:
         who: the one with the requirement.
-        needs: what it needs, such as ``pin==3.8.0``.
-        found: the version that is installed instead; None where there is none.
+        needs: its requirement, such as ``pin==3.8.0``.
+        found: the installed version; None if there is none.
     """
 
     who: str
@@ -88,7 +88,7 @@ def normal(name: str) -> str:
 
 
 def installed(names: Iterable[str]) -> dict[str, Distribution]:
-    """Those of the named distributions that this Python has, and those that they need in an exact version."""
+    """The installed ones of the named distributions, and the distributions that they require in an exact version."""
     found: dict[str, Distribution] = {}
     left = [normal(name) for name in names]
     seen = set(left)
@@ -113,12 +113,12 @@ def exact_needs(distribution: Distribution) -> list[tuple[str, str]]:
 
 
 def conflicts(have: Mapping[str, Distribution]) -> list[Conflict]:
-    """Exact versions that an installed package asks for and does not get.
+    """Exact versions that an installed package requires and that are not installed.
 
     Those are the binary interfaces of Pinocchio, coal and placo, which are built against each other.
 
     Args:
-        have: what is installed, with what it needs in an exact version: `installed`.
+        have: the result of `installed`.
     """
     found = []
     for who, distribution in sorted(have.items()):
@@ -130,11 +130,11 @@ def conflicts(have: Mapping[str, Distribution]) -> list[Conflict]:
 
 
 def shadow(distribution: Distribution, file: str) -> str | None:
-    """Folder from which another package of the same name was imported, or None where the right one was.
+    """Folder from which another package of the same name was imported, or None if the right one was imported.
 
     Args:
-        distribution: what is installed.
-        file: where the imported module says it lies.
+        distribution: the installed distribution.
+        file: the file of the imported module.
     """
     if not distribution.files or os.path.realpath(file) in distribution.files:
         return None

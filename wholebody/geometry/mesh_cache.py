@@ -57,7 +57,7 @@ class ConvexPieces(NamedTuple):
         pieces: at least one.
         added_volume: volume of all pieces over the volume of the mesh, minus one; parts that are not closed do not
             count, since they have no volume of their own.
-        notes: one sentence for each part that could not be kept as it is.
+        notes: one sentence for each part that was changed.
     """
 
     pieces: tuple[Piece, ...]
@@ -66,11 +66,11 @@ class ConvexPieces(NamedTuple):
 
 
 class CacheState(NamedTuple):
-    """What is kept on disk.
+    """The state of the cache.
 
     Attributes:
-        folder: where.
-        entries: number of meshes.
+        folder: its folder.
+        entries: number of cached meshes.
         size: bytes.
         writable: whether this process can write there.
     """
@@ -82,7 +82,7 @@ class CacheState(NamedTuple):
 
 
 def cache_folder() -> Path:
-    """Return the folder of the cache, which need not exist: the user's of this platform, or what `VARIABLE` names."""
+    """Return the folder of the cache, which need not exist: the user's cache folder, or that of `VARIABLE`."""
     import platformdirs
 
     named = os.environ.get(VARIABLE)
@@ -92,13 +92,13 @@ def cache_folder() -> Path:
 
 
 def kept(content: tuple[bytes, ...], settings: str, what: str, make: Callable[[], ConvexPieces]) -> ConvexPieces:
-    """Return pieces from the cache, or make them and keep them.
+    """Return pieces from the cache, or make and cache them.
 
     Args:
-        content: what they are made from.
-        settings: how, with the versions of the libraries that make them.
+        content: the data that the pieces are made from.
+        settings: the settings, with the versions of the libraries.
         what: name of the mesh, with which all notes begin; the cache does not depend on it.
-        make: makes them.
+        make: makes the pieces.
     """
     digest = hashlib.sha256("\0".join((_FORMAT, __version__, settings)).encode())
     for part in content:

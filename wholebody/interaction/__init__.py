@@ -1,4 +1,4 @@
-"""Interaction: a figure that follows a tracker frame by frame among things, in contact and never inside them."""
+"""Interaction: a figure that follows a tracker frame by frame among things, in contact and without penetration."""
 
 from wholebody.interaction.dragging import Dragged, DragJudgement, drag_along, judge_drag
 from wholebody.interaction.judging import Judgement, judge

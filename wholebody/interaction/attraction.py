@@ -1,6 +1,6 @@
-"""What draws the shown posture to the tracked one, and how fast it may follow.
+"""The attraction of the shown posture to the tracked one, and the bound on the speed with which it follows.
 
-Unlike other terms these two change between steps: they stand for the tracker, which is read in every frame.
+Unlike other terms these two change between steps, because the tracker is read in every frame.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from wholebody.tasks.distance import SquaredDistance
 class Attraction(Measure):
     """Weighted squared distance from the tracked posture: ``sum_i w_i d_i^2``, d the tangent vector from there.
 
-    Its unconstrained minimum is the tracked posture itself, which one program reaches in one step where nothing is in
-    the way; in contact the minimum is the nearest posture that touches. A goal would say something else: it is met at
-    any price in the other joints, and its pull does not grow with the distance.
+    Its unconstrained minimum is the tracked posture itself, which one program reaches in one step without contact. In
+    contact the minimum is the nearest posture that touches. A goal would behave differently: it is met at any cost in
+    the other joints, and its force does not grow with the distance.
     """
 
     def __init__(self, model: pin.Model, q: Array, weights: Array) -> None:
@@ -27,7 +27,7 @@ class Attraction(Measure):
         self._distance = SquaredDistance.build(model, q, weights)
 
     def toward(self, q: Array) -> None:
-        """Attract to another posture (nq,) from now on."""
+        """Attract to another posture (nq,)."""
         self._distance.reference[:] = q
 
     def value(self, state: State) -> float:
@@ -44,7 +44,7 @@ class Attraction(Measure):
 
 
 class Pace(Bound):
-    """Bounds how far a whole frame moves, however many steps it takes."""
+    """Bounds the motion of a whole frame, whatever the number of its steps."""
 
     def __init__(self, model: pin.Model, limit: Array) -> None:
         """Allow `limit` (nv,) a frame to either side, radians and metres."""
@@ -52,10 +52,10 @@ class Pace(Bound):
         self._begin = pin.neutral(model)
 
     def begin(self, q: Array) -> None:
-        """Count from the posture q (nq,)."""
+        """Begin a frame at the posture q (nq,)."""
         self._begin = np.array(q)
 
     def bounds(self, state: State, dt: float | None) -> tuple[Array, Array]:
-        """What is left of the frame's way."""
+        """The remaining motion of the frame."""
         gone = np.asarray(pin.difference(state.model, self._begin, state.q))
         return np.minimum(-self._limit - gone, 0.0), np.maximum(self._limit - gone, 0.0)

@@ -1,4 +1,4 @@
-"""overlap="ccd": the overlap of an articulated figure is removed limb by limb by cyclic coordinate descent."""
+"""overlap="ccd": cyclic coordinate descent removes the overlap of an articulated figure limb by limb."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
 from wholebody.scene import Scene
 
 NOTED = 1e-3
-"""Depth left, metres, that a frame's note speaks of."""
+"""Remaining depth, metres, from which a frame's note reports it."""
 
 SPEED = 4.0
-"""rad/s at which a joint may be displaced from the tracked one, or be drawn back: fast enough to be back from 2 rad in
-half a second, and slow enough not to look like a jump."""
+"""Largest velocity, rad/s, with which a joint moves away from the tracked one or returns to it: fast enough to return
+from 2 rad in half a second, and slow enough not to look like a jump."""
 
 ROOT_SPEED = 2.0  # m/s
 
@@ -26,11 +26,11 @@ class CCDStrategy:
     sweep_tolerance = 8e-4
 
     def __init__(self, scene: Scene, shown: Array, dt: float, seed: int) -> None:
-        """Set up for frames of `dt` seconds.
+        """Prepare for frames of `dt` seconds.
 
         Args:
             scene: the figure among things.
-            shown: (nq,) where the figure is.
+            shown: (nq,) the present posture.
             dt: seconds from frame to frame.
             seed: of the order of the chains.
         """

@@ -1,7 +1,8 @@
-"""A goal dragged along a path by any method: what was shown, what it took, and how good it is.
+"""A goal dragged along a path by any method: the postures, their times, and their assessment.
 
 The drag of Choi and Cremer 1999, section 3: a stream of nearby goals, each met with moderate accuracy and the last one
-with high. Judged are all postures, by every pair of pieces, and the ways between them, by a continuous sweep.
+with high accuracy. All postures are assessed, by every pair of pieces, and the motions between them, by a continuous
+sweep.
 """
 
 from __future__ import annotations
@@ -29,23 +30,23 @@ from wholebody.tasks import Point
 
 Counts = NDArray[np.intp]
 
-SETTLED = 1e-3  # m, rad: a goal that is left by less than this when it has come to its end is met at once
-GAIN = 1e-4  # m, rad: a figure that nears it by less in a frame has come to rest
-SETTLING = 120  # most frames that are added for one that lags behind
+SETTLED = 1e-3  # m, rad: largest error at the end of the path for which no frames are added
+GAIN = 1e-4  # m, rad: a figure that approaches the goal by less in a frame is at rest
+SETTLING = 120  # most frames that are added for a figure that lags behind
 
 
 @dataclass(frozen=True, eq=False)
 class Dragged:
-    """A drag, frame by frame; `q` and `dt` as a clip has them.
+    """A drag, frame by frame; it has `q` and `dt` like a clip.
 
     Attributes:
         q: (n + 2, nq) the start, every frame, and the end, which is solved to full accuracy.
-        targets: (n, 3) where the goal was in each frame, metres; the last place again while the figure lags.
+        targets: (n, 3) position of the goal in each frame, metres; the last one is repeated while the figure lags.
         dt: seconds from frame to frame.
-        method: its name.
+        method: name of the method.
         seconds, cpu_seconds: (n,) of each frame: wall time, and the processor's for this thread.
-        iterations: (n,) of the method.
-        end: the answer at the end.
+        iterations: (n,) of the method in each frame.
+        end: the solution at the end.
     """
 
     q: Array
@@ -67,12 +68,12 @@ class DragJudgement:
     """How good a drag is; arrays have a row a posture, the start first and the end last.
 
     Attributes:
-        error: (n,) what was left to the moving goal's target in each frame, metres, or radians where that is more.
-        depth: (n + 2,) deepest overlap of any pair, metres; 0 where there is none.
-        between: (n + 1,) a bound on how much deeper any pair gets on the way to the next posture than at the deeper end
-            of that way, metres, one of `motion_assessment.DEPTHS`; inf where it is more than the last of them.
-        constraint_violation: (n + 2,) how far the worst constraint is from holding, metres or radians.
-        limit_violation: how far the worst joint of any posture is out of its limits, radians.
+        error: (n,) remaining error of the moving goal in each frame, metres, or radians if that is more.
+        depth: (n + 2,) deepest overlap of any pair, metres; 0 if there is none.
+        between: (n + 1,) a bound on how much deeper any pair gets between two postures than at the deeper of the two,
+            metres, one of `motion_assessment.DEPTHS`; inf if it is more than the last of them.
+        constraint_violation: (n + 2,) largest violation of a constraint, metres or radians.
+        limit_violation: largest violation of a joint limit at any posture, radians.
         jerk: (n - 1,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
     """
 
@@ -85,7 +86,7 @@ class DragJudgement:
 
 
 def present_place(problem: Problem, goal: int = 0) -> Array:
-    """Where the frame (or its point) that a goal moves is at the problem's start, (3,) metres.
+    """Position of a goal's frame (or of its point) at the problem's start, (3,) metres.
 
     Raises:
         InputError: the goal is not a `Point` or a `Frame`.
@@ -96,7 +97,7 @@ def present_place(problem: Problem, goal: int = 0) -> Array:
 
 
 def goal_place(problem: Problem, goal: int = 0) -> Array:
-    """Where a goal is, (3,) metres; raises like `present_place`."""
+    """Position of a goal's target, (3,) metres; raises like `present_place`."""
     term = moving_goal(problem, goal)
     return np.array(term.resolved_target if isinstance(term, Point) else term.resolved_target.translation, dtype=float)
 
@@ -110,20 +111,20 @@ def drag_along(
     dt: float = FRAME,
     progress: Callable[[int], None] | None = None,
 ) -> Dragged:
-    """Drag a goal through places, one a frame, and meet the last with full accuracy.
+    """Drag a goal through positions, one a frame, and meet the last with full accuracy.
 
-    A figure that lags behind is given more frames at the last place until it comes to rest.
+    A figure that lags behind gets more frames at the last position until it comes to rest.
 
     Args:
         problem: with the goal that moves, a `Point` or a `Frame`, which keeps its orientation.
         places: (n, 3) metres.
         method: see `Drag`.
-        goal: which of the problem's goals moves.
+        goal: index of the goal that moves.
         dt: seconds from frame to frame.
-        progress: called with the number of frames done after each.
+        progress: called after each frame with the number of frames done.
 
     Raises:
-        InputError: the goal or the places are none.
+        InputError: the goal or the positions are invalid.
         UnknownNameError: there is no such method.
     """
     given = array(places, "places", "places of shape (n, 3), metres")
@@ -162,12 +163,12 @@ def drag_along(
 
 
 def _lags(left: list[float], late: int) -> bool:
-    """Whether a figure still comes nearer to the last place, from what was left in each frame."""
+    """Whether a figure still approaches the last position, from the error in each frame."""
     return late < SETTLING and left[-1] > SETTLED and left[-2] - left[-1] > GAIN
 
 
 def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudgement:
-    """Judge a drag of a problem's goal."""
+    """Assess a drag of a problem's goal."""
     own = copied(problem)
     instance(dragged, Dragged, "judge_drag: dragged", "make one with drag_along(problem, places)")
     moving_goal(problem, goal)
@@ -188,6 +189,6 @@ def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudg
 
 
 def _aim(problem: Problem, goal: int, place: Array) -> Array | pin.SE3:
-    """The target of a moving goal at a place (3,)."""
+    """The target of a moving goal at a position (3,)."""
     term = moving_goal(problem, goal)
     return place if isinstance(term, Point) else pin.SE3(term.resolved_target.rotation, place)

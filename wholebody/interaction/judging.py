@@ -1,4 +1,4 @@
-"""What a recording of the frame loop is judged by: the motion itself, and how far it is from what was tracked."""
+"""The assessment of a recording of the frame loop: its motion, and its distance from the tracked motion."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from wholebody.scene import Scene
 Counts = NDArray[np.intp]
 
 PASSING = {"qp": 1e-4, "ccd": 1e-3}
-"""Depth on the way between two frames that counts as passing, metres: what may be left in the frames themselves."""
+"""Depth between two frames that counts as passing through, metres: as much as may remain in the frames themselves."""
 
-BACK = 1e-3  # rad, m: nearer than this to the tracked posture the shown one is back
-IN_TIME = 30  # frames after the end of contact in which it should be back
+BACK = 1e-3  # rad, m: the shown posture has returned if it is nearer to the tracked one than this
+IN_TIME = 30  # frames after the end of contact in which it should return
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,18 +28,19 @@ class Judgement:
     """How good a recording is; arrays have a row a frame.
 
     Attributes:
-        depth: (n,) deepest overlap of any pair in the shown posture, metres; 0 where there is none.
+        depth: (n,) deepest overlap of any pair in the shown posture, metres; 0 if there is none.
         tracked_depth: (n,) the same of the tracked posture.
-        tracked_pairs: (n,) overlapping pairs of pieces in the tracked posture.
-        limit_violation: how far the worst joint of any shown posture is out of its limits, radians.
-        cone_violation: how far the worst limb is out of its reach cone, radians.
-        passed: frames on the way to which some pair went deeper than 0.1 mm (qp) or 1 mm (ccd).
+        tracked_pairs: (n,) number of overlapping pairs of pieces in the tracked posture.
+        limit_violation: largest violation of a joint limit at any shown posture, radians.
+        cone_violation: largest angle of a limb outside its reach cone, radians.
+        passed: frames before which some pair got deeper than 0.1 mm (qp) or 1 mm (ccd) during the motion.
         distance: (n,) root of the mean square of joint angles between shown and tracked posture, radians.
-        root_distance: (n,) distance between the two places of a free root, metres.
+        root_distance: (n,) distance between the two positions of a free root, metres.
         jerk: (n - 3,) the root of the mean square of the third difference of the shown joint angles, rad/s^3.
         tracked_jerk: (n - 3,) of the tracked ones.
-        returns: for every end of contact that was followed by 30 frames without, the frame, and after how many frames
-            the shown posture was back at the tracked one to 1 mrad; -1 where it was not back by the next contact.
+        returns: for every end of contact that was followed by 30 frames without contact: the frame, and the number of
+            frames until the shown posture was at the tracked one to 1 mrad; -1 if that did not happen before the next
+            contact.
     """
 
     depth: Array
@@ -56,7 +57,7 @@ class Judgement:
 
 
 def judge(scene: Scene, recording: Recording) -> Judgement:
-    """Judge a recording of a scene."""
+    """Assess a recording of a scene."""
     instance(scene, Scene, "judge: scene", "make one with wb.Scene(figure)")
     instance(recording, Recording, "judge: recording", "make one with follow(scene, track)")
     shown, tracked = (assess_motion(scene, q, recording.dt) for q in (recording.q, recording.tracked))

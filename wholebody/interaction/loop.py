@@ -1,7 +1,7 @@
-"""The frame loop: driven objects first, each coupled to its tracker and freed of overlap; then what moves by itself.
+"""The frame loop: the figure moves towards its tracker, and its overlap is removed.
 
 Schmidl and Lin, "Real-time physically-based interaction between avatars and virtual environments", figure 3. The figure
-(with what it carries) is the driven object, the things of the scene are fixed. In every frame, at rest too, the figure
+(with carried things) is the driven object; the things of the scene are fixed. In every frame, also at rest, the figure
 is attracted to the tracked posture as far as contact allows.
 """
 
@@ -34,26 +34,26 @@ from wholebody.tasks import ReachCones
 OVERLAPS = ("qp", "ccd")
 
 SHARES = (0.5, 0.25)
-"""Of the way, tried when all of it is not free: what keeps to a surface leaves it by the square of the share."""
+"""Shares of the motion that are tried if the whole is not free: an arc leaves a surface by the square of the share."""
 
 
 def check_scene(scene: object, what: str) -> None:
-    """Refuse what is no scene.
+    """Check that the argument is a scene.
 
     Raises:
-        InputError: it is none.
+        InputError: it is not.
     """
     instance(scene, Scene, f"{what}: scene", "make one with wb.Scene(figure)")
 
 
 class FrameLoop:
-    """Shows a figure that follows a tracker, frame by frame, and is never inside of things.
+    """Computes the posture of a figure that follows a tracker, frame by frame, without penetration.
 
     Attributes:
         scene: the figure among things.
-        shown: (nq,) the posture that is shown now.
-        overlap: how overlap is removed.
-        count: frames so far.
+        shown: (nq,) the posture that is shown at present.
+        overlap: name of the overlap strategy.
+        count: number of frames so far.
     """
 
     def __init__(
@@ -66,17 +66,16 @@ class FrameLoop:
         seed: int = 0,
         rigid: bool = False,
     ) -> None:
-        """Begin.
+        """Prepare the first frame.
 
         Args:
             scene: the figure among things.
-            start: (nq,) tracked posture of the beginning; where it overlaps something, the nearest posture that does
-                not is shown.
-            overlap: "qp": the nearest posture without overlap, by programs; "ccd": limb by limb by cyclic coordinate
-                descent, and what is rigid by its global penetration depth, as Schmidl and Lin do.
+            start: (nq,) first tracked posture; if it overlaps something, the nearest posture without overlap is shown.
+            overlap: "qp": the nearest posture without overlap, by quadratic programs; "ccd": limb by limb by cyclic
+                coordinate descent, or for a rigid figure by its global penetration depth, as Schmidl and Lin do.
             dt: seconds from frame to frame.
-            seed: of what is done in random order.
-            rigid: whether the figure is displaced as a whole, as a hand is, while its joints follow the tracker.
+            seed: of all random orders.
+            rigid: whether the figure is displaced as a whole, such as a hand, while its joints follow the tracker.
 
         Raises:
             UnknownNameError: another overlap.
@@ -94,16 +93,16 @@ class FrameLoop:
             raise InputError(f"frame 0: {unreadable}; begin with a posture of {scene.figure.name}")
         self.shown, self._note = free_start(scene, q, rigid)
         self._strategy = self._strategy_for(overlap, dt, seed, rigid)
-        self._kept_from_passing(self._strategy.resolve(self.shown, self.shown))  # what is set up once, before the clock
+        self._kept_from_passing(self._strategy.resolve(self.shown, self.shown))  # one-time set-up
 
     def frame(self, tracked: ArrayLike) -> Frame:
         """Show one frame.
 
-        A tracked posture that cannot be read (a sensor that dropped out) leaves the figure where it is; the note of the
-        frame says so.
+        If the tracked posture is invalid (a sensor that failed), the figure keeps its posture, and the note of the
+        frame reports it.
 
         Args:
-            tracked: (nq,) what the tracker says.
+            tracked: (nq,) the tracked posture.
         """
         began = _clocks()
         goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
@@ -111,7 +110,7 @@ class FrameLoop:
         if unreadable:
             return self._shown(Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{unreadable}; the figure stays"), began)
         resolution = self._strategy.resolve(self.shown, self._readable(goal))
-        # Simulated objects would move here, after the driven ones have found their places.
+        # Simulated objects would move here, after the driven ones.
         return self._shown(self._kept_from_passing(resolution), began)
 
     def _shown(self, resolution: Resolution, began: tuple[float, float]) -> Frame:
@@ -129,11 +128,11 @@ class FrameLoop:
         return self.scene.figure.clamp(pin.normalize(self.scene.model, goal))
 
     def _kept_from_passing(self, resolution: Resolution) -> Resolution:
-        """The first posture whose way from the one shown is free; else a part of its way, or the one shown.
+        """The first posture to which the motion is free; otherwise a share of the motion, or the posture shown.
 
-        What the resolution swept is not swept again. This is the interpolation with the last posture without overlap of
-        algorithm 1, step 4. What is free for the whole length of a share is taken, and never what is free up to a
-        contact: that would creep into it.
+        A motion that the resolution swept is not swept again. This is the interpolation with the last posture without
+        overlap of algorithm 1, step 4. Only a share whose whole motion is free is taken. Motions up to a contact are
+        not taken, because they would creep into it.
         """
         if resolution.swept:
             return resolution
@@ -166,7 +165,7 @@ class FrameLoop:
 
 
 def _unreadable(scene: Scene, q: Array) -> str:
-    """Why a tracked posture is none, or ""."""
+    """Why a tracked posture is invalid, or ""."""
     if q.shape != (scene.model.nq,) or not np.isfinite(q).all():
         return f"the tracked posture is not {scene.model.nq} finite numbers"
     if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
@@ -180,7 +179,7 @@ def _clocks() -> tuple[float, float]:
 
 
 def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
-    """The posture q, or the nearest one that is inside nothing, with a note of what was done.
+    """The posture q, or the nearest one without overlap, with a note of the change.
 
     Raises:
         InputError: no posture near it is free of overlap.
@@ -200,7 +199,7 @@ def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
 
 
 def deepest_overlap(scene: Scene, q: Array) -> str:
-    """The deepest overlap at q in words, or "" where there is none."""
+    """The deepest overlap at q in words, or "" if there is none."""
     contacts = scene.contacts(q, within=-PENETRATION)
     if not len(contacts.distance):
         return ""
@@ -221,14 +220,14 @@ def follow(
 
     Args:
         scene: the figure among things.
-        track: what the tracker says; it may go into things.
-        overlap: how overlap is removed, see `FrameLoop`.
-        seed: of what is done in random order; the same seed gives the same frames.
+        track: the tracked postures; they may overlap things.
+        overlap: name of the overlap strategy, see `FrameLoop`.
+        seed: of all random orders; the same seed gives the same frames.
         rigid: whether the figure is displaced as a whole, see `FrameLoop`.
-        progress: called with the number of frames done after each.
+        progress: called after each frame with the number of frames done.
 
     Raises:
-        UnknownNameError, InputError: the track does not fit the figure, or its start cannot be freed of overlap; frame
+        UnknownNameError, InputError: the track does not fit the figure, or no posture near its start is free; frame
             and place are named, before anything is computed.
     """
     check_scene(scene, "follow")

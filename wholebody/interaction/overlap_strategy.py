@@ -1,4 +1,4 @@
-"""What the ways to remove overlap have in common."""
+"""The protocol of overlap strategies."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from wholebody.arrays import Array
 
 
 class Resolution(NamedTuple):
-    """How the overlap of one frame was removed; the other attributes are those of `wholebody.interaction.Frame`.
+    """Result of the overlap removal of one frame; the other attributes are those of `wholebody.interaction.Frame`.
 
     Attributes:
-        candidates: postures (nq,) to show, the best one first; the next is taken if the way to one is not free.
-        swept: the way to the first of them was swept and is free.
+        candidates: postures (nq,) to show, the best one first; the next is taken if the motion to one is not free.
+        swept: whether the motion to the first of them was swept and is free.
     """
 
     candidates: tuple[Array, ...]
@@ -26,11 +26,11 @@ class Resolution(NamedTuple):
 
 
 class OverlapStrategy(Protocol):
-    """A way to remove overlap."""
+    """An algorithm that removes overlap."""
 
     @property
     def sweep_tolerance(self) -> float:
-        """Depth, metres, to which the way from frame to frame may go in: less than what its postures may keep."""
+        """Allowed depth of the motion from frame to frame, metres; less than that of its postures."""
 
     def resolve(self, shown: Array, tracked: Array) -> Resolution:
         """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""

@@ -1,4 +1,4 @@
-"""Paths that a goal is dragged along: lines, circles, and places from a file."""
+"""Paths of dragged goals: lines, circles, and points from a file."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from wholebody.files import read_text
 from wholebody.interaction.tracks import MOST_FRAMES
 from wholebody.tasks.inputs import direction, point
 
-SPEED = 0.5  # m/s: of a hand that drags, where the number of frames is not given
+SPEED = 0.5  # m/s: of the goal, if the number of frames is not given
 CORNERS = 72  # of a circle
 SMALLEST = 1e-6  # m: of a circle
-LARGEST = 100.0  # m: a place farther out is taken for a slip of units
+LARGEST = 100.0  # m: a point farther from the origin is refused as a wrong unit
 
 
 class Line(NamedTuple):
-    """A line of a file: its number, counted from one, and what it says."""
+    """A line of a file: its number, counted from one, and its text."""
 
     number: int
     text: str
 
 
 def circle(center: ArrayLike, radius: float, normal: ArrayLike = (1.0, 0.0, 0.0)) -> Array:
-    """Corners (k, 3) of a closed circle, which begins and ends at its lowest place.
+    """Corners (k, 3) of a closed circle, which begins and ends at its lowest point.
 
     Args:
         center: (3,) metres.
         radius: metres.
-        normal: (3,) of its plane; x faces the figure. Where it is upright the circle begins in front.
+        normal: (3,) of its plane; x faces the figure. With a vertical normal the circle begins in front.
 
     Raises:
         InputError: the radius is not positive, or a value is not finite.
@@ -52,15 +52,15 @@ def circle(center: ArrayLike, radius: float, normal: ArrayLike = (1.0, 0.0, 0.0)
 
 
 def read_path(path: str | os.PathLike[str]) -> Array:
-    """Read places from a text file: x, y and z in metres, one place a line, parted by commas or spaces.
+    """Read points from a text file: x, y and z in metres, one point a line, separated by commas or spaces.
 
-    Empty lines, what follows a #, and a first line of names are left out.
+    Empty lines, comments after #, and a first line of names are ignored.
 
     Returns:
-        (k, 3) places, at least one.
+        (k, 3) points, at least one.
 
     Raises:
-        FileFormatError: the file cannot be read or a line is no place; the line is named.
+        FileFormatError: the file cannot be read or a line is no point; the line is named.
     """
     path = checked_path(path, "path")
     text = read_text(path, "path")
@@ -75,11 +75,11 @@ def read_path(path: str | os.PathLike[str]) -> Array:
 
 
 def spread(corners: ArrayLike, frames: int | None = None, dt: float = 1.0 / 60.0) -> Array:
-    """Places (n, 3) evenly along a path, its end the last and its beginning left out.
+    """Evenly spaced points (n, 3) of a path, with its end and without its beginning.
 
     Args:
         corners: (k, 3) of the path, metres.
-        frames: how many; as many as make half a metre a second if left out.
+        frames: number of points; by default as many as give half a metre a second.
         dt: seconds a frame.
 
     Raises:

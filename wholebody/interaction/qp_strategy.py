@@ -1,4 +1,4 @@
-"""overlap="qp": the nearest posture to the tracked one that is inside nothing, by a few programs a frame."""
+"""overlap="qp": the nearest posture to the tracked one without overlap, by a few quadratic programs a frame."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
 
 CLEARANCE = 1e-3
-"""Metres kept between pieces. A step is exact to first order only, and what it neglects must fit in here."""
+"""Clearance of pieces, metres. A step is exact to first order only; the clearance must exceed its error."""
 
 STEPS = 2
-"""Most programs a frame. One is enough in the open; the second mends what the first, exact to first order, neglected.
-More would settle limbs in fewer frames and take longer in each."""
+"""Most programs a frame. One is enough without contact; the second corrects the second-order error of the first. More
+would converge in fewer frames and take longer in each."""
 
 SETTLED = 1e-4
 """Largest entry of a step, radians and metres, below which the frame is done."""
 
 SPEED = 8.0
-"""rad/s at which joints may follow: above what people do, so that what is released returns soon but not in a jump."""
+"""Velocity limit of joints, rad/s: above that of people, so that a released figure returns soon but does not jump."""
 
 ROOT_SPEED = 3.0  # m/s
 ROOT_WEIGHT = 1000.0
-"""Attraction of the root against that of a joint, 1/m^2 to 1/rad^2: limbs give way before the whole body does."""
+"""Weight of the root relative to that of a joint, 1/m^2 to 1/rad^2: limbs give way before the whole body."""
 
 RIGID_WEIGHT = 100.0
-"""Attraction of joints and of the root's turn against that of the root's place, for what gives way as a whole. A finger
+"""Weight of joints and of the root's rotation relative to that of the root's position, for a rigid figure. A finger
 8 cm long then takes a ten-thousandth of a displacement."""
 
 
@@ -43,11 +43,11 @@ class QPStrategy:
     sweep_tolerance = 5e-5
 
     def __init__(self, scene: Scene, start: Array, dt: float, rigid: bool) -> None:
-        """Set up for frames of `dt` seconds, from the overlap-free posture `start`, (nq,).
+        """Prepare for frames of `dt` seconds, from the overlap-free posture `start`, (nq,).
 
         Args:
             scene: the figure among things.
-            start: (nq,) where the figure is.
+            start: (nq,) the present posture.
             dt: seconds from frame to frame.
             rigid: whether the figure is displaced as a whole while its joints follow the tracker.
         """
@@ -62,11 +62,11 @@ class QPStrategy:
         self._into_cones = OverlapResolver(scene, scene.workspace()).into_cones if cones else np.array
 
     def resolve(self, shown: Array, tracked: Array) -> Resolution:
-        """One frame: from the posture that is shown towards the tracked one, as near as it can be.
+        """One frame: from the shown posture towards the tracked one, as near as possible.
 
         Args:
             shown: (nq,) of the frame before, overlap-free.
-            tracked: (nq,) what the tracker says.
+            tracked: (nq,) the tracked posture.
         """
         workspace = self._tracker.workspace
         proximity = workspace.proximity
@@ -77,7 +77,7 @@ class QPStrategy:
         candidates: list[Array] = []
         while len(candidates) < STEPS:
             step = self._tracker.step(q)
-            q = self._into_cones(step.q)  # rows are exact to first order only, and a corner of a cone is no edge
+            q = self._into_cones(step.q)  # rows are exact to first order only, and have one edge at a corner of a cone
             candidates.append(q)
             if np.abs(step.displacement).max() < SETTLED or not step.rows:
                 break
@@ -99,7 +99,7 @@ def weights(scene: Scene, rigid: bool) -> Array:
 
 
 def pace(scene: Scene, dt: float) -> Array:
-    """How far every degree of freedom may move in a frame, (nv,)."""
+    """Largest motion of every degree of freedom in a frame, (nv,)."""
     result = np.full(scene.model.nv, SPEED * dt)
     if scene.figure.root == "free":
         result[:3] = ROOT_SPEED * dt

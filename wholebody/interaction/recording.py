@@ -1,4 +1,4 @@
-"""What was shown, frame by frame, and what it took."""
+"""Recordings: the shown postures, frame by frame, with times and counts."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ class Frame(NamedTuple):
     """One frame.
 
     Attributes:
-        q: (nq,) the posture that is shown, free of overlap as far as the note does not say otherwise.
-        seconds: that the frame took, without drawing.
-        cpu_seconds: that the processor worked on it, without waiting for other work on a shared machine.
-        contact_seconds: of it, in collision queries.
-        solve_seconds: of it, in finding joint angles (or, for a rigid figure, its displacement).
+        q: (nq,) the shown posture, free of overlap unless the note says otherwise.
+        seconds: wall time of the frame, without drawing.
+        cpu_seconds: the processor's time, without waiting for other work on a shared machine.
+        contact_seconds: the part of it for collision queries.
+        solve_seconds: the part of it for joint angles (or, for a rigid figure, its displacement).
         iterations: programs solved, passes of CCD with a goal made anew, or displacements.
-        joints: that were adjusted for contact, counted once for each iteration that adjusted them, as the joints per
-            frame of table 2 of Schmidl and Lin; 0 where the figure is displaced as a whole.
-        pairs: pairs of pieces that were held off or taken apart.
-        note: "" or what was out of the ordinary.
+        joints: number of joints adjusted for contact, counted once for each iteration that adjusted them, as the joints
+            per frame of table 2 of Schmidl and Lin; 0 if the figure is displaced as a whole.
+        pairs: number of pairs of pieces that were kept apart or separated.
+        note: "" or a report of unusual events.
     """
 
     q: Array
@@ -43,11 +43,11 @@ class Frame(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """All frames of a run, as arrays of n rows; `q` and `dt` as a clip has them.
+    """All frames of a run, as arrays of n rows; it has `q` and `dt` like a clip.
 
     Attributes:
-        q: (n, nq) what was shown.
-        tracked: (n, nq) what the tracker said.
+        q: (n, nq) the shown postures.
+        tracked: (n, nq) the tracked postures.
         dt: seconds from frame to frame.
         overlap: "qp" or "ccd".
         seconds, cpu_seconds, contact_seconds, solve_seconds: (n,) as in `Frame`.

@@ -1,8 +1,8 @@
-"""overlap="ccd" for what is rigid: it is displaced as a whole by the global penetration depth.
+"""overlap="ccd" for a rigid figure: it is displaced as a whole by the global penetration depth.
 
 Schmidl and Lin find that "even a complicated object, such as an articulated hand, can be handled in this way": the
-fingers follow the glove, and the hand with its fingers as they are is pushed back by pure translation. PD_g is the
-sum of pd_i^2 n_i over the sum of pd_i (their equation 1), n_i out of the obstacle; it is asked again until nothing
+fingers follow the glove, and the hand with its present fingers is displaced by pure translation. PD_g is the sum of
+pd_i^2 n_i over the sum of pd_i (their equation 1), with n_i out of the obstacle; it is computed again until nothing
 overlaps.
 """
 
@@ -22,25 +22,25 @@ from wholebody.interaction.overlap_strategy import Resolution
 from wholebody.scene import Scene
 
 STEP = 0.01
-"""Metres that the hand is drawn at once: less than half of what is thin (a table's top, a finger), so that it is not
-pushed out on the other side."""
+"""Largest motion of the hand in one step, metres: less than half the width of thin pieces (a table's top, a finger), so
+that it does not leave them on the other side."""
 
-STEPS = 6  # most of them a frame: 3.6 m/s at 60 frames a second
-TURN = 0.1  # rad that it is turned at once
-DISPLACEMENTS = 30  # most of them a step; one is enough for one pair, and in a corner the walls take turns
+STEPS = 6  # most steps a frame: 3.6 m/s at 60 frames a second
+TURN = 0.1  # rad: largest rotation of the hand in one step
+DISPLACEMENTS = 30  # most displacements a step; one is enough for one pair, and in a corner the walls alternate
 MARGIN = 5e-4  # m beyond PD_g: room for the arcs of fingertips from frame to frame
-CANCELLED = 1e-6  # m: a shorter PD_g shows no way out
+CANCELLED = 1e-6  # m: a shorter PD_g has no direction
 HALVINGS = 8
-GAIN = 1e-5  # m, rad: a step that brings the hand no nearer than this ends the frame
+GAIN = 1e-5  # m, rad: a step that brings the hand nearer by less than this ends the frame
 
 
 class RigidTranslation:
-    """Follows tracked postures of a figure with a free root that is taken for rigid."""
+    """Follows tracked postures of a figure with a free root that is displaced as a rigid body."""
 
     sweep_tolerance = 2e-4
 
     def __init__(self, scene: Scene) -> None:
-        """Set up.
+        """Prepare the strategy.
 
         Raises:
             InputError: the figure is fixed to the world.
@@ -72,13 +72,13 @@ class RigidTranslation:
         return Resolution((q,), queried, spent, self._displacements, 0, self._pairs, note)
 
     def _with_glove(self, shown: Array, tracked: Array) -> Array | None:
-        """The shown hand with the tracked fingers, displaced out of what they go into; None where that fails."""
+        """The shown hand with the tracked fingers, displaced out of overlap; None if that fails."""
         q = np.concatenate([shown[:7], tracked[7:]])
         freed = self._displaced(q)
         return freed
 
     def _drawn(self, q: Array, tracked: Array) -> Array:
-        """A step of the root towards the tracked one, along what it was pushed out of in this frame: so it slides."""
+        """A step of the root towards the tracked one, tangential to the obstacles of this frame, so that it slides."""
         way = np.asarray(pin.difference(self.model, q, tracked))
         turn = pin.Quaternion(q[3:7]).toRotationMatrix()
         for out in self._out:
@@ -89,14 +89,14 @@ class RigidTranslation:
         return np.asarray(pin.integrate(self.model, q, way))
 
     def _freed(self, free: Array, drawn: Array) -> Array:
-        """The drawn hand displaced, or else the last free one on the way to it (algorithm 1, step 4)."""
+        """The moved hand displaced, or else the last free position of the motion (algorithm 1, step 4)."""
         displaced = self._displaced(drawn)
         if displaced is not None:
             return displaced
         return last_free(self.model, free, drawn, lambda q: len(self._overlaps(q)[0]), HALVINGS)
 
     def _displaced(self, q: Array) -> Array | None:
-        """The hand displaced by PD_g until nothing overlaps; None where that does not end."""
+        """The hand displaced by PD_g until nothing overlaps; None if that does not end."""
         q = q.copy()
         for _ in range(DISPLACEMENTS):
             depths, normals, obstacles = self._overlaps(q)
@@ -105,7 +105,7 @@ class RigidTranslation:
             self._displacements += 1
             self._pairs = max(self._pairs, len(depths))
             if (obstacles < 0).any():
-                return None  # two of its own pieces: no translation takes them apart
+                return None  # two of its own pieces: no translation separates them
             for obstacle in np.unique(obstacles):
                 of = obstacles == obstacle
                 push = global_depth(depths[of], normals[of])
@@ -127,6 +127,6 @@ class RigidTranslation:
         return -contacts.distance, normals, obstacle
 
     def _left(self, q: Array, tracked: Array) -> float:
-        """What is left of the root's way, metres and, at a hand's length of 0.2 m, radians."""
+        """Remaining distance of the root, metres, with radians converted by a hand's length of 0.2 m."""
         way = np.asarray(pin.difference(self.model, q, tracked))
         return float(np.linalg.norm(way[:3]) + 0.2 * np.linalg.norm(way[3:6]))

@@ -1,4 +1,4 @@
-"""A gallery of two rooms with a door between them and some twenty objects, to walk into."""
+"""A gallery of two rooms with a door between them and some twenty objects."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TABLE_SIZE = (1.6, 0.8, 0.04)
 
 
 def gallery(figure: Figure) -> Scene:
-    """Put a figure into a gallery: a west room (x from -5 to 0) and an east room (0 to 5) with a door between them.
+    """A scene with a figure in a gallery: a west room (x from -5 to 0), an east room (0 to 5), and a door between them.
 
     Walls, a door with a lintel, a niche in the east room, tables, a bench, pedestals, and sculptures on them: a torus,
     split into convex pieces, a sphere, an egg, an obelisk and a figure of capsules. All of them are fixed.

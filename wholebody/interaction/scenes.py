@@ -1,4 +1,4 @@
-"""Scenes to try the frame loop on: what is tracked goes into walls, tables and the figure itself.
+"""Scenes for the frame loop, in which the tracked posture penetrates walls, tables and the figure itself.
 
 After the experiments of Schmidl and Lin, "Real-time physically-based interaction between avatars and virtual
 environments" (table 2, figures 2, 5, 7 and 8), without their balls.
@@ -33,14 +33,14 @@ class InteractionScene:
     """A scene with a tracker.
 
     Attributes:
-        name: as the command calls it.
+        name: its name on the command line.
         about: one sentence.
         scene: figure and things.
-        track: what the tracker says.
-        rigid: whether the figure is displaced as a whole, as a hand is.
-        eye: where to look from, metres.
-        target: what to look at, metres.
-        see_through: things that would hide the figure.
+        track: the tracked postures.
+        rigid: whether the figure is displaced as a whole, such as a hand.
+        eye: position of the camera, metres.
+        target: the point in the middle of the picture, metres.
+        see_through: things to draw transparent.
     """
 
     name: str
@@ -68,8 +68,8 @@ def build_scene(name: str, *, frames: int | None = None, seed: int = 0, dt: floa
 
     Args:
         name: of the scene.
-        frames: how many; the script is cut, or repeated. All of it, once, if left out: at least 600.
-        seed: of the tracked person's unrest.
+        frames: number of frames; the script is cut, or repeated. By default the whole script once: at least 600.
+        seed: of the tracked person's tremor.
         dt: seconds from frame to frame.
 
     Raises:
@@ -91,7 +91,7 @@ def build_scene(name: str, *, frames: int | None = None, seed: int = 0, dt: floa
     )
 
 
-# ---- the hand: where the wrist is, and the glove
+# ---- the hand: position of the wrist, and the glove
 
 
 def _hand(figure: Figure, at: Place, yaw: float, glove: str) -> Array:
@@ -141,7 +141,7 @@ def _hand_in_corner(figure: Figure) -> Keys:
     ]
 
 
-# ---- the avatar: where it stands, and what it does with its limbs
+# ---- the avatar: its position, and the motion of its limbs
 
 
 def _avatar(figure: Figure, x: float, y: float, yaw: float, degrees: Mapping[str, float]) -> Array:
@@ -291,4 +291,4 @@ _PLANS: dict[str, _Plan] = {
 }  # fmt: skip
 
 SCENES: Mapping[str, str] = {name: plan.about for name, plan in _PLANS.items()}
-"""What each scene shows, by name."""
+"""Descriptions of the scenes, by name."""

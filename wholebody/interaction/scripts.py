@@ -1,4 +1,4 @@
-"""Scripted trackers: from posture to posture in given times, smoothly, with the tremor of a person who is tracked."""
+"""Scripted trackers: smooth motion from posture to posture in given times, with the tremor of a tracked person."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from wholebody.figures.figure import Figure
 from wholebody.interaction.tracks import Track
 
 FRAME = 1.0 / 60.0  # s: of a display
-TREMOR = 2e-3  # rad: what a tracker's noise and a person's unrest come to in arms, fingers and neck
+TREMOR = 2e-3  # rad: amplitude of a tracker's noise and a person's tremor in arms, fingers and neck
 STILL = ("hip", "knee", "ankle", "toe")
-"""In the names of joints without tremor: feet that stand on the floor."""
+"""Parts of the names of joints without tremor, because the feet stand on the floor."""
 TREMOR_BAND = (0.3, 2.0)  # Hz
 WAVES = 5
 
@@ -25,15 +25,15 @@ def script(
 ) -> Track:
     """Move through postures, at rest in each.
 
-    Between two keys the share of the way is ``10 s^3 - 15 s^4 + 6 s^5``, the straight movement of least jerk (Flash and
-    Hogan 1985, "The Coordination of Arm Movements", J. Neuroscience 5(7)). Two equal keys make a pause.
+    Between two keys the share of the motion is ``10 s^3 - 15 s^4 + 6 s^5``, the straight movement of least jerk (Flash
+    and Hogan 1985, "The Coordination of Arm Movements", J. Neuroscience 5(7)). Two equal keys make a pause.
 
     Args:
-        figure: who moves.
+        figure: the figure that moves.
         keys: seconds from the key before (the first one's are not used), and the posture (nq,).
         dt: seconds from frame to frame.
         seed: of the tremor.
-        name: what messages call the track.
+        name: name of the track in messages.
     """
     frames = [keys[0][1]]
     for (_, before), (seconds, after) in pairwise(keys):
@@ -44,12 +44,12 @@ def script(
 
 
 def smooth(s: float) -> float:
-    """Share of the way after the share s of the time."""
+    """Share of the motion after the share s of the time."""
     return s**3 * (10.0 + s * (6.0 * s - 15.0))
 
 
 def _trembling(figure: Figure, q: Array, dt: float, rng: np.random.Generator) -> Array:
-    """Add slow waves of small amplitude that begin and end at nothing."""
+    """Add slow waves of small amplitude that begin and end at zero."""
     time = dt * np.arange(len(q))
     size = np.zeros(figure.model.nv)
     for joint in figure.joints:

@@ -1,4 +1,4 @@
-"""Tracks as text: one line a frame, one named column a joint, so that what another program recorded can be read."""
+"""Tracks as text: one line a frame, one named column a joint, so that recordings of other programs can be read."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "
 LARGEST = 200_000_000  # bytes: an hour of a person at 60 frames a second
 LATEST = 1e9  # s
 TIME = "time"
-EVEN = 1e-3  # share of the time step by which a line may come early or late
+EVEN = 1e-3  # share of the time step by which the time of a line may differ
 
 
 def write_track(track: Track, path: str | os.PathLike[str]) -> Path:
@@ -42,7 +42,7 @@ def write_track(track: Track, path: str | os.PathLike[str]) -> Path:
 
 
 def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
-    """Read a track of a figure; its columns may stand in any order.
+    """Read a track of a figure; its columns may have any order.
 
     Raises:
         FileFormatError: the file cannot be read, a line has another length, a value is no number, or the time step

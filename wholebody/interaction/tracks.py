@@ -1,4 +1,4 @@
-"""Tracks: what a tracker says, frame by frame; recorded, computed, or scripted."""
+"""Tracks: postures of a tracker, frame by frame; recorded, computed, or scripted."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.placement import placement
 
-UNIT_TOLERANCE = 1e-3  # of a quaternion's length, beyond which it is taken for a mistake
+UNIT_TOLERANCE = 1e-3  # largest deviation of a quaternion from unit length; more is refused as a mistake
 ROOT_SIZE = 7
 LARGEST = 1e6  # of a value, radians or metres
-MOST_FRAMES = 1_000_000  # of a track: ten hours at 30 frames a second; more is a slip, and gigabytes
+MOST_FRAMES = 1_000_000  # of a track: ten hours at 30 frames a second; more would be gigabytes
 
 
 def check_figure(figure: object, what: str) -> Figure:
@@ -34,15 +34,15 @@ def check_figure(figure: object, what: str) -> Figure:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Postures at a fixed time step, as a tracker gives them: they may be inside of things.
+    """Postures of a tracker at a fixed time step; they may penetrate things.
 
-    It has `q` and `dt` as a clip has, so that `Viewer.play` plays it.
+    It has `q` and `dt` like a clip, so `Viewer.play` plays it.
 
     Attributes:
-        q: (n, nq) a posture a frame.
+        q: (n, nq) one posture for each frame.
         dt: seconds from frame to frame.
         joints: names of the joints in the order of q, without the free root.
-        name: what messages call it.
+        name: name of the track in messages.
 
     Raises:
         InputError: no frame, a time step that is not positive, or a value that is not finite; the frame is named.
@@ -101,16 +101,16 @@ class Track:
         return Track(self.q[first:last], self.dt, self.joints, self.name)
 
     def repeated(self, frames: int) -> Track:
-        """As many frames as asked for: the first ones, or all of them again and again.
+        """A track of a given number of frames: the first ones, or all of them repeatedly.
 
         Raises:
-            InputError: fewer than one frame is asked for.
+            InputError: the number is less than one.
         """
         whole(frames, f"{self.name}: frames", 1, MOST_FRAMES)
         return Track(self.q[np.arange(frames) % len(self)], self.dt, self.joints, self.name)
 
     def check(self, figure: Figure) -> None:
-        """See that the track fits a figure.
+        """Check that the track fits a figure.
 
         Raises:
             UnknownNameError: it has a joint that the figure does not have.
@@ -151,12 +151,12 @@ def posed(
     """Track from placements of the root and angles by joint name: a hand's placements and a glove's angles.
 
     Args:
-        figure: whose postures these become.
-        roots: n placements of a free root, each as for `Scene.add`; where the posture has it if left out.
+        figure: the figure of the postures.
+        roots: n placements of a free root, each as for `Scene.add`; by default that of the posture.
         angles: joint name to n angles, radians, or one for all frames; other joints stay as in the posture.
         posture: (nq,) or a name; the figure's first one if left out.
         dt: seconds from frame to frame.
-        name: what messages call it.
+        name: name of the track in messages.
 
     Raises:
         UnknownNameError: a joint that the figure does not have.

@@ -18,8 +18,8 @@ from wholebody.errors import InputError
 from wholebody.solution import TraceEntry
 
 LONGEST = 4.0
-"""Default time limit of a solve, seconds of processor time. Few solves take as long. The load of the machine does not
-change it."""
+"""Default time limit of a solve, seconds of processor time. Few solves come near it, and the load of the machine does
+not change their answers."""
 
 LIMITS = (1e-9, 1e9)
 """Least and greatest time limit, seconds."""

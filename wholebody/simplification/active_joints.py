@@ -1,9 +1,9 @@
-"""Which joints take part in a problem, and what locking the others can cost.
+"""The active joints of a problem, and a bound on the cost of locking the others.
 
-The joints that move a goal take part. So does every joint of an equality (a held foot, a closed loop) that one of those
-already moves: without it the equality would hold the others fast. A joint beyond its limits, or one on the way between
-two pieces that begin too near, takes part because something has to be mended; one that a measure weighs together with
-others, because no bound on the measure could be given. All the rest stay where they start.
+The joints that move a goal are active. So is every joint of an equality (a held foot, a closed loop) that an active
+joint moves: without it the equality would lock the others. A joint beyond its limits is active, and one between two
+pieces that are too near at the start, because they need repair. A joint that a measure combines with others is active,
+because the measure would have no bound. All other joints stay where they start.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from wholebody.tasks.discomfort import Discomfort
 from wholebody.tasks.displacement import Displacement
 from wholebody.tasks.effort import Effort
 
-SEPARABLE = (Effort, Displacement, Discomfort)  # measures that are a sum over joints, so that locking one costs its own
-SAMPLES = 6  # postures at which rows that are no wrenches are asked which joints they move with
+SEPARABLE = (Effort, Displacement, Discomfort)  # measures that are sums over joints
+SAMPLES = 6  # postures at which the dependence of rows that are no wrenches on joints is tested
 NOTHING = 1e-9  # entries of a Jacobian below this are rounding
-STEPS = 200  # of the way between a joint's limits along which its own best value is looked for
+STEPS = 200  # between a joint's limits, in the search for its least share of the measures
 
 
 @dataclass(frozen=True)
 class ActiveJoints:
-    """Joints of a problem, by what they are needed for.
+    """The joints of a problem: active, frozen, or locked.
 
     Attributes:
-        moving: (njoints,) which joints take part.
-        frozen: (njoints,) which ones a bound keeps in place anyway.
+        moving: (njoints,) the active joints.
+        frozen: (njoints,) the joints that a bound keeps in place.
         helpers: names of the inequalities that a locked joint could have helped to keep.
-        excess: by how much the measures of the locked joints alone are above their least value.
+        excess: the measures of the locked joints alone minus their least value.
     """
 
     moving: Mask
@@ -48,7 +48,7 @@ class ActiveJoints:
 
 
 def active_joints(problem: Problem, lock: bool = True) -> ActiveJoints:
-    """Find the joints that take part in a problem: those that it needs, or with `lock` off all that are not frozen."""
+    """Find the active joints of a problem; without `lock` all that are not frozen."""
     model = problem.scene.model
     walk = _Walk(problem)
     joint_of = np.repeat(np.arange(1, model.njoints), [joint.nv for joint in list(model.joints)[1:]])
@@ -73,7 +73,7 @@ def active_joints(problem: Problem, lock: bool = True) -> ActiveJoints:
 
 
 def _closed(moving: Mask, rows: list[tuple[Constraint, Mask, Mask, Mask]], frozen: Mask) -> Mask:
-    """Add the joints of equalities that move already, and of inequalities that are to be mended, until none is new."""
+    """Add the joints of equalities that move already, and of inequalities that need repair, until none is new."""
     while True:
         before = moving.copy()
         for _, columns, equal, broken in rows:
@@ -85,7 +85,7 @@ def _closed(moving: Mask, rows: list[tuple[Constraint, Mask, Mask, Mask]], froze
 
 
 class _Walk:
-    """The start, and random postures with the root as at the start: one state that goes from one to the next."""
+    """The start, and random postures with the root as at the start: one state that moves from one to the next."""
 
     def __init__(self, problem: Problem) -> None:
         self.state = State(problem.scene.model)
@@ -101,7 +101,7 @@ class _Walk:
 
 
 def _columns(term: Goal | Constraint, states: Iterable[State]) -> Mask:
-    """(m, nv) which degrees of freedom a row moves with: exact for wrenches, else what the sampled postures show."""
+    """(m, nv) degrees of freedom on which each row depends: exact for wrenches, otherwise from the sampled postures."""
     found: Mask | None = None
     for state in states:
         jacobian = term.jacobian(state)
@@ -124,7 +124,7 @@ def _slopes(measure: Measure, states: Iterable[State]) -> Mask:
 
 
 def _kinds(term: Constraint, state: State) -> tuple[Mask, Mask]:
-    """Which rows are equalities, and which do not hold at the start."""
+    """The rows that are equalities, and the rows that do not hold at the start."""
     value = np.atleast_1d(term.value(state))
     lower, upper = np.broadcast_to(term.lower, value.shape), np.broadcast_to(term.upper, value.shape)
     return lower == upper, (value < lower - COAL_ACCURACY) | (value > upper + COAL_ACCURACY)
@@ -149,7 +149,7 @@ def _out_of_limits(problem: Problem) -> Mask:
 
 
 def _too_near(problem: Problem) -> Mask:
-    """Degrees of freedom between the pieces of pairs that begin nearer than they may be."""
+    """Degrees of freedom between the pieces of pairs that are nearer at the start than their clearance."""
     scene = problem.scene
     state = scene.state(problem.start)
     near = scene.contacts(problem.start, problem.clearance + COAL_ACCURACY)
@@ -160,9 +160,9 @@ def _too_near(problem: Problem) -> Mask:
 
 
 def _excess(problem: Problem, locked: Mask) -> float:
-    """What the locked joints' share of the separable measures is above its least value within their limits.
+    """The locked joints' share of the separable measures minus its least value within their limits.
 
-    All of them walk from limit to limit together: the gradient has the slope of every joint's own share.
+    All of them move from limit to limit together: the gradient has the slope of every joint's own share.
     """
     figure, state = problem.scene.figure, State(problem.scene.model)
     terms = [measure for measure in problem.measures if isinstance(measure, SEPARABLE)]

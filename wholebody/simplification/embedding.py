@@ -1,9 +1,9 @@
 """Terms of the whole figure on a smaller one, whose postures are embedded in those of the whole one.
 
-The smaller figure has the same joints without the locked ones. A term is stated on it anew by its names. Where that
-would not be the same function (joints it names are gone, a posture it takes is too long, its weights are shares of what
-a locked joint has) the term stays as it is: it is asked at the whole posture, and gives the columns of its derivatives
-that are left.
+The smaller figure has the same joints without the locked ones. A term is resolved on it by its names. If that gives a
+different function (joints that it names are missing, a posture that it takes has another length, its weights depend on
+a locked joint), the term of the whole figure is used: it is evaluated at the whole posture, and gives the remaining
+columns of its derivatives.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings, Term
 
-SAMPLES = 3  # postures at which a term that was stated anew must say the same
-SAME = 1e-7  # largest difference in its values and derivatives there, beside their size
+SAMPLES = 3  # postures at which a resolved term is compared with that of the whole figure
+SAME = 1e-7  # largest difference in its values and derivatives, relative to their size
 
 _T = TypeVar("_T", bound=Term)
 
 
 class Embedding:
-    """The places of a smaller model's joints in the whole one's postures.
+    """The indices of a smaller model's joints in the whole one's postures.
 
     Attributes:
-        idx_q: (small nq,) places in the whole posture.
-        idx_v: (small nv,) places in the whole displacement.
+        idx_q: (small nq,) indices in the whole posture.
+        idx_v: (small nv,) indices in the whole displacement.
     """
 
     def __init__(self, whole: pin.Model, small: pin.Model, start: Array) -> None:
@@ -50,12 +50,12 @@ class Embedding:
         return whole
 
     def whole(self, state: State) -> State:
-        """The whole figure at the posture of the small one; it belongs to whoever the small state belongs to."""
+        """The state of the whole figure at the posture of the small one; it belongs to the owner of the small state."""
         q, whole = self.embed(state.q), state.companion(self, self._model)
         return whole if np.array_equal(q, whole.q) else whole.update(q)
 
     def rows(self, term: Goal | Constraint, state: State) -> Array:
-        """The columns (m, small nv) of a term's Jacobian where the small figure is."""
+        """The columns (m, small nv) of a term's Jacobian at the small figure's posture."""
         whole = self.whole(state)
         return np.asarray(_dense(term.jacobian(whole), whole)[:, self.idx_v])
 
@@ -152,9 +152,9 @@ class EmbeddedBound(Bound):
 
 
 def restated_term(term: _T, scene: Surroundings, start: Array, embedding: Embedding) -> Term | None:
-    """The term on the smaller figure: stated anew where that is the same function, else embedded.
+    """The term on the smaller figure: resolved anew if that gives the same function, otherwise embedded.
 
-    Rows of a constraint that no joint moves any more, and that hold, need not be asked; None where that is all of them.
+    Rows of a constraint that no joint moves, and that hold, are dropped; None if all rows are dropped.
 
     Args:
         term: a resolved term of the whole figure.
@@ -181,7 +181,7 @@ def restated_term(term: _T, scene: Surroundings, start: Array, embedding: Embedd
     try:
         anew = term.resolve(scene, start)
         values = _values(anew, state, start)
-    except Exception:  # a term is anyone's code, and may fail in any way on a figure it was not meant for
+    except Exception:  # a user's term may raise any error on another figure
         return embedded
     alike = len(values) == len(wanted) and all(
         a.shape == b.shape and np.abs(a - b).max(initial=0.0) <= SAME * (1.0 + np.abs(b).max(initial=0.0))
@@ -191,7 +191,7 @@ def restated_term(term: _T, scene: Surroundings, start: Array, embedding: Embedd
 
 
 def _values(term: Term, state: State, start: Array) -> list[Array]:
-    """What a term says at a few postures: all that a method reads, but for what is constant in a measure."""
+    """Values of a term at a few postures: all that a method reads, except the constant part of a measure."""
     postures = [start, *random_postures(state.model, SAMPLES, seed=1)]
     ask: list[Callable[[], object]] = []
     if isinstance(term, Goal):
@@ -209,7 +209,7 @@ def _values(term: Term, state: State, start: Array) -> list[Array]:
 
 
 def _moving_rows(values: list[Array]) -> tuple[list[Array], int]:
-    """What a constraint says, without the rows that hold and that nothing moves; and how many rows are left."""
+    """Values of a constraint without the rows that hold and that no joint moves; and the number of remaining rows."""
     value, lower, upper = values[0], values[2], values[3]
     moves = np.any([np.abs(jacobian).max(axis=1, initial=0.0) > SAME for jacobian in values[1::4]], axis=0)
     keep = moves | (value < lower - SAME) | (value > upper + SAME)

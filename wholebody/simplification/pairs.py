@@ -1,4 +1,4 @@
-"""Which pairs of pieces can come near each other in some posture that is allowed."""
+"""The pairs of pieces that can come near each other in an allowed posture."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from wholebody.simplification.reach import Balls, Reach, about_point, placed
 from wholebody.tasks.base import Constraint
 from wholebody.tasks.hold import Hold
 
-HELD_WITHIN = 1e-3  # m: how far holds let a piece be from where they would have it; an accepted answer keeps to less
-PROBE = 1e-4  # m: radius of the ball that stands for a point in coal
+HELD_WITHIN = 1e-3  # m: largest displacement of a piece by errors of holds; an accepted answer has less
+PROBE = 1e-4  # m: radius of the ball that represents a point in coal
 
 
 def reachable_pairs(
@@ -30,20 +30,20 @@ def reachable_pairs(
     constraints: Iterable[Constraint],
     frozen: Iterable[int],
 ) -> NDArray[np.bool_]:
-    """Which pairs can come as near as their clearance; the others never do, however the joints stand.
+    """The pairs that can come as near as their clearance; the others never do, whatever the joint values.
 
     Args:
-        figure: what moves.
+        figure: the figure.
         pieces: of the figure and of the things.
         size: (pieces,) radius of each about its origin, metres; infinite for a half-space.
         pairs: (pairs, 2) indices of pieces.
-        start: (nq,) posture that the problem starts from.
-        clearances: (pairs,) least distance asked, metres.
-        constraints: resolved ones; frames held in the world bound where everything else can be.
+        start: (nq,) start of the problem.
+        clearances: (pairs,) clearance of each pair, metres.
+        constraints: resolved ones; frames held in the world bound the positions of all pieces.
         frozen: degrees of freedom that stay as at the start.
 
     Returns:
-        (pairs,) true where nothing was proved.
+        (pairs,) true without a proof that the pair stays apart.
     """
     model = figure.model
     joint: Indices = np.array([piece.parentJoint for piece in pieces], dtype=np.intp)
@@ -67,7 +67,7 @@ def reachable_pairs(
 
 
 def _held(figure: Figure, reach: Reach, constraints: Iterable[Constraint]) -> list[Balls]:
-    """Balls of all pieces in the world as far as each frame that is held there bounds them."""
+    """Balls of all pieces in the world, from each frame that is held there."""
     found = []
     for hold in constraints:
         if not isinstance(hold, Hold) or hold.relative_to is not None:

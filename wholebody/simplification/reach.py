@@ -1,10 +1,10 @@
-"""Balls that hold a piece in every posture within the limits, seen from another joint.
+"""Balls that contain a piece in every posture within the limits, relative to another joint.
 
-A ball with centre p and radius r that is carried by a revolute joint of angle a - h ... a + h stays within one ball:
-the arc of p, d away from the axis, has the enclosing ball of radius d sin h about the point d cos h from the axis (d
-about the axis itself from h = 90 degrees on), and r is added. A sliding joint adds half its travel. Towards the leaves
-the same holds with the motion turned round, so any joint, or a frame that a `Hold` keeps in the world, can be the place
-that everything is seen from. Balls grow from joint to joint and never lose a posture: the bound is safe, not tight.
+A ball with centre p and radius r on a revolute joint of angle a - h ... a + h stays within one ball: the arc of p, at
+distance d from the axis, has the enclosing ball of radius d sin h about the point at distance d cos h from the axis (of
+radius d about the axis itself from h = 90 degrees on), and r is added. A prismatic joint adds half its travel. Towards
+the leaves the same holds with the inverse motion. So any joint, or a frame that a `Hold` keeps in the world, can be the
+reference. Balls grow from joint to joint and cover every posture: the bound is safe, not tight.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from wholebody.arrays import Array, Indices
 
 
 class Range(NamedTuple):
-    """What a joint of one degree of freedom does: a turn or a slide along an axis, between two values.
+    """The motion of a joint with one degree of freedom: rotation or translation along an axis, between two values.
 
     Attributes:
         axis: (3,) unit vector in the joint's frame.
-        turns: whether it turns, or slides.
-        low, high: least and greatest value, radians or metres; infinite where there is no limit.
+        turns: whether it rotates; otherwise it translates.
+        low, high: least and greatest value, radians or metres; infinite without a limit.
     """
 
     axis: Array
@@ -34,11 +34,11 @@ class Range(NamedTuple):
 
 
 class Balls(NamedTuple):
-    """Balls that hold pieces, in the frame of one joint.
+    """Balls that contain pieces, in the frame of one joint.
 
     Attributes:
         center: (k, 3) metres.
-        radius: (k,) metres; infinite where nothing bounds a piece.
+        radius: (k,) metres; infinite for a piece without a bound.
         piece: (k,) indices of the pieces.
     """
 
@@ -48,17 +48,17 @@ class Balls(NamedTuple):
 
 
 class Reach:
-    """Where the pieces of a model can be, within the limits of its joints."""
+    """Bounds on the positions of the pieces of a model within its joint limits."""
 
     def __init__(self, model: pin.Model, start: Array, resting: Balls, joint: Indices, frozen: Iterable[int]) -> None:
         """Read the joints.
 
         Args:
             model: the model.
-            start: (nq,) posture that counts as possible even where it is beyond a limit.
-            resting: a ball about every piece in the frame of the joint that carries it, in the order of the pieces.
+            start: (nq,) posture that counts as possible even if it is beyond a limit.
+            resting: a ball around every piece in the frame of the joint that carries it, in the order of the pieces.
             joint: (n,) that joint.
-            frozen: degrees of freedom (places in the tangent) that stay as at the start.
+            frozen: degrees of freedom (tangent indices) that stay as at the start.
         """
         self.model, self.start = model, start
         self._resting, self._joint = resting, joint
@@ -92,7 +92,7 @@ class Reach:
         return Balls(self._resting.center[mine], self._resting.radius[mine], mine)
 
     def _across(self, balls: Balls, node: int, to: int) -> Balls:
-        """Take balls from the frame of one joint to that of a neighbour in the tree."""
+        """Transform balls from the frame of one joint to that of a neighbour in the tree."""
         up = self.model.parents[node] == to
         joint = node if up else to
         place = self.model.jointPlacements[joint]
@@ -101,7 +101,7 @@ class Reach:
         return self._moved(placed(balls, place.inverse()), joint, -1.0)
 
     def _moved(self, balls: Balls, joint: int, sign: float) -> Balls:
-        """Let the joint move, or with sign -1 its base against it."""
+        """Balls after motion of the joint, or with sign -1 of its base relative to it."""
         if joint in self._still:
             still = self._still[joint]
             return placed(balls, still if sign > 0 else still.inverse())
@@ -125,7 +125,7 @@ class Reach:
         return balls._replace(center=along + np.cos(half) * turned, radius=balls.radius + np.sin(half) * lever)
 
     def _range(self, index: int) -> Range | None:
-        """Limits of a joint with one degree of freedom that only turns or only slides; None for any other."""
+        """Range of a revolute or prismatic joint; None for any other."""
         joint = self.model.joints[index]
         if joint.nv != 1 or joint.nq > 2 or "Mimic" in joint.shortname() or "Composite" in joint.shortname():
             return None
@@ -149,13 +149,13 @@ class Reach:
 
 
 def about_point(balls: Balls, point: Array) -> Balls:
-    """Let balls turn about a point in any way."""
+    """Balls after any rotation about a point."""
     radius = balls.radius + np.linalg.norm(balls.center - point, axis=1)
     return Balls(np.tile(point, (len(radius), 1)), radius, balls.piece)
 
 
 def placed(balls: Balls, place: Any) -> Balls:
-    """Balls in another frame, whose placement of the old one is given."""
+    """Balls in another frame, given the placement of the old frame in it."""
     return balls._replace(center=balls.center @ place.rotation.T + place.translation)
 
 

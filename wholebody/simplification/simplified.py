@@ -1,4 +1,4 @@
-"""A problem with no more in it than it needs, and the way back to the whole figure."""
+"""A simplified problem, and the conversion of its answers to the whole figure."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from wholebody.problem import Problem
 from wholebody.simplification.embedding import Embedding
 from wholebody.solution import Solution
 
-HOLDS = 1e-4  # m, rad: to this limits, constraints and clearances of the whole problem must hold for "solved"
+HOLDS = 1e-4  # m, rad: tolerance of limits, constraints and clearances of the whole problem for "solved"
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What a simplified problem does without, and what that can change at most.
+    """The parts that a simplified problem omits, with bounds on the effect.
 
     Attributes:
-        locked: joints that stay as at the start although nothing froze them.
-        frozen: joints that a bound kept in place already; leaving them out changes nothing.
-        helpers: inequalities that a locked joint could have helped to keep. An answer in which none of them is at its
-            bound has lost nothing to the locking but `excess`.
-        excess: the measures of the locked joints alone are this much above their least value, so an answer's measure
-            is at most so much higher where no helper and no pair of a locked joint is at its bound.
+        locked: joints that stay as at the start although no bound freezes them.
+        frozen: joints that a bound keeps in place; leaving them out changes nothing.
+        helpers: inequalities for which a locked joint could have helped. An answer in which none of them is at its
+            bound loses at most `excess` by the locking.
+        excess: the measures of the locked joints alone minus their least value. An answer's measure is at most this
+            much higher if no helper and no pair of a locked joint is at its bound.
         pairs: number of pairs left out. None can come nearer than its clearance in any posture within the limits (and
             with the frames held that the problem holds); exact.
-        rigid: number of pairs left out because no joint between the two takes part.
-        things: names of things without any pair that is left; they are not in the smaller scene.
-        pieces: name of each piece with fewer corners -> how far it reaches out of the piece it holds, metres.
-        counts: what -> (in the whole problem, in the simplified one), for the report.
+        rigid: number of pairs left out because no joint between the two is active.
+        things: names of things without a remaining pair; they are not in the smaller scene.
+        pieces: name of each piece with fewer corners -> how far it protrudes from the original piece, metres.
+        counts: kind of part -> (number in the whole problem, number in the simplified one), for the report.
     """
 
     locked: tuple[str, ...]
@@ -45,16 +45,16 @@ class LeftOut:
 
     @property
     def growth(self) -> float:
-        """How far the coarsest piece reaches out of the one it holds, metres."""
+        """How far the coarsest piece protrudes from the original one, metres."""
         return max(self.pieces.values(), default=0.0)
 
     @property
     def exact(self) -> bool:
-        """Whether nothing is changed at all: no joint locked that could matter, no piece simplified."""
+        """Whether the answers are unchanged: no active joint locked, no piece simplified."""
         return not self.locked and not self.pieces
 
     def __str__(self) -> str:
-        """One line for each kind of thing left out, with its bound."""
+        """One line for each kind of part left out, with its bound."""
         lines = [f"{name}: {after} of {before}" for name, (before, after) in self.counts.items()]
         lines.append(
             f"{self.pairs} pairs cannot come nearer than their clearance, {self.rigid} do not move to each other: exact"
@@ -79,9 +79,10 @@ class Simplified:
     """A smaller problem whose answers are answers of the whole one.
 
     Attributes:
-        problem: what to solve. It is about things as they stood when it was made: simplify anew when they move.
-        whole: the problem it was made from.
-        left_out: what was left out, with bounds.
+        problem: the smaller problem. It has the placements that things had when it was made: simplify anew when they
+            move.
+        whole: the original problem.
+        left_out: the parts that were left out, with bounds.
     """
 
     problem: Problem
@@ -101,7 +102,7 @@ class Simplified:
         return self._embedding.embed(checks.posture(q, self.problem.scene.model.nq))
 
     def restored(self, solution: Solution) -> Solution:
-        """The same answer for the whole problem: its posture, judged by the whole problem's assessment.
+        """The same answer for the whole problem: its posture, with the whole problem's assessment.
 
         Args:
             solution: a method's answer to `problem`.

@@ -1,4 +1,4 @@
-"""Pieces with fewer corners, each of which holds the piece that it stands for."""
+"""Pieces with fewer corners, each of which contains the original piece."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from wholebody.geometry.pieces import Piece
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.geometry.simplified_hull import simplified_hull
 
-FEW = 64  # corners: fewer of them in pieces with no more are nothing to be measured in a solve
+FEW = 64  # corners: simplifying pieces with at most as many saves no measurable time
 CORNERS = (8, 16, 32, 48)  # tried in turn
-PROBE = 1e-4  # m: radius of the ball that stands for a point in coal
+PROBE = 1e-4  # m: radius of the ball that represents a point in coal
 
 
 def simplified_piece(piece: pin.GeometryObject, growth: float) -> tuple[pin.GeometryObject, float] | None:
@@ -24,10 +24,10 @@ def simplified_piece(piece: pin.GeometryObject, growth: float) -> tuple[pin.Geom
 
     Args:
         piece: any piece.
-        growth: how far out of the hull the new one may reach, metres.
+        growth: how far the new piece may protrude from the hull, metres.
 
     Returns:
-        The piece and how far it reaches out at most; None where the piece has few corners, or needs them.
+        The piece and how far it protrudes at most; None if the piece has few corners, or cannot be simplified.
     """
     if not isinstance(piece.geometry, coal.Convex):
         return None
@@ -47,7 +47,7 @@ def simplified_piece(piece: pin.GeometryObject, growth: float) -> tuple[pin.Geom
 
 @lru_cache(maxsize=256)
 def _around(corners: bytes, growth: float) -> tuple[Piece, float] | None:
-    """The simplest hull around these corners that reaches out no farther, and how far it does."""
+    """The simplest hull around these corners that protrudes no farther, and how far it does."""
     points = np.frombuffer(corners).reshape(-1, 3)
     whole = hull_piece(points)
     for most in CORNERS:
@@ -59,11 +59,11 @@ def _around(corners: bytes, growth: float) -> tuple[Piece, float] | None:
 
 
 def farthest(points: Array, hull: coal.Convex) -> float:
-    """How far a polytope with these corners, (n, 3), reaches out of a hull: the distance is convex, so a corner's."""
+    """How far a polytope with these corners, (n, 3), protrudes from a hull: the distance is convex, so a corner's."""
     probe, here, request = coal.Sphere(PROBE), coal.Transform3s.Identity(), coal.DistanceRequest()
     out = 0.0
     for point in points:
         there = coal.Transform3s(np.eye(3), point)
-        # a result of its own: coal keeps the least of all that one has seen
+        # a new result for each query: coal keeps the least distance of all queries of one result
         out = max(out, float(coal.distance(hull, here, probe, there, request, coal.DistanceResult())) + PROBE)
     return out + COAL_ACCURACY

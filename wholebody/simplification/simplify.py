@@ -1,4 +1,4 @@
-"""From a problem to the smaller one."""
+"""Makes a smaller problem from a problem."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from wholebody.simplification.simplified_pieces import simplified_piece
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import Freeze
 
-GROWTH = 2e-3  # m: how far a piece with fewer corners may reach out of the one it stands for
+GROWTH = 2e-3  # m: how far a piece with fewer corners may protrude from the original one
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What to leave out: each kind by itself, so that its gain can be measured.
+    """The kinds of parts to leave out, separately, so that their effects can be measured.
 
     Attributes:
         joints: leave out joints that the problem freezes.
-        lock: lock joints that take no part, too.
-        pairs: drop pairs that cannot come near, and things that are left without any.
-        growth: how far a piece with fewer corners may reach out of the one it holds, metres; 0 keeps all pieces.
+        lock: also lock joints that are not active.
+        pairs: drop pairs that cannot come near, and things without a remaining pair.
+        growth: how far a piece with fewer corners may protrude from the original one, metres; 0 keeps all pieces.
     """
 
     joints: bool = True
@@ -45,7 +45,7 @@ class Parts:
 
 @dataclass(frozen=True)
 class _Smaller:
-    """What terms need to know of the smaller scene, before it is made."""
+    """The part of the smaller scene that terms need, before the scene is made."""
 
     figure: Figure
     geometry: pin.GeometryModel
@@ -57,17 +57,17 @@ class _Smaller:
 
 
 def simplify(problem: Problem, *, lock: bool = True) -> Simplified:
-    """A smaller problem whose answers are answers of this one: the joints, pairs and corners that matter.
+    """A smaller problem whose answers are answers of this one, with fewer joints, pairs and corners.
 
     Args:
         problem: any problem; it is not changed.
-        lock: whether joints that take no part stay as they start; False keeps all that are not frozen.
+        lock: whether joints that are not active stay as they start; False keeps all that are not frozen.
 
     Returns:
-        The smaller problem, the way back to the whole figure, and what was left out with what that can change.
+        The smaller problem, the conversion to the whole figure, and the parts that were left out with bounds.
 
     Raises:
-        InputError: it is no problem, or objects came to or left its scene after it was stated.
+        InputError: it is no problem, or objects were added to or removed from its scene after it was made.
     """
     checks.instance(problem, Problem, "simplify: problem", "state one with wb.Problem(scene, goals=[...])")
     checks.flag(lock, "lock")
@@ -75,10 +75,10 @@ def simplify(problem: Problem, *, lock: bool = True) -> Simplified:
 
 
 def leave_out(problem: Problem, parts: Parts) -> Simplified:
-    """Leave some kinds of things out of a problem.
+    """Leave some kinds of parts out of a problem.
 
     Raises:
-        InputError: objects came to or left the scene after the problem was stated.
+        InputError: objects were added to or removed from the scene after the problem was made.
     """
     problem.check_fresh()
     whole = problem.scene
@@ -108,7 +108,7 @@ def leave_out(problem: Problem, parts: Parts) -> Simplified:
 
 
 def _smaller_figure(problem: Problem, part: ActiveJoints | None) -> tuple[Figure, pin.GeometryModel]:
-    """The figure without the joints that take no part, and the scene's geometry on its joints."""
+    """The figure without the joints that are not active, and the scene's geometry on its joints."""
     scene = problem.scene
     if part is None or part.moving[1:].all():
         return scene.figure, scene.geometry
@@ -121,7 +121,7 @@ def _smaller_figure(problem: Problem, part: ActiveJoints | None) -> tuple[Figure
 
 
 def _moving_pairs(problem: Problem, geometry: pin.GeometryModel) -> tuple[Indices, int]:
-    """Numbers of the pairs whose pieces still move to each other, and how many do not."""
+    """Numbers of the pairs whose pieces still move relative to each other, and how many do not."""
     joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
     pairs = problem.scene.pair_table.pairs
     moves = joint[pairs[:, 0]] != joint[pairs[:, 1]]
@@ -139,7 +139,7 @@ def _terms(
         found = [restated_term(term, small, start, embedding) for term in terms]
         return [term for term in found if term is not None]
 
-    bounds = tuple(bound for bound in problem.bounds if not isinstance(bound, Freeze))  # what they freeze is locked
+    bounds = tuple(bound for bound in problem.bounds if not isinstance(bound, Freeze))  # frozen joints are locked
     return (
         restated(problem.goals), restated(problem.constraints), restated(bounds), restated(problem.measures),
     )  # type: ignore[return-value]  # fmt: skip
@@ -148,7 +148,7 @@ def _terms(
 def _pieces(
     problem: Problem, geometry: pin.GeometryModel, numbers: Indices, growth: float
 ) -> tuple[dict[int, pin.GeometryObject], dict[str, float]]:
-    """Pieces with fewer corners, by index; not where one would begin nearer to something than it may be."""
+    """Pieces with fewer corners, by index; not if one would be nearer at the start than its clearance."""
     if growth <= 0.0:
         return {}, {}
     scene = problem.scene
@@ -166,7 +166,7 @@ def _pieces(
 
 
 def _kept_pieces(scene: Scene, numbers: Indices) -> list[int]:
-    """All pieces of the figure, and those of things with a pair that is left."""
+    """All pieces of the figure, and those of things with a remaining pair."""
     used = {scene.piece_owner[index] for index in np.unique(scene.pair_table.pairs[numbers]).tolist()}
     return [k for k, owner in enumerate(scene.piece_owner) if owner in used or owner not in scene.objects]
 
@@ -179,7 +179,7 @@ def _scene(
     numbers: Indices,
     coarse: dict[int, pin.GeometryObject] | None = None,
 ) -> Scene:
-    """A scene of these pieces and pairs, in the order they had."""
+    """A scene of these pieces and pairs, in their original order."""
     place = {old: new for new, old in enumerate(kept)}
     chosen = [(coarse or {}).get(old, geometry.geometryObjects[old]) for old in kept]
     made = geometry_model([pin.GeometryObject(piece) for piece in chosen])
@@ -198,7 +198,7 @@ def _places_in_things(
     kept: range | list[int],
     chosen: list[pin.GeometryObject],
 ) -> dict[str, list[tuple[int, pin.SE3]]]:
-    """Index of each piece of a thing, and where it is in the thing."""
+    """Index of each piece of a thing, and its placement in the thing."""
     pieces: dict[str, list[int]] = {thing.name: [] for thing in objects}
     for index, owner in enumerate(owners):
         if owner in pieces:
@@ -213,7 +213,7 @@ def _places_in_things(
 
 
 def _dofs(figure: Figure, joint: str) -> list[int]:
-    """Degrees of freedom of a joint, none where it is not in this figure."""
+    """Degrees of freedom of a joint, none if it is not in this figure."""
     index = list(figure.model.names).index(joint) if joint in list(figure.model.names) else 0
     first = figure.model.joints[index].idx_v if index else 0
     return list(range(first, first + figure.model.joints[index].nv)) if index else []

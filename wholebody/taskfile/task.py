@@ -70,7 +70,7 @@ def read_task(path: str | PathLike[str]) -> Task:
         path: a TOML file. Paths in it are relative to its folder.
 
     Raises:
-        FileFormatError: a file that cannot be read, or a value of the wrong kind or out of range; file, key and mend
+        FileFormatError: a file that cannot be read, or a value of the wrong kind or out of range; file, key and fix
             are named.
         UnknownNameError: an unknown key, type, joint, frame or posture, or a missing file, with the nearest names.
         InputError: values that contradict each other.

@@ -1,4 +1,4 @@
-"""What keeps a posture from what was asked, named at its place: contacts, joints at their limits, held frames."""
+"""Markers of blockers at their positions: contacts, joints at their limits, held frames."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wholebody.view import style
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.viewed_scene import ViewedContacts, ViewedScene
 
-MOST = 4  # of the hardest are marked; more labels hide each other
+MOST = 4  # most blockers that are marked, the strongest; more labels hide each other
 
 _BALL = Marker("ball", style.BLOCKER, style.BLOCKER_RADIUS)
 
@@ -21,14 +21,14 @@ _BALL = Marker("ball", style.BLOCKER, style.BLOCKER_RADIUS)
 def mark_blockers(
     keyframe: Keyframe, scene: ViewedScene, state: State, contacts: ViewedContacts, blockers: Sequence[Any]
 ) -> None:
-    """Mark each of the hardest blockers by a ball and its name.
+    """Mark each of the strongest blockers by a ball and its name.
 
     Args:
-        keyframe: what is shown.
-        scene: whose figure and things they are.
-        state: of the figure, where it is shown.
-        contacts: pairs near each other there.
-        blockers: `Blocker`s of an assessment, the hardest first.
+        keyframe: the keyframe to which the markers are added.
+        scene: the scene.
+        state: of the figure at the shown posture.
+        contacts: near pairs at that posture.
+        blockers: `Blocker`s of an assessment, the strongest first.
     """
     for number, blocker in enumerate(blockers[:MOST]):
         place = _place(scene, state, contacts, blocker)
@@ -47,7 +47,7 @@ def mark_blockers(
 
 
 def _place(scene: ViewedScene, state: State, contacts: ViewedContacts, blocker: Any) -> Array | None:
-    """Where a blocker is (3,), or None for one that is nowhere, such as a balance."""
+    """Position of a blocker (3,), or None for one without a position, such as a balance."""
     if blocker.kind == "contact":
         owners = scene.piece_owner
         for row, (a, b) in enumerate(np.asarray(contacts.pair)):

@@ -17,15 +17,15 @@ from wholebody.view.viewed_scene import ViewedScene
 
 @dataclass(frozen=True)
 class Body:
-    """One piece as it is drawn.
+    """One drawn piece.
 
     Attributes:
-        carrier: node that moves with the joint.
+        carrier: the node of the joint.
         path: node of the piece, below the carrier.
         joint: index of the joint.
-        thing: name of the object it is part of; None for the figure's own.
-        color: when it touches nothing.
-        plate: whether it is a half-space, of which only a plate is drawn.
+        thing: name of its object; None for a piece of the figure.
+        color: its color without contact.
+        plate: whether it is a half-space, which is drawn as a plate.
     """
 
     carrier: str
@@ -36,7 +36,7 @@ class Body:
     plate: bool
 
     def state_color(self, state: Color) -> Color:
-        """Colour when it touches: the figure's pieces take it on, things are tinted, half-spaces stay as they are."""
+        """Colour in contact: the figure's pieces take this colour, things are tinted, half-spaces keep theirs."""
         if self.plate:
             return self.color
         amount = style.TINT if self.thing is not None else 1.0
@@ -50,8 +50,8 @@ class Bodies:
         """Read the scene.
 
         Args:
-            scene: what to draw.
-            see_through: names of things that should not hide the figure.
+            scene: the scene to draw.
+            see_through: names of things to draw transparent.
         """
         self.scene = scene
         self.see_through = frozenset(see_through)
@@ -64,7 +64,7 @@ class Bodies:
             color = self._thing_color(thing, numbers[thing], piece) if thing is not None else style.FIGURE
             folder = f"{style.OBJECT_NODE}/{node(thing)}" if thing is not None else style.FIGURE_NODE
             carrier = f"{folder}/{node(names[piece.parentJoint])}"
-            piece.geometry.computeLocalAABB()  # coal leaves the box undefined until it is asked for
+            piece.geometry.computeLocalAABB()  # coal computes the box only on request
             plate = type(piece.geometry).__name__ == "Halfspace"
             self.all.append(Body(carrier, f"{carrier}/{node(piece.name)}", int(piece.parentJoint), thing, color, plate))
         self.carriers = {body.carrier: body.joint for body in self.all}
@@ -82,7 +82,7 @@ class Bodies:
         return style.with_opacity(color, style.SEE_THROUGH) if thing in self.see_through else color
 
     def build(self, graph: SceneGraph) -> None:
-        """Put every piece in the scene graph, in place of those that were there."""
+        """Put every piece in the scene graph, in place of earlier ones."""
         graph.remove(style.FIGURE_NODE)
         graph.remove(style.OBJECT_NODE)
         for body, piece in zip(self.all, self.scene.geometry.geometryObjects, strict=True):
@@ -91,18 +91,18 @@ class Bodies:
         floor = next(
             (index for index, body in enumerate(self.all) if body.plate and body.color[:3] == style.FLOOR[:3]), None
         )
-        graph.set("/Ground", "visible", floor is None)  # what shows shadows where there is no floor
+        graph.set("/Ground", "visible", floor is None)  # a plane for shadows if there is no floor
         grid = np.eye(4)
         if floor is not None:
             piece = self.scene.geometry.geometryObjects[floor]
             top = drawing.plate_placement(np.asarray(piece.geometry.n), float(piece.geometry.d))
             grid = piece.placement.homogeneous @ top
             grid[:3, 3] += grid[:3, 2] * style.PLATE[2] / 2
-        grid[:3, 3] += 0.0015 * grid[:3, 2]  # m: clear of the floor, else the two flicker
+        grid[:3, 3] += 0.0015 * grid[:3, 2]  # m: above the floor, otherwise the two flicker
         graph.place("/Grid", grid)
 
     def pose(self, keyframe: Keyframe, data: Any) -> None:
-        """Place the joints where `data` has them, and the things where the scene has them now."""
+        """Place the joints by `data`, and the things at their present placements."""
         for path, joint in self.carriers.items():
             keyframe.transforms[path] = data.oMi[joint].homogeneous
         pieces = self.scene.geometry.geometryObjects
@@ -123,7 +123,7 @@ class Bodies:
             graph.place(f"{root}{body.carrier}", data.oMi[body.joint].homogeneous)
 
     def pose_ghost(self, keyframe: Keyframe, number: int, data: Any) -> None:
-        """Place a ghost that was drawn before where `data` has the joints."""
+        """Place an existing ghost at the posture of `data`."""
         for path, joint in self.carriers.items():
             if joint:
                 keyframe.transforms[f"{style.GHOST_NODE}/{number}{path}"] = data.oMi[joint].homogeneous
@@ -135,7 +135,7 @@ class Bodies:
         return np.concatenate([np.zeros((0, 3)), *(self._box(index, data) for index in chosen)])
 
     def tops(self, data: Any) -> dict[str, tuple[str, Array]]:
-        """Where the name of each thing goes: by node, the name and the top middle (3,) of its boxes; no half-spaces."""
+        """Labels of things: by node, the name and the top middle (3,) of its boxes; no half-spaces."""
         found: dict[str, list[Array]] = {}
         for index in self._things:
             body = self.all[index]

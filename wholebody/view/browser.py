@@ -1,4 +1,4 @@
-"""A headless Chromium, spoken to over two pipes with its DevTools protocol: no port, and it ends when we do."""
+"""A headless Chromium, controlled by its DevTools protocol over two pipes, without a port; it ends with us."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from wholebody.files import Scratch
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "chromium-headless-shell")
 _FLAGS = (
     "--headless",
-    "--no-sandbox",  # a container has none to offer; the one page opened is our own, and it has no network
+    "--no-sandbox",  # a container has no sandbox; the only page is our own, and it has no network
     "--disable-gpu",
     "--enable-unsafe-swiftshader",
     "--disable-dev-shm-usage",
@@ -41,11 +41,11 @@ _FLAGS = (
 
 
 class BrowserError(WholebodyError):
-    """The headless browser did not do what was asked of it."""
+    """The headless browser failed to carry out a command."""
 
 
 def find_chromium() -> str | None:
-    """Path of a Chromium or Chrome: what WHOLEBODY_CHROMIUM names, else the first on the PATH; None without any."""
+    """Path of a Chromium or Chrome: that of WHOLEBODY_CHROMIUM, otherwise the first on the PATH; None without any."""
     named = os.environ.get("WHOLEBODY_CHROMIUM")
     if named:
         return shutil.which(named)
@@ -57,7 +57,7 @@ class Browser:
 
     Attributes:
         errors: JavaScript errors of the page since it was opened.
-        requests: addresses the page asked for since it was opened.
+        requests: addresses that the page requested since it was opened.
     """
 
     def __init__(self, size: tuple[int, int] = (960, 720), timeout: float = 60.0) -> None:
@@ -101,12 +101,12 @@ class Browser:
             raise
 
     def _start(self, executable: str) -> None:
-        """Spawn Chromium with the reading end of one pipe as its descriptor 3, the writing end of another as 4."""
+        """Start Chromium with the reading end of one pipe as descriptor 3, the writing end of another as 4."""
         theirs_in, self._out = os.pipe()
         self._in, theirs_out = os.pipe()
         high_in = fcntl.fcntl(
             theirs_in, fcntl.F_DUPFD_CLOEXEC, 10
-        )  # clear of 3 and 4, so that neither dup2 hits the other
+        )  # other numbers than 3 and 4, so that no dup2 overwrites the other
         high_out = fcntl.fcntl(theirs_out, fcntl.F_DUPFD_CLOEXEC, 10)
         actions = [
             (os.POSIX_SPAWN_OPEN, fd, os.devnull, flag, 0)
@@ -123,13 +123,13 @@ class Browser:
                 os.close(descriptor)
 
     def resize(self, size: tuple[int, int]) -> None:
-        """Give the page another width and height, pixels."""
+        """Change the width and height of the page, pixels."""
         self._call(
             "Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=False
         )
 
     def open(self, url: str) -> None:
-        """Open an address and wait until the page of a `Viewer` has drawn what it was sent.
+        """Open an address and wait until the page of a `Viewer` has drawn all commands.
 
         Raises:
             BrowserError: the page did not load, or has an error.
@@ -179,7 +179,7 @@ class Browser:
         """PNG of the drawing, without the controls on top of it.
 
         Args:
-            first: JavaScript to carry out before, in the same breath, so that the page draws only once.
+            first: JavaScript to run before it in the same call, so that the page draws only once.
         """
         if self.errors:
             raise BrowserError(f"the page failed: {self.errors[0]}")
@@ -187,7 +187,7 @@ class Browser:
         return base64.b64decode(data.partition(",")[2])
 
     def close(self) -> None:
-        """End Chromium and remove its temporary files. Doing it again does nothing."""
+        """End Chromium and remove its temporary files. Calling it again does nothing."""
         if self._pid is None:
             return
         atexit.unregister(self.close)
@@ -230,7 +230,7 @@ class Browser:
         return result
 
     def _receive(self, end: float) -> None:
-        """Take in what the browser says next."""
+        """Read the next messages of the browser."""
         if not select.select([self._in], [], [], max(end - time.monotonic(), 0.0))[0]:
             raise BrowserError(f"the browser did not answer within {self.timeout:g} s")
         chunk = os.read(self._in, 1 << 20)

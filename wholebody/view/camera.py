@@ -1,4 +1,4 @@
-"""Where the camera stands and looks: as it was told, or at the figure with what is near it."""
+"""The camera: at a given position, or automatically in front of the figure and the things near it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from wholebody.view import commands, style
 from wholebody.view.server import CAMERA, Command
 
 NEAR = 0.3
-"""How far around the figure things are kept in the picture, metres; a wall is as long as it likes."""
+"""Distance from the figure within which things are kept in the picture, metres."""
 
 
 def look(
@@ -26,12 +26,12 @@ def look(
     """Turn the camera to a target, from `eye`, or from `direction` so that all `points` (n, 3) are in the picture.
 
     Args:
-        target: (3,) what is in the middle.
+        target: (3,) the point in the middle of the picture.
         fov: vertical angle of view, degrees.
-        eye: (3,) where the camera is.
+        eye: (3,) position of the camera.
         direction: (3,) from the target towards the camera.
-        points: (n, 3) what must be seen.
-        margin: how much wider than the points the picture is, 1 being exact.
+        points: (n, 3) points that must be visible.
+        margin: width of the picture relative to the points; 1 is exact.
     """
     command: dict[str, Any] = {"type": "look", "target": np.asarray(target, dtype=float).tolist(), "fov": float(fov)}
     if eye is not None:
@@ -44,12 +44,12 @@ def look(
 
 
 def camera_on(figure: Array, things: Array, direction: Array | None = None) -> Command:
-    """Look at the figure from its front right, from as far away as it takes to see it and what is near it.
+    """Look at the figure from its front right, at a distance from which it and the things near it are visible.
 
     Args:
-        figure: (n, 3) points of the figure that must be seen.
-        things: (m, 3) points of other things; those far away are drawn in to `NEAR`.
-        direction: (3,) from the figure to the camera, if another is wanted.
+        figure: (n, 3) points of the figure that must be visible.
+        things: (m, 3) points of other things; distant ones are clamped to `NEAR`.
+        direction: (3,) from the figure to the camera; None for the default.
     """
     if not len(figure):
         figure = things if len(things) else np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 2.0]])

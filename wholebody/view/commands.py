@@ -30,13 +30,13 @@ def set_object(path: str, three: Mapping[str, Any]) -> Command:
 
 
 def label(path: str, text: str, color: str, size: float) -> Command:
-    """Put a text at a node, upright and as large from near as from far.
+    """Put a text at a node, upright and of the same size at every distance.
 
     Args:
         path: the node.
         text: one line.
         color: of the letters, as in CSS.
-        size: height, as a fraction of the distance at which it is looked at.
+        size: height, as a fraction of the distance from the camera.
     """
     return Command(OBJECT, path, "", pack({"type": "label", "path": path, "text": text, "color": color, "size": size}))
 
@@ -66,7 +66,7 @@ class Track(NamedTuple):
         name: the property, as three.js names it: "position", "material.color".
         kind: "vector3", "quaternion", "color", "number" or "bool".
         values: (n, size) one row a frame; n booleans for "bool".
-        steps: whether the value jumps at each frame instead of passing smoothly to the next.
+        steps: whether the value jumps at each frame instead of being interpolated.
     """
 
     path: str
@@ -76,7 +76,7 @@ class Track(NamedTuple):
     steps: bool = False
 
     def lower(self, times: Array) -> dict[str, Any]:
-        """Return the track as three.js reads it."""
+        """Return the track in the format of three.js."""
         if self.kind == "bool":
             values: Any = [bool(value) for value in np.ravel(self.values)]
         else:
@@ -91,10 +91,10 @@ def set_animation(tracks: Sequence[Track], dt: float, frames: int, repetitions: 
     """Let the page play a motion by its own clock.
 
     Args:
-        tracks: what changes.
+        tracks: the changing properties.
         dt: seconds from frame to frame.
-        frames: how many there are.
-        repetitions: how often it is played; infinity for ever.
+        frames: number of frames.
+        repetitions: number of times it is played; infinity for ever.
     """
     times = np.asarray(np.arange(frames) * dt, dtype=float)
     clips: dict[str, list[dict[str, Any]]] = {}
@@ -108,7 +108,7 @@ def set_animation(tracks: Sequence[Track], dt: float, frames: int, repetitions: 
 
 
 def stop_animation() -> Command:
-    """End the motion; what it moved goes back to where it was before."""
+    """End the motion; moved nodes return to their state before it."""
     empty = {"type": "set_animation", "animations": [], "options": {"play": False}}
     return Command(ANIMATION, "", STOP, pack(empty))
 

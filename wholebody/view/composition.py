@@ -1,4 +1,4 @@
-"""Turns a posture of a scene into a keyframe: pieces, contacts, goals, names, and where the camera stands."""
+"""Makes the keyframe of a posture of a scene: pieces, contacts, goals, names, and the camera."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class Composition:
     def __init__(
         self, scene: ViewedScene, graph: SceneGraph, contact_distance: float, see_through: Collection[str], names: bool
     ) -> None:
-        """Keep what to draw and how; nothing is drawn before the first posture.
+        """Store the options; nothing is drawn before the first posture.
 
         Args:
-            scene: what is shown.
-            graph: where it is shown.
+            scene: the shown scene.
+            graph: the scene graph.
             contact_distance: pieces nearer than this are shown as touching, metres.
             see_through: names of things to draw transparent.
-            names: write the names of things beside them.
+            names: whether to write the names of things beside them.
         """
         self._scene, self._graph = scene, graph
         self._contact_distance, self._see_through, self._names = contact_distance, see_through, names
@@ -44,7 +44,7 @@ class Composition:
 
     @property
     def bodies(self) -> Bodies:
-        """The pieces; drawn when they are first asked for, and anew after things came or went."""
+        """The pieces; drawn when they are first needed, and again after things were added or removed."""
         if self._bodies is None or self._bodies.revision != self._scene.revision:
             self._bodies = Bodies(self._scene, self._see_through)
             self._bodies.build(self._graph)
@@ -59,7 +59,7 @@ class Composition:
         return np.array(self._state.update(q).q)
 
     def keyframe(self, q: Array, problem: Any, blockers: Sequence[Any] = ()) -> Keyframe:
-        """What is shown at a posture, with the goals of a problem if there is one, and what stands in their way."""
+        """The keyframe of a posture, with the goals of a problem if there is one, and the blockers."""
         bodies, state, keyframe = self.bodies, self._state.update(q), Keyframe()
         bodies.pose(keyframe, state.data)
         contacts = self._scene.contacts(q, within=self._contact_distance)
@@ -86,7 +86,7 @@ class Composition:
             self.bodies.ghost(self._graph, number, self._state.update(q).data, color)
 
     def moving_ghost(self, keyframes: Sequence[Keyframe], postures: Any, color: style.Color) -> list[Array]:
-        """Add a ghost that moves to a motion's keyframes; return where it begins.
+        """Add a moving ghost to a motion's keyframes; return its first posture.
 
         Raises:
             InputError: not as many postures as keyframes, or one has the wrong shape or is not finite.
@@ -100,7 +100,7 @@ class Composition:
         return checked[:1]
 
     def camera(self, postures: Iterable[Array]) -> Command:
-        """Look at the figure so that it is in the picture at all of these postures, and the goals shown last too."""
+        """A camera that sees the figure at all of these postures, and the last shown goals."""
         figure, things = [], []
         for q in postures:
             state = self._state.update(q)

@@ -1,4 +1,4 @@
-"""Contacts and penetrations: colours of the pieces, normals, witness points, and the way out of each other."""
+"""Contacts and penetrations: colours of the pieces, normals, witness points, and penetration vectors."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.viewed_scene import ViewedContacts
 
 MOST = 60
-"""Markers are drawn for this many of the nearest contacts; a page with thousands of nodes stutters."""
+"""Number of the nearest contacts with markers; a page with thousands of nodes is slow."""
 
 LABELLED = 3
-"""The depth is written beside this many of the deepest penetrations."""
+"""Number of the deepest penetrations that are labelled with their depth."""
 
 _NORMAL = Marker("arrow", style.NORMAL, 0.8)
 _WITNESS = Marker("ball", style.WITNESS, style.WITNESS_RADIUS)
@@ -23,7 +23,7 @@ _DEPTH = Marker("arrow", style.DEPTH, 1.3)
 
 
 def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) -> None:
-    """Give every piece that touches the colour of its state; penetration outweighs contact."""
+    """Give every piece in contact the colour of its state; penetration takes precedence over contact."""
     for pairs, state in (
         (contacts.pair, style.CONTACT),
         (contacts.pair[np.asarray(contacts.distance) < -PENETRATION], style.PENETRATION),
@@ -34,10 +34,10 @@ def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts)
 
 
 def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) -> None:
-    """Mark witness points and normals; for penetrations the vector by which the figure's piece would come out.
+    """Mark witness points and normals; for penetrations the vector that moves the figure's piece out.
 
-    A normal starts at the first piece's witness point and leads to the second piece. A penetration vector is as long as
-    the depth, but at least `style.SHORTEST_DEPTH`; the label of the deepest ones says how deep.
+    A normal starts at the first piece's witness point and points to the second piece. A penetration vector is as long
+    as the depth, but at least `style.SHORTEST_DEPTH`; the deepest ones are labelled with their depth.
     """
     for row in range(min(len(contacts.distance), MOST)):
         root = f"{style.CONTACT_NODE}/{row}"

@@ -20,7 +20,7 @@ _AROUND, _ALONG = 32, 8
 
 
 def piece(geometry: Any, name: str, color: Color) -> Three:
-    """A piece as it is, in its own coordinates. It throws a shadow unless it is transparent or a half-space.
+    """A piece in its own coordinates. It casts a shadow unless it is transparent or a half-space.
 
     Args:
         geometry: coal's Sphere, Capsule, Box, Ellipsoid, Convex, Halfspace, Cylinder, Cone or a BVHModel.
@@ -70,7 +70,7 @@ _ALONG_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 
 
 
 def plate_placement(normal: Array, offset: float) -> Array:
-    """Placement (4, 4) of the plate that stands for the half-space n.x <= d: its upper face lies in the plane."""
+    """Placement (4, 4) of the plate that represents the half-space n.x <= d: its upper face is in the plane."""
     placement = np.eye(4)
     placement[:3, :3] = _turned_to(normal)
     placement[:3, 3] = normal * (offset - style.PLATE[2] / 2)
@@ -91,7 +91,7 @@ def _turned_to(direction: Array) -> Array:
 
 
 def arrow_placement(start: Array, direction: Array, length: float) -> Array:
-    """Placement (4, 4), scale included, that lays the unit arrow from `start` along `direction`; long ones slender."""
+    """Placement (4, 4), with scale, of the unit arrow from `start` along `direction`; long arrows keep their width."""
     placement = np.eye(4)
     width = min(length, style.WIDEST_ARROW)
     placement[:3, :3] = _turned_to(direction) * (width, width, length)
@@ -100,7 +100,7 @@ def arrow_placement(start: Array, direction: Array, length: float) -> Array:
 
 
 def rod_placement(start: Array, end: Array, radius: float) -> Array | None:
-    """Placement (4, 4) of the rod of radius 1 and length 1 between two points; None where they are the same."""
+    """Placement (4, 4) of the rod of radius 1 and length 1 between two points; None if they are the same."""
     span = end - start
     length = float(np.linalg.norm(span))
     if length < 1e-6:
@@ -209,7 +209,7 @@ def _material(color: Color, *, flat: bool) -> Three:
         "color": _number(color),
         "opacity": color[3],
         "transparent": color[3] < 1.0,
-        "polygonOffset": color[3] < 1.0,  # a ghost's surface yields to the figure's where the two coincide
+        "polygonOffset": color[3] < 1.0,  # where they coincide, the figure's surface is drawn in front of a ghost's
         "polygonOffsetFactor": 2,
         "polygonOffsetUnits": 8,
         "flatShading": flat,

@@ -1,4 +1,4 @@
-"""Goals: what is to be reached, how far it is, and in words how much is left."""
+"""Markers of goals: target, distance, and the remaining error in words."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Goals:
     """The goals of a problem, drawn at any posture."""
 
     def __init__(self, scene: ViewedScene, problem: Any) -> None:
-        """Take the goals of a `wholebody.Problem`, which has resolved them on its scene.
+        """Use the resolved goals of a `wholebody.Problem`.
 
         Raises:
             InputError: it is no problem.
@@ -37,7 +37,7 @@ class Goals:
         self.goals = goals
 
     def mark(self, keyframe: Keyframe, state: State) -> None:
-        """Mark each goal that has a place: target, the way to it, axes where it asks for an orientation, the error."""
+        """Mark each goal that has a position: target, line to it, axes of an orientation goal, the error."""
         for number, goal in enumerate(self.goals):
             root = f"{style.GOAL_NODE}/{number}"
             here = self._here(goal, state)
@@ -58,7 +58,7 @@ class Goals:
             keyframe.markers[f"{root}/text"] = (label, _at(target.translation))
 
     def targets(self, state: State) -> Array:
-        """Places (n, 3) that should be in the picture."""
+        """Positions (n, 3) that should be in the picture."""
         found = [np.zeros((0, 3))]
         for goal in self.goals:
             target, _ = _target(goal, self._here(goal, state), state, self.scene)
@@ -67,7 +67,7 @@ class Goals:
         return np.concatenate(found)
 
     def _here(self, goal: Any, state: State) -> pin.SE3 | None:
-        """Placement of what the goal moves; None for a goal without a place."""
+        """Placement of the goal's frame; None for a goal without a position."""
         name = getattr(goal, "frame", None)
         if isinstance(name, str):
             here = state.frame(self.scene.figure.frame_id(name)).copy()
@@ -79,7 +79,7 @@ class Goals:
         return None
 
     def _point(self, keyframe: Keyframe, root: str, goal: Any, here: pin.SE3) -> None:
-        """The axis that a goal points somewhere, and where it should point."""
+        """The axis of a goal, and its target direction."""
         axis = getattr(goal, "axis", None)
         if axis is None:
             return
@@ -98,7 +98,7 @@ def _wanted(goal: Any, here: pin.SE3) -> Array:
 
 
 def _target(goal: Any, here: pin.SE3 | None, state: State, scene: ViewedScene) -> tuple[pin.SE3 | None, bool]:
-    """Where the goal wants its frame, and whether it asks for an orientation too."""
+    """Target placement of the goal's frame, and whether the goal includes the orientation."""
     if here is None:
         return None, False
     target = getattr(goal, "target", None)
@@ -124,7 +124,7 @@ def _target(goal: Any, here: pin.SE3 | None, state: State, scene: ViewedScene) -
 
 
 def left(goal: Any, state: State) -> str:
-    """How much of a goal is left, in words: "3.2 mm", "1.5°", or both."""
+    """Remaining error of a goal in words: "3.2 mm", "1.5°", or both."""
     error = np.atleast_1d(goal.error(state))
     angular = np.broadcast_to(goal.angular, error.shape)
     parts: Iterable[str] = (

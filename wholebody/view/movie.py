@@ -17,7 +17,7 @@ from wholebody.errors import InputError, MissingPackageError, WholebodyError
 from wholebody.files import Scratch
 
 FASTEST = {".gif": 25.0, ".mp4": 30.0}
-"""Pictures per second by default at most: GIF counts hundredths of a second, and browsers slow down beyond 50."""
+"""Largest default pictures per second: GIF times are hundredths of a second, and browsers slow down beyond 50."""
 SLOWEST = 0.01  # pictures per second
 _COLORS = 96
 
@@ -40,13 +40,13 @@ def check_movie(path: str | os.PathLike[str]) -> Path:
 
 
 def frame_times(path: Path, count: int, dt: float, fps: float | None) -> tuple[list[float], float]:
-    """When the pictures of a movie are taken, seconds from the motion's beginning, and how many there are a second.
+    """Times of the pictures of a movie, seconds from the motion's beginning, and the rate per second.
 
     Args:
         path: of the movie; its ending limits the default rate.
-        count: postures of the motion.
+        count: number of postures of the motion.
         dt: seconds from one to the next.
-        fps: pictures per second, or None for the motion's own where the kind of file allows it.
+        fps: pictures per second, or None for the motion's own if the kind of file allows it.
 
     Raises:
         InputError: the rate is out of range.
@@ -96,7 +96,7 @@ def _mp4(pictures: Iterable[bytes], fps: float) -> bytes:
     ]
     command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p"]
     with Scratch() as folder, tempfile.TemporaryFile() as log:
-        path = folder / "movie.mp4"  # ffmpeg puts the index first at the end, which takes a file
+        path = folder / "movie.mp4"  # ffmpeg moves the index to the front at the end, which requires a file
         process = subprocess.Popen(
             [*command, "-movflags", "+faststart", str(path)], stdin=subprocess.PIPE, stdout=log, stderr=log
         )

@@ -1,4 +1,4 @@
-"""The page that shows the picture: live, fed over a socket, or one self-contained file that opens without a network."""
+"""The page that shows the scene: live over a socket, or one self-contained file that opens without a network."""
 
 from __future__ import annotations
 
@@ -41,16 +41,16 @@ body {{ margin: 0; background: #dfe3e7; }}
 
 
 def live_page(title: str = "wholebody") -> str:
-    """HTML of a page that connects back to the server it came from."""
+    """HTML of a page that connects to its server."""
     return _page(title, "")
 
 
 def static_page(commands: list[Command], title: str = "wholebody") -> str:
-    """HTML of a page that carries its picture with it and asks the network for nothing.
+    """HTML of a page that contains its scene and makes no network requests.
 
     Args:
-        commands: what draws the picture, in order (`Store.commands`).
-        title: what the browser's tab is called.
+        commands: the drawing commands, in order (`Store.commands`).
+        title: of the browser's tab.
     """
     data = base64.b64encode(bundle([command.payload for command in commands])).decode("ascii")
     return _page(title, f'<script id="picture" type="application/octet-stream">{data}</script>')
@@ -63,7 +63,7 @@ def _page(title: str, picture: str) -> str:
 
 @lru_cache(maxsize=1)
 def _meshcat_script() -> str:
-    """Meshcat's viewer with three.js in it, found without importing meshcat (which would take IPython along)."""
+    """Meshcat's viewer with three.js, found without importing meshcat (which would import IPython)."""
     found = importlib.util.find_spec("meshcat")
     folder = Path(found.origin).parent if found is not None and found.origin else None
     script = folder / "viewer" / "dist" / "main.min.js" if folder is not None else None

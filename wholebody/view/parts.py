@@ -1,4 +1,4 @@
-"""Rigid parts that no figure has, such as those of a `wholebody.Assembly`, as something the viewer can show."""
+"""Rigid parts without a figure, such as those of a `wholebody.Assembly`, in a form that the viewer shows."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Part(NamedTuple):
     """One shape of a part.
 
     Attributes:
-        shape: what it is.
-        at: where in the part's frame.
-        color: red, green, blue, alpha; the viewer's choice if left out.
+        shape: the shape.
+        at: its placement in the part's frame.
+        color: red, green, blue, alpha; chosen by the viewer if left out.
     """
 
     shape: Shape
@@ -39,7 +39,7 @@ class _Colored:
 
 
 class _Nothing(NamedTuple):
-    """No contacts: what parts do to each other is not asked here."""
+    """No contacts: contacts of parts are not computed."""
 
     pair: NDArray[np.intp] = np.zeros((0, 2), dtype=np.intp)
     distance: Array = np.zeros(0)
@@ -49,7 +49,7 @@ class _Nothing(NamedTuple):
 
 
 class Parts:
-    """Free rigid parts, for `Viewer(Parts(...))`; a posture is where each of them is, see `posture`.
+    """Free rigid parts, for `Viewer(Parts(...))`; a posture is the placements of all of them, see `posture`.
 
     Contacts are not computed.
 
@@ -63,7 +63,7 @@ class Parts:
     revision = 0
 
     def __init__(self, parts: Mapping[str, Iterable[Part]]) -> None:
-        """Take the shapes of each part, by the part's name.
+        """Store the shapes of each part, by the part's name.
 
         Raises:
             InputError: there is no part, or one has no shape or a placement that cannot be read.
@@ -98,7 +98,7 @@ class Parts:
         self.objects = MappingProxyType(objects)
 
     def posture(self, placements: Mapping[str, Any]) -> Array:
-        """Where all parts are, (7 n,), from a placement for each name, as `AssemblySolution.placements` has them.
+        """The posture (7 n,) of all parts from a placement for each name, such as `AssemblySolution.placements`.
 
         Raises:
             UnknownNameError: a part has no placement.
@@ -115,14 +115,14 @@ class Parts:
         return np.concatenate([pin.SE3ToXYZQUAT(placement(placements[name], name)) for name in self.names])
 
     def contacts(self, q: Array, within: float = 0.05) -> _Nothing:
-        """None: contacts are not computed here."""
+        """No contacts."""
         checks.posture(q, self.model.nq)
         checks.number(within, "within", -FARTHEST, FARTHEST, "m")
         return _Nothing()
 
 
 def _part(entry: Any, name: str) -> Part:
-    """A part from what stands in a list, with its shape and color checked."""
+    """A part from an entry of a list, with its shape and color checked."""
     part = Part(*entry) if isinstance(entry, tuple) and 1 <= len(entry) <= len(Part._fields) else Part(entry)
     if not isinstance(part.shape, Shape):
         raise InputError(f"part {name!r} has {checks.shown(part.shape)} for a shape; give wb.Box, wb.Sphere or another")

@@ -1,4 +1,4 @@
-"""The page's content as a scene graph: tells the live page of changes only, and turns keyframes into an animation."""
+"""The page's content as a scene graph: sends only changes to the live page, and makes animations of keyframes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from wholebody.view.style import Color
 
 @dataclass(frozen=True)
 class Marker:
-    """A small thing drawn on top of the picture. Made once and then only moved.
+    """A small object drawn on top of the picture. It is made once and then only moved.
 
     Attributes:
         kind: "arrow", "rod", "ball" or "label".
@@ -35,7 +35,7 @@ class Marker:
 
 @dataclass
 class Keyframe:
-    """Everything that can differ from one posture to the next.
+    """Everything that can change from one posture to the next.
 
     Attributes:
         transforms: placement (4, 4) by node, relative to the node above.
@@ -49,28 +49,28 @@ class Keyframe:
 
 
 class SceneGraph:
-    """The page's content. Without a connection it is only kept, ready to be saved."""
+    """The page's content. Without a connection it is only stored, for saving."""
 
     def __init__(self) -> None:
-        """Begin empty."""
+        """Make an empty scene graph."""
         self.store = Store()
         self._sender: Sender | None = None
         self._waiting: list[Command] = []
         self._markers: dict[str, Marker] = {}
 
     def connect(self, sender: Sender) -> None:
-        """Show everything in the live page from now on."""
+        """Connect to the live page, which then shows everything."""
         self._sender = sender
         self._waiting.clear()
         sender.send(self.store.commands())
 
     def disconnect(self) -> None:
-        """Only keep the content from now on."""
+        """Disconnect from the live page; the content is kept."""
         self._sender = None
         self._waiting.clear()
 
     def put(self, path: str, three: Mapping[str, Any]) -> None:
-        """Put a three.js object at a node, in place of what was there."""
+        """Put a three.js object at a node, in place of an earlier one."""
         self.do(commands.set_object(path, three))
 
     def remove(self, path: str) -> None:
@@ -87,7 +87,7 @@ class SceneGraph:
         self.do(commands.set_property(path, name, value))
 
     def flush(self) -> None:
-        """Send what has changed since the last time, in one go."""
+        """Send all changes since the last call together."""
         if self._sender is not None and self._waiting:
             self._sender.send(self._waiting)
         self._waiting.clear()
@@ -110,7 +110,7 @@ class SceneGraph:
         self.flush()
 
     def play(self, keyframes: Sequence[Keyframe], dt: float, repetitions: float) -> None:
-        """Let the page play these keyframes, dt seconds apart. A marker that changes its looks is left out."""
+        """Let the page play these keyframes, dt seconds apart. A marker that changes its appearance is left out."""
         for keyframe in keyframes[1:]:
             for path, (marker, _) in keyframe.markers.items():
                 if path not in keyframes[0].markers:
@@ -121,7 +121,7 @@ class SceneGraph:
         self.flush()
 
     def do(self, command: Command) -> None:
-        """Carry out a command, unless everything is already as it would make it."""
+        """Carry out a command, unless it would change nothing."""
         if self.store.has(command):
             return
         self.store.apply(command)
@@ -129,7 +129,7 @@ class SceneGraph:
             self._waiting.append(command)
 
     def _provide(self, path: str, marker: Marker) -> None:
-        """Make a marker unless it is there already."""
+        """Make a marker unless it exists already."""
         if self._markers.get(path) == marker:
             return
         self._markers[path] = marker
@@ -143,7 +143,7 @@ class SceneGraph:
             self.put(path, drawing.ball(path, marker.color, marker.size))
 
     def _appearances(self, keyframes: Sequence[Keyframe]) -> list[Track]:
-        """Tracks of the markers: when they are seen, and where."""
+        """Tracks of the markers: their visibility and placements."""
         tracks: list[Track] = []
         for path, marker in self._markers.items():
             found = [keyframe.markers.get(path) for keyframe in keyframes]
@@ -178,7 +178,7 @@ def _colors(keyframes: Sequence[Keyframe]) -> list[Track]:
 
 
 def _motion(path: str, matrices: Array, *, steps: bool = False) -> list[Track]:
-    """Tracks of one node's placements (n, 4, 4); none where it rests."""
+    """Tracks of one node's placements (n, 4, 4); none if it does not move."""
     if (np.ptp(matrices, axis=0) < 1e-9).all():
         return []
     scales = np.linalg.norm(matrices[:, :3, :3], axis=1)

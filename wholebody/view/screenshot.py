@@ -1,4 +1,4 @@
-"""Pages turned into pictures by one headless browser, started when it is first needed."""
+"""Pictures of pages by one headless browser, which is started when it is first needed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from wholebody.checks import listed, shown, whole
 from wholebody.errors import InputError
 from wholebody.view.browser import Browser
 
-LARGEST = 8192  # pixels: no software renderer goes beyond
+LARGEST = 8192  # pixels: limit of software renderers
 
 
 def check_size(size: Any) -> tuple[int, int]:
@@ -25,10 +25,10 @@ def check_size(size: Any) -> tuple[int, int]:
 
 
 class Screenshots:
-    """A headless browser and what it is used for here."""
+    """A headless browser that takes pictures of pages."""
 
     def __init__(self) -> None:
-        """Start nothing yet."""
+        """Prepare; the first picture starts the browser."""
         self._browser: Browser | None = None
 
     def picture(self, page: str, size: Any) -> bytes:
@@ -46,7 +46,7 @@ class Screenshots:
         return (browser.capture(f"wholebody.seek({time!r})") for time in times)
 
     def close(self) -> None:
-        """End the browser. Doing it again does nothing."""
+        """End the browser. Calling it again does nothing."""
         if self._browser is not None:
             self._browser.close()
         self._browser = None

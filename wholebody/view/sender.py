@@ -24,11 +24,11 @@ _STARTING = 20.0  # s
 
 
 class ViewerClosedError(WholebodyError):
-    """The viewer's server process is gone, so nothing can be shown live any more."""
+    """The viewer's server process has ended, so nothing can be shown live any more."""
 
 
 class Sender:
-    """The program's end of a server process. Commands go through a pipe: nobody else can send any, nothing is awaited.
+    """The program's side of a server process. Commands go through a pipe, so no other process can send any.
 
     Attributes:
         url: address of the page.
@@ -40,7 +40,7 @@ class Sender:
         Args:
             page: HTML to serve.
             host: name or address of this machine to listen at.
-            port: where; 0 for the first free one.
+            port: the port; 0 for the first free one.
 
         Raises:
             InputError: the port is taken, or the host is no address of this machine.
@@ -60,7 +60,7 @@ class Sender:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             bufsize=0,
-            start_new_session=True,  # Ctrl-C in the terminal is for the program; the server ends with it
+            start_new_session=True,  # Ctrl-C in the terminal reaches only the program; the server ends with it
         )
         atexit.register(self.close)
         try:
@@ -79,10 +79,10 @@ class Sender:
             raise
 
     def send(self, commands: Iterable[Command]) -> None:
-        """Hand commands to the server in one write; open tabs carry them out together.
+        """Send commands to the server in one write; open tabs carry them out together.
 
         Raises:
-            ViewerClosedError: the server process is gone.
+            ViewerClosedError: the server process has ended.
         """
         self._write(b"".join(command.pack() for command in commands) + Command(PUSH).pack())
 
@@ -99,14 +99,14 @@ class Sender:
         return False
 
     def sync(self, timeout: float) -> bool:
-        """Wait until every open tab has carried out all that was sent; False if not within `timeout` seconds."""
+        """Wait until every open tab has carried out all commands; False if not within `timeout` seconds."""
         self._syncs += 1
         number = self._syncs
         self._write(Command(PUSH).pack() + Command(SYNC, key=str(number)).pack())
         return self._read(("sync",), timeout, number) is not None
 
     def close(self) -> None:
-        """End the server process. Doing it again does nothing."""
+        """End the server process. Calling it again does nothing."""
         atexit.unregister(self.close)
         process = self._process
         for pipe in (process.stdin, process.stdout):

@@ -1,9 +1,9 @@
-"""The process that serves the page and hands every drawing command to the browser tabs that show it.
+"""The process that serves the page and sends every drawing command to the browser tabs that show it.
 
 It runs apart from the program that draws, so that a long computation never freezes the page. It is started as a script
-and imports the standard library and tornado alone. Commands come in over its standard input, so nobody else can send
-any; what it has to tell goes out over its standard output, one JSON object a line. It listens on one address,
-127.0.0.1 by default, and ends when its input ends or its parent is gone.
+and imports the standard library and tornado alone. It reads commands from its standard input, so no other process can
+send any, and writes messages to its standard output, one JSON object a line. It listens on one address, 127.0.0.1 by
+default, and ends when its input ends or its parent has ended.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ PARENT_POLL = 0.5  # s
 
 
 class Command(NamedTuple):
-    """One message: what it does, to which node, under which key, and the bytes for the page (msgpack).
+    """One message: its kind, node and key, and the bytes for the page (msgpack).
 
-    An ANIMATION with the key STOP is told to open pages, and then forgotten; PUSH, SYNC and PAGE speak to the server.
+    An ANIMATION with the key STOP is sent to open pages and not stored; PUSH, SYNC and PAGE are commands to the server.
     """
 
     op: bytes
@@ -41,7 +41,7 @@ class Command(NamedTuple):
     payload: bytes = b""
 
     def pack(self) -> bytes:
-        """Return the message as it travels: a header with the lengths, then the parts."""
+        """Return the serialised message: a header with the lengths, then the parts."""
         path, key = self.path.encode(), self.key.encode()
         return HEADER.pack(self.op, len(path), len(key), len(self.payload)) + path + key + self.payload
 
@@ -56,7 +56,7 @@ class _Node:
 
 
 class Store:
-    """What a page has to be told to show the present picture: the last value of everything, never the history."""
+    """The commands that show the present picture in a new page: the last value of everything, without history."""
 
     def __init__(self) -> None:
         """Begin with an empty picture."""
@@ -65,7 +65,7 @@ class Store:
         self.animation: bytes | None = None
 
     def apply(self, command: Command) -> None:
-        """Take a command into the picture."""
+        """Apply a command to the picture."""
         op, path, key, payload = command
         if op == TRANSFORM:
             self._node(path).transform = payload
@@ -91,7 +91,7 @@ class Store:
         return node
 
     def has(self, command: Command) -> bool:
-        """Whether the picture already is as the command would make it."""
+        """Whether the command would change nothing."""
         node = self.nodes.get(command.path)
         if node is None:
             return False
@@ -102,7 +102,7 @@ class Store:
         return command.op == OBJECT and node.object == command.payload
 
     def commands(self, *, motion: bool = True) -> list[Command]:
-        """Commands that build the picture in an empty page; the animation last, when all it moves is there.
+        """Commands that build the picture in an empty page; the animation last, when all its nodes exist.
 
         Args:
             motion: include the animation.
@@ -127,10 +127,10 @@ def bundle(payloads: list[bytes]) -> bytes:
 
 
 class Queue:
-    """What one tab has still to be told. A new transform or property replaces the one that waits, so no tab lags."""
+    """The pending commands of one tab. A new transform or property replaces the pending one, so no tab lags."""
 
     def __init__(self) -> None:
-        """Begin with nothing waiting."""
+        """Make an empty queue."""
         self.waiting: list[bytes] = []
         self._place: dict[tuple[bytes, str, str], int] = {}
 
@@ -147,14 +147,14 @@ class Queue:
         self.waiting.append(command.payload)
 
     def take(self) -> list[bytes]:
-        """Return all that waits, in order, and forget it."""
+        """Return all pending commands, in order, and empty the queue."""
         taken, self.waiting = self.waiting, []
         self._place.clear()
         return taken
 
 
 def tell(**what: Any) -> None:
-    """Write one line for the parent."""
+    """Write one line to the parent."""
     sys.stdout.write(json.dumps(what) + "\n")
     sys.stdout.flush()
 
@@ -170,7 +170,7 @@ class Hub:
         self.syncs: list[int] = []
 
     async def listen(self, reader: asyncio.StreamReader) -> None:
-        """Take commands until the input ends."""
+        """Read commands until the input ends."""
         while True:
             try:
                 op, path, key, size = HEADER.unpack(await reader.readexactly(HEADER.size))
@@ -181,7 +181,7 @@ class Hub:
                 return
 
     def take(self, command: Command) -> None:
-        """Obey one command."""
+        """Carry out one command."""
         if command.op == PAGE:
             self.page = command.payload.decode()
             tell(ready=True)
@@ -197,7 +197,7 @@ class Hub:
                 tab.queue.put(command)
 
     def settle(self) -> None:
-        """Answer the pending questions whether every tab has drawn everything."""
+        """Answer the pending SYNC commands if every tab has drawn everything."""
         if self.syncs and all(tab.idle for tab in self.tabs):
             for number in self.syncs:
                 tell(sync=number, tabs=len(self.tabs))
@@ -205,7 +205,7 @@ class Hub:
 
 
 def called(host: str) -> frozenset[str]:
-    """Names under which a server that listens at `host` may be asked: a foreign one would be DNS rebinding."""
+    """Host names that a server at `host` accepts in requests: another name would be DNS rebinding."""
     names = {*LOCAL, host.lower()}
     if host not in LOCAL:
         names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
@@ -213,7 +213,7 @@ def called(host: str) -> frozenset[str]:
 
 
 def is_address(name: str) -> bool:
-    """Whether a name is an IP address, which nobody can rebind."""
+    """Whether a name is an IP address, for which DNS rebinding is impossible."""
     try:
         ipaddress.ip_address(name.strip("[]"))
     except ValueError:
@@ -250,7 +250,7 @@ def make_application(hub: Hub, host: str) -> Any:
             self.queue.waiting = [command.payload for command in hub.store.commands()]
             hub.tabs.add(self)
             tell(tabs=len(hub.tabs))
-            self.send()  # even if there is nothing: it tells the page that it is up to date
+            self.send()  # also an empty message: it tells the page that it is up to date
 
         def send(self) -> None:
             self.idle = False
@@ -274,7 +274,7 @@ def make_application(hub: Hub, host: str) -> Any:
 
 
 async def serve(parent: int, host: str, port: int) -> None:
-    """Serve until the input ends or the parent is gone; port 0 takes the first free one."""
+    """Serve until the input ends or the parent has ended; port 0 takes the first free one."""
     import logging
 
     from tornado.httpserver import HTTPServer

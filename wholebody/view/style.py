@@ -1,4 +1,4 @@
-"""How things look: colours, sizes and distances, in one place."""
+"""Colours, sizes and distances of the viewer."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ OBJECTS: tuple[Color, ...] = (
     (0.62, 0.56, 0.49, 1.0),
     (0.53, 0.53, 0.74, 1.0),
 )
-"""Muted, told apart by hue, none near the two colours of state."""
+"""Muted colours of different hues, none near the two colours of state."""
 
 SEE_THROUGH = 0.22
-"""Opacity of things that should not hide the figure."""
+"""Opacity of transparent things."""
 
 TINT = 0.45
-"""How far the colour of a thing (not of the figure) goes towards the colour of its state: it stays recognisable."""
+"""Share of the colour of state in the colour of a thing (not of the figure), which stays recognisable."""
 
 NORMAL = (0.13, 0.36, 0.60)
 WITNESS = (0.10, 0.22, 0.38)
@@ -49,10 +49,10 @@ BLOCKER_RADIUS = 0.014  # m
 TARGET_RADIUS = 0.016  # m
 LINE_RADIUS = 0.0025  # m
 AXES_LENGTH = 0.10  # m
-SHORTEST_DEPTH = 0.05  # m: shallower penetration vectors are drawn this long, else nobody would see them
-LABEL_SIZE = 0.018  # of the distance it is looked at from: about 22 pixels of 720
+SHORTEST_DEPTH = 0.05  # m: shallower penetration vectors are drawn this long, otherwise they would be invisible
+LABEL_SIZE = 0.018  # of the distance from the camera: about 22 pixels of 720
 
-PLATE = (6.0, 6.0, 0.04)  # m: what is drawn of a half-space
+PLATE = (6.0, 6.0, 0.04)  # m: size of the plate that represents a half-space
 
 FIGURE_NODE, OBJECT_NODE, GHOST_NODE = "/figure", "/objects", "/ghosts"
 CONTACT_NODE, GOAL_NODE, NAME_NODE, BLOCKER_NODE = "/contacts", "/goals", "/names", "/in the way"
@@ -79,5 +79,5 @@ def tinted(color: Color, towards: Color, amount: float) -> Color:
 
 
 def with_opacity(color: Color, opacity: float) -> Color:
-    """The same colour, as opaque as said."""
+    """The same colour with another opacity."""
     return (*color[:3], opacity)

@@ -1,4 +1,4 @@
-"""What the viewer needs to know of a scene: this much and no more."""
+"""The part of a scene that the viewer uses."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from wholebody.errors import InputError
 
 
 def checked_scene(scene: Any) -> Any:
-    """What a viewer shows.
+    """Check the argument of a viewer.
 
     Raises:
-        InputError: it is no scene; what else might have been meant is told how to be shown.
+        InputError: it is no scene; for some other types the message says how to show them.
     """
     if isinstance(getattr(scene, "model", None), pin.Model) and callable(getattr(scene, "contacts", None)):
         return scene
@@ -35,7 +35,7 @@ def checked_scene(scene: Any) -> Any:
 
 
 class ViewedContacts(Protocol):
-    """Pairs of pieces near each other; k rows each."""
+    """Near pairs of pieces; k rows each."""
 
     @property
     def pair(self) -> NDArray[np.intp]:
@@ -59,11 +59,11 @@ class ViewedContacts(Protocol):
 
 
 class ViewedScene(Protocol):
-    """A figure among things, as `wholebody.Scene` is."""
+    """A figure among things, such as a `wholebody.Scene`."""
 
     @property
     def figure(self) -> Any:
-        """The figure; only goals ask it for its frames."""
+        """The figure; only goals use its frames."""
 
     @property
     def model(self) -> Any:
@@ -79,11 +79,11 @@ class ViewedScene(Protocol):
 
     @property
     def piece_owner(self) -> Sequence[str]:
-        """Segment or object that each piece is part of."""
+        """Segment or object of each piece."""
 
     @property
     def revision(self) -> int:
-        """A number that changes whenever things come or go."""
+        """A number that changes when things are added or removed."""
 
     def contacts(self, q: Array, within: float = ...) -> ViewedContacts:
         """Pairs nearer than `within` metres at the posture q, nearest first."""

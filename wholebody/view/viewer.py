@@ -32,7 +32,7 @@ from wholebody.view.server import ANIMATION, CAMERA, Command
 from wholebody.view.viewed_scene import ViewedScene, checked_scene
 
 DEFAULT_DT = 1 / 30  # s: postures without a time step
-CAMERA_POSTURES = 24  # postures of a motion that the camera takes into account
+CAMERA_POSTURES = 24  # number of postures of a motion that the camera takes into account
 
 
 class Viewer:
@@ -42,9 +42,9 @@ class Viewer:
     Chromium, `save` neither. In the page's controls every folder (figure, objects, contacts, goals, names, ghosts) can
     be switched off.
 
-    Pieces turn orange where they come nearer than `contact_distance` to each other, and red where they are inside each
-    other; things are tinted, half-spaces keep their colour. A blue arrow is a contact's normal, from the first piece to
-    the second; a dark red one is the way out of a penetration.
+    Pieces nearer than `contact_distance` to each other are orange, and penetrating pieces red; things are tinted,
+    half-spaces keep their colour. A blue arrow is a contact's normal, from the first piece to the second; a dark red
+    one is the vector that resolves a penetration.
 
     Example:
         >>> with Viewer(scene) as viewer:          # doctest: +SKIP
@@ -68,12 +68,12 @@ class Viewer:
         Args:
             scene: a `wholebody.Scene`.
             contact_distance: pieces nearer than this are shown as touching, metres.
-            see_through: names of things to draw transparent because they would hide the figure.
-            names: write the names of things beside them.
+            see_through: names of things to draw transparent, so that they do not hide the figure.
+            names: whether to write the names of things beside them.
             title: of the browser's tab.
-            host: name or address of this machine at which the live page is served. Any other than 127.0.0.1 lets
-                whoever reaches it look on.
-            port: at which it is served; 0 for the first free one from 7000.
+            host: name or address of this machine at which the live page is served. Any other than 127.0.0.1 allows
+                access from other machines.
+            port: port of the live page; 0 for the first free one from 7000.
 
         Raises:
             InputError: not a scene, or a value of the wrong kind or out of range.
@@ -97,15 +97,15 @@ class Viewer:
         self._ghosts: list[Array] = []
         self._motion: tuple[int, float] | None = None
 
-    # ---- what is shown
+    # ---- content
 
     def show(self, q: ArrayLike, *, problem: Any = None) -> None:
-        """Show a posture. Only what changed is sent to the live page; it can be called sixty times a second.
+        """Show a posture. Only changes are sent to the live page; it can be called sixty times a second.
 
         Args:
             q: (nq,) posture.
-            problem: a `wholebody.Problem` whose goals are drawn with what is left of them, and what stands in their
-                way.
+            problem: a `wholebody.Problem`, whose goals are drawn with their remaining errors and their
+                blockers.
 
         Raises:
             InputError: q has the wrong shape or is not finite.
@@ -125,10 +125,10 @@ class Viewer:
 
         Args:
             motion: postures, (n, nq) or a list of (nq,), or a clip with `q` and `dt`.
-            dt: seconds from posture to posture; the clip's own, or 1/30, when left out.
+            dt: seconds from posture to posture; by default the clip's own, or 1/30.
             problem: a `wholebody.Problem` whose goals are drawn.
-            ghost: as many postures more, shown transparent beside them; in place of the ghosts that were there.
-            repeat: how often it is played; `math.inf` for ever.
+            ghost: the same number of postures, shown transparent; they replace earlier ghosts.
+            repeat: number of times it is played; `math.inf` for ever.
 
         Raises:
             InputError: there is no posture, one has the wrong shape, or the time step or the repeats are not positive.
@@ -151,7 +151,7 @@ class Viewer:
         self._graph.play(keyframes, step, repeat)
 
     def ghosts(self, postures: Sequence[ArrayLike], *, color: style.Color = style.GHOST) -> None:
-        """Show more postures of the figure, transparent; in place of the ghosts that were there.
+        """Show more postures of the figure, transparent; they replace earlier ghosts.
 
         Args:
             postures: each (nq,); none removes the ghosts.
@@ -167,11 +167,11 @@ class Viewer:
         self._graph.flush()
 
     def look(self, eye: ArrayLike | None = None, target: ArrayLike | None = None) -> None:
-        """Aim the camera; without arguments at the figure as it is shown.
+        """Set the camera; without arguments it looks at the figure.
 
         Args:
-            eye: (3,) where the camera is, metres.
-            target: (3,) what is in the middle of the picture, metres.
+            eye: (3,) position of the camera, metres.
+            target: (3,) the point in the middle of the picture, metres.
 
         Raises:
             InputError: only one of the two is given, one is not three finite numbers, or they are the same place.
@@ -193,7 +193,7 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Address of the live page; starts its server when first asked for.
+        """Address of the live page; the first call starts its server.
 
         Raises:
             InputError: the port is taken, or the host is no address of this machine.
@@ -202,13 +202,13 @@ class Viewer:
         return self._live().url
 
     def open(self) -> Viewer:
-        """Show the live page in the user's browser; where there is none, say its address."""
+        """Show the live page in the user's browser; without a browser print its address."""
         if not webbrowser.open(self.url):
             sys.stdout.write(f"open {self.url} in a browser to see the scene\n")
         return self
 
     def wait(self, timeout: float = 60.0) -> bool:
-        """Wait up to `timeout` seconds (`math.inf` for ever) until a browser shows the live page; whether one does."""
+        """Wait up to `timeout` seconds (`math.inf` for ever) until a browser shows the page; return whether so."""
         return self._live().wait(_seconds(timeout))
 
     def wait_until_closed(self, timeout: float = math.inf) -> bool:
@@ -216,13 +216,13 @@ class Viewer:
         return self._live().wait_until_closed(_seconds(timeout))
 
     def sync(self, timeout: float = 10.0) -> bool:
-        """Wait up to `timeout` seconds until every open tab has drawn all that was shown; return whether they have."""
+        """Wait up to `timeout` seconds until every open tab has drawn everything; return whether they have."""
         return self._live().sync(_seconds(timeout))
 
     # ---- files
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write what is shown as one HTML file that opens in any browser without a network, motion included.
+        """Write the scene as one HTML file that opens in any browser without a network, motion included.
 
         Returns:
             The path.
@@ -234,7 +234,7 @@ class Viewer:
         return write(place, static_page(self._commands(), self.title))
 
     def picture(self, path: str | os.PathLike[str], size: tuple[int, int] = (960, 720)) -> Path:
-        """Write what is shown as a PNG, drawn by a headless Chromium. A motion is shown at its beginning.
+        """Write the scene as a PNG, drawn by a headless Chromium. A motion is shown at its beginning.
 
         Args:
             path: of the file.
@@ -252,12 +252,12 @@ class Viewer:
         return write(place, self._screenshots.picture(page, size))
 
     def movie(self, path: str | os.PathLike[str], size: tuple[int, int] = (640, 480), fps: float | None = None) -> Path:
-        """Write the motion that was played last as a GIF or an MP4, by the ending of the path.
+        """Write the last played motion as a GIF or an MP4, by the ending of the path.
 
         Args:
             path: of the file.
             size: width and height, pixels.
-            fps: pictures per second; when left out the motion's own, at most 25 in a GIF and 30 in an MP4.
+            fps: pictures per second; by default the motion's own, at most 25 in a GIF and 30 in an MP4.
 
         Returns:
             The path.
@@ -275,7 +275,7 @@ class Viewer:
         return write(place, movie(place.suffix, self._screenshots.pictures(page, size, times), fps))
 
     def close(self) -> None:
-        """End the live page's server and the headless browser. Doing it again does nothing."""
+        """End the live page's server and the headless browser. Calling it again does nothing."""
         self._graph.disconnect()
         if self._sender is not None:
             self._sender.close()
@@ -290,7 +290,7 @@ class Viewer:
         """Close it."""
         self.close()
 
-    # ---- inside
+    # ---- internals
 
     def _live(self) -> Sender:
         if self._sender is None:
@@ -299,18 +299,18 @@ class Viewer:
         return self._sender
 
     def _camera_command(self) -> Command:
-        """The camera that was asked for, else one that looks at the figure in what was shown last."""
+        """The chosen camera, otherwise one that looks at the figure in its last postures."""
         return self._camera or self._composition.camera([*self._seen, *self._ghosts])
 
     def _commands(self) -> list[Command]:
-        """What draws the picture anew, with the camera on the figure as it is now."""
+        """Commands that draw the whole picture, with the camera on the present figure."""
         if not self._seen:
             raise InputError("nothing is shown yet; call show(q) or play(motion) first")
         return [self._camera_command() if command.op == CAMERA else command for command in self._graph.store.commands()]
 
 
 def _seconds(timeout: object) -> float:
-    """Seconds to wait, perhaps for ever."""
+    """Seconds to wait, which may be infinite."""
     if isinstance(timeout, float) and math.isinf(timeout) and timeout > 0.0:
         return timeout
     return checks.number(timeout, "timeout", 0.0, 1e9, "s, or math.inf")
