@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from wholebody.tasks import ReachCones
 BEFORE, AFTER = 8, 32
 
 
-@lru_cache(maxsize=None)
+@cache
 def first_contact(name: str) -> tuple[InteractionScene, Track]:
     """A scene, and its track from just before it first goes into something; made once for both ways out."""
     made = build_scene(name)

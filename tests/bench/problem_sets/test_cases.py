@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import subprocess
 import sys
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ SPARE = 5e-4  # m
 STILL = [name for name, group in SETS.items() if not group.moving]
 
 
-@lru_cache(maxsize=None)
+@cache
 def made(name: str, number: int, seed: int = 0) -> Case:
     """A case, made once for all tests of this file, which only read it."""
     return problem_set(name).make(number, seed)
@@ -61,9 +61,7 @@ def test_numbers_and_seeds_make_different_problems(name: str) -> None:
 
 def test_another_process_makes_the_same_problems() -> None:
     here = {name: fingerprint(made(name, 1, 1)) for name in SETS}
-    code = (
-        f"import sys; sys.path.insert(0, {str(__file__).rpartition('/')[0]!r}); import test_cases as t; t.tell(1, 1)"
-    )
+    code = f"import sys; sys.path.insert(0, {str(__file__).rpartition('/')[0]!r}); import test_cases as t; t.tell(1, 1)"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert dict(line.split() for line in told.splitlines()) == here
 
