@@ -36,7 +36,7 @@ def test_a_run_prints_tables_and_writes_numbers_chart_animation_and_documentatio
     docs.mkdir()
     for name, part in (("results", "interaction"), ("where-methods-fail", "interaction-failures")):
         (docs / f"{name}.md").write_text(PAGE.format(part))
-    command = ["interact", "hand_on_table", "--frames", "70", "--out", str(out)]
+    command = ["interact", "hand_on_table", "--frames", "100", "--out", str(out)]
     assert main([*command, "--update-docs", str(docs)]) == 0
     printed = capsys.readouterr().out
     assert "hand_on_table" in printed
@@ -44,7 +44,7 @@ def test_a_run_prints_tables_and_writes_numbers_chart_animation_and_documentatio
     assert {path.suffix for path in out.iterdir()} == {".csv", ".html", ".md", ".png", ".svg"}
     facts, rows = read_rows(out / "hand_on_table-qp.csv", FrameRow)
     assert "processor" in facts
-    assert [row.frame for row in rows] == list(range(70))
+    assert [row.frame for row in rows] == list(range(100))
     assert max(row.tracked_depth_mm for row in rows) > 5.0
     assert max(row.depth_mm for row in rows) < 0.1
     page = (out / "hand_on_table-qp.html").read_text(encoding="utf-8")
@@ -53,7 +53,7 @@ def test_a_run_prints_tables_and_writes_numbers_chart_animation_and_documentatio
     assert "old" not in page
     assert page.startswith("before")
     assert page.rstrip().endswith("after")
-    assert "| hand on table | qp | 70 |" in page
+    assert "| hand on table | qp | 100 |" in page
     assert "| arm in corner | paper | 2146 | 20.49 |" in page
     assert (docs / "assets" / "interaction" / "hand_on_table-qp.svg").is_file()
     page = (docs / "where-methods-fail.md").read_text()
