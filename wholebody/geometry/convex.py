@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from functools import lru_cache
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -17,7 +18,9 @@ from wholebody.geometry.hull import hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, kept
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 from wholebody.geometry.simplified_hull import simplified_hull
-from wholebody.runner import Child, EndedError
+
+if TYPE_CHECKING:
+    from wholebody.runner import Child
 
 CONVEX_VOLUME = 1e-4
 """A closed part is taken as convex when its hull adds at most this share of its volume: float32 files round by less."""
@@ -149,6 +152,8 @@ def _decompose(vertices: bytes, faces: bytes, max_vertices: int, threshold: floa
     pieces: list[Piece] = []
     notes: list[str] = []
     before = after = 0.0
+    from wholebody.runner import Child
+
     child = Child()  # begins to run at the first part that needs it
     try:
         for number, part in enumerate(split_components(cloud, triangles)):
@@ -208,6 +213,8 @@ MOST_SECONDS = 40.0
 def _coacd(part: Component, max_vertices: int, threshold: float, name: str, child: Child) -> list[Array]:
     if find_spec("coacd") is None:
         raise MissingPackageError("a mesh that is not convex needs coacd: pip install coacd")
+    from wholebody.runner import EndedError
+
     _log.info("decomposing %s (%d triangles) into convex pieces", name, len(part.faces))
     faces = part.faces.astype(np.int32)
     try:
