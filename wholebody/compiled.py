@@ -1,6 +1,6 @@
-"""Loops that numba compiles: what is compiled is kept, the first compilation is told, and what it takes is counted.
+"""Compilation by numba: compiled code is cached, the first compilation is logged, and its time is counted.
 
-``python -m wholebody.compiled`` compiles all of them, so that no solve does.
+``python -m wholebody.compiled`` compiles all loops, so that no solve has to.
 """
 
 from __future__ import annotations
@@ -16,10 +16,13 @@ from typing import Any, TypeVar
 LOOPS = (
     "wholebody.geometry.contact_rows",
     "wholebody.geometry.continuous.moved_pairs",
+    "wholebody.geometry.proximity",
+    "wholebody.linearisation",
     "wholebody.methods.newton.linear_algebra.gram",
     "wholebody.methods.qp.active_set",
+    "wholebody.methods.qp.subproblem",
 )
-"""Modules with compiled loops; each has a function `compiled_kernel`, which makes them ready."""
+"""Modules with compiled loops; each has a function `compiled_kernel`, which compiles or loads them."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -27,10 +30,10 @@ _compiling = {"depth": 0, "since": 0.0, "seconds": 0.0}
 
 
 def compiled(**options: Any) -> Callable[[F], F]:
-    """Let numba compile a function at its first call, and keep the result.
+    """Let numba compile a function at its first call, and cache the result.
 
-    numba keeps it beside the file, or in the user's cache folder where that cannot be written to; NUMBA_CACHE_DIR names
-    another folder. Where no folder can be written to, every process compiles anew.
+    The cache is beside the file, or in the user's cache folder if that is not writable; NUMBA_CACHE_DIR names another
+    folder. If no folder is writable, every process compiles anew.
 
     Args:
         options: what `numba.njit` takes, such as error_model and fastmath.
@@ -48,13 +51,13 @@ def compiled(**options: Any) -> Callable[[F], F]:
 
 
 def compile_all() -> None:
-    """Compile all loops, or read them back where that was done before."""
+    """Compile all loops, or load them from the cache."""
     for name in LOOPS:
         import_module(name).compiled_kernel()
 
 
 def compile_seconds() -> float:
-    """Processor time that compiling has taken so far, in whatever solve it happened; no solve is charged for it."""
+    """Processor time of all compilation so far, seconds; time limits of solves do not count it."""
     return _compiling["seconds"]
 
 
@@ -82,7 +85,7 @@ def _loop_type() -> Any:
 
 @lru_cache(maxsize=1)
 def _watch() -> None:
-    """Tell of the first function that numba compiles, and count what compiling takes."""
+    """Log the first compilation, and count the time of all."""
     from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]
