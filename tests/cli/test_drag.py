@@ -72,7 +72,7 @@ def test_a_line_by_newton_prints_a_table_and_writes_all_files(
 def test_a_circle_by_the_other_methods(method: str, task: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = ["drag", str(task), "--path", "circle", "--size", "0.05", "--method", method, "--out", str(out)]
-    assert main(command) == 0
+    assert main([*command, "--frames", "60"]) == 0
     _, rows = read_rows(out / f"reach-{method}.csv", DragFrameRow)
     assert rows[-1].error_mm < 1.0
     assert max(row.between_mm for row in rows) <= 1.0
@@ -84,7 +84,7 @@ def test_a_file_that_leads_into_the_wall_ends_there(
     (tmp_path / "way.csv").write_text("x,y,z\n0.35,-0.3,1.2\n0.75,-0.3,1.2\n")
     out = tmp_path / "out"
     command = ["drag", str(task), "--path", str(tmp_path / "way.csv"), "--method", "qp", "--out", str(out)]
-    assert main([*command, "--goal", "0", "--frames", "120"]) == 1
+    assert main([*command, "--goal", "0", "--frames", "80"]) == 1
     assert "unreachable" in "".join(capsys.readouterr().out.split())
     _, rows = read_rows(out / "reach-qp.csv", DragFrameRow)
     errors = np.array([row.error_mm for row in rows])

@@ -29,36 +29,34 @@ def test_lists_the_scenes(capsys: pytest.CaptureFixture[str]) -> None:
     assert "name a scene: hand_on_table" in capsys.readouterr().err
 
 
-def test_a_run_prints_tables_and_writes_numbers_chart_and_animation(
+def test_a_run_prints_tables_and_writes_numbers_chart_animation_and_documentation(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["interact", "hand_on_table", "--frames", "100", "--out", str(tmp_path)]) == 0
+    docs, out = tmp_path / "docs", tmp_path / "out"
+    docs.mkdir()
+    for name, part in (("results", "interaction"), ("where-methods-fail", "interaction-failures")):
+        (docs / f"{name}.md").write_text(PAGE.format(part))
+    command = ["interact", "hand_on_table", "--frames", "100", "--out", str(out)]
+    assert main([*command, "--update-docs", str(docs)]) == 0
     printed = capsys.readouterr().out
     assert "hand_on_table" in printed
     assert "paper" in printed
-    assert {path.suffix for path in tmp_path.iterdir()} == {".csv", ".html", ".md", ".png", ".svg"}
-    facts, rows = read_rows(tmp_path / "hand_on_table-qp.csv", FrameRow)
+    assert {path.suffix for path in out.iterdir()} == {".csv", ".html", ".md", ".png", ".svg"}
+    facts, rows = read_rows(out / "hand_on_table-qp.csv", FrameRow)
     assert "processor" in facts
     assert [row.frame for row in rows] == list(range(100))
     assert max(row.tracked_depth_mm for row in rows) > 5.0
     assert max(row.depth_mm for row in rows) < 0.1
-    page = (tmp_path / "hand_on_table-qp.html").read_text(encoding="utf-8")
+    page = (out / "hand_on_table-qp.html").read_text(encoding="utf-8")
     assert "ghosts" in page
-
-
-def test_the_tables_go_into_the_documentation(tmp_path: Path) -> None:
-    for name, part in (("results", "interaction"), ("where-methods-fail", "interaction-failures")):
-        (tmp_path / f"{name}.md").write_text(PAGE.format(part))
-    command = ["interact", "hand_on_table", "--frames", "40", "--out", str(tmp_path / "out")]
-    assert main([*command, "--update-docs", str(tmp_path)]) == 0
-    page = (tmp_path / "results.md").read_text()
+    page = (docs / "results.md").read_text()
     assert "old" not in page
     assert page.startswith("before")
     assert page.rstrip().endswith("after")
-    assert "| hand on table | qp | 40 |" in page
+    assert "| hand on table | qp | 100 |" in page
     assert "| arm in corner | paper | 2146 | 20.49 |" in page
-    assert (tmp_path / "assets" / "interaction" / "hand_on_table-qp.svg").is_file()
-    page = (tmp_path / "where-methods-fail.md").read_text()
+    assert (docs / "assets" / "interaction" / "hand_on_table-qp.svg").is_file()
+    page = (docs / "where-methods-fail.md").read_text()
     assert "\nold\n" not in page
     assert "| hand on table | qp | 0.0000 (" in page
 

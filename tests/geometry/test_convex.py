@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import time
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +16,7 @@ from scipy.spatial import ConvexHull
 
 from wholebody import FileFormatError, InputError
 from wholebody.arrays import Array
+from wholebody.geometry import convex
 from wholebody.geometry.components import split_components
 from wholebody.geometry.convex import convex_pieces
 from wholebody.geometry.mesh_cache import ConvexPieces
@@ -48,6 +52,26 @@ def test_a_torus_is_covered_and_its_hole_stays_open(torus: tuple[trimesh.Trimesh
     assert 0.0 < found.added_volume < 0.3
     assert len(found.pieces) > 5
     assert not found.notes
+
+
+@pytest.mark.parametrize(
+    ("does", "seconds", "said"),
+    [
+        (
+            lambda *_: os.kill(os.getpid(), signal.SIGSEGV),
+            60.0,
+            "CoACD cannot cut it into convex pieces; mend the mesh",
+        ),
+        (lambda *_: time.sleep(60.0), 2.0, "CoACD found no convex pieces in 2 s; mend the mesh"),
+    ],
+    ids=["crashes", "hangs"],
+)
+def test_a_part_that_coacd_does_not_survive_is_an_error(does, seconds, said, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(convex, "MOST_SECONDS", seconds)
+    monkeypatch.setattr(convex, "run_coacd", does)
+    mesh = trimesh.creation.torus(0.3, 0.1, major_sections=8, minor_sections=6)
+    with pytest.raises(InputError, match=f"ring, part 0: {said}"):
+        convex_pieces(mesh.vertices, mesh.faces, what="ring")
 
 
 def test_a_convex_part_keeps_all_its_vertices() -> None:

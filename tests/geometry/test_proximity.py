@@ -65,7 +65,7 @@ def test_agrees_with_coal_asked_pair_by_pair(detail):
     assert len(scene.geometry.collisionPairs) > 600
     seen = {"near": 0, "inside": 0}
     used = scene.workspace().proximity
-    for _ in range(5):
+    for _ in range(3):
         q = random_posture(scene.figure, rng)
         expected = asked_one_by_one(scene, q)
         for k, within in enumerate((5.0, 0.02, 0.5, -0.01, 0.0, 0.1, 5.0)):

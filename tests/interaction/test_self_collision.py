@@ -46,10 +46,11 @@ def sampled_depth(scene: wb.Scene, q: Any) -> float:
     pin.forwardKinematics(scene.model, data, np.asarray(q))
     pieces = scene.geometry.geometryObjects
     places = [data.oMi[piece.parentJoint] * piece.placement for piece in pieces]
+    filled = [spheres(piece.geometry) for piece in pieces]
     deepest = 0.0
     for pair in scene.geometry.collisionPairs:
         for a, b in ((pair.first, pair.second), (pair.second, pair.first)):
-            points, radius = spheres(pieces[a].geometry)
+            points, radius = filled[a]
             way = places[b].actInv(places[a])
             distance = signed_distance(pieces[b].geometry, points @ way.rotation.T + way.translation)
             deepest = max(deepest, radius - float(distance.min()))

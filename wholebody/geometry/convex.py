@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import logging
-import pickle
-import subprocess
-import sys
 from functools import lru_cache
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -20,6 +18,9 @@ from wholebody.geometry.hull import hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, kept
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 from wholebody.geometry.simplified_hull import simplified_hull
+
+if TYPE_CHECKING:
+    from wholebody.runner import Child
 
 CONVEX_VOLUME = 1e-4
 """A closed part counts as convex if its hull adds at most this share of its volume; float32 rounding is smaller."""
@@ -151,19 +152,26 @@ def _decompose(vertices: bytes, faces: bytes, max_vertices: int, threshold: floa
     pieces: list[Piece] = []
     notes: list[str] = []
     before = after = 0.0
-    for number, part in enumerate(split_components(cloud, triangles)):
-        name = f"{what}, part {number}"
-        made = _part_pieces(part, max_vertices, threshold, name, notes)
-        pieces += made
-        if part.closed:
-            before += part.volume
-            after += sum(piece.volume for piece in made)
+    from wholebody.runner import Child
+
+    child = Child()  # begins to run at the first part that needs it
+    try:
+        for number, part in enumerate(split_components(cloud, triangles)):
+            made = _part_pieces(part, max_vertices, threshold, f"{what}, part {number}", notes, child)
+            pieces += made
+            if part.closed:
+                before += part.volume
+                after += sum(piece.volume for piece in made)
+    finally:
+        child.close()
     if not pieces:
         raise InputError(f"{what}: nothing in it is larger than {SMALLEST} m; is the scale right?")
     return ConvexPieces(tuple(pieces), after / before - 1.0 if before > 0 else 0.0, tuple(notes))
 
 
-def _part_pieces(part: Component, max_vertices: int, threshold: float, name: str, notes: list[str]) -> list[Piece]:
+def _part_pieces(
+    part: Component, max_vertices: int, threshold: float, name: str, notes: list[str], child: Child
+) -> list[Piece]:
     try:
         whole = hull_piece(part.vertices, name)
     except InputError:
@@ -174,7 +182,7 @@ def _part_pieces(part: Component, max_vertices: int, threshold: float, name: str
     if whole.volume - part.volume <= CONVEX_VOLUME * part.volume:
         return [whole]
     pieces: list[Piece] = []
-    for corners in _coacd(part, max_vertices, threshold, name):
+    for corners in _coacd(part, max_vertices, threshold, name, child):
         try:
             pieces.append(hull_piece(corners, name))
         except InputError:
@@ -197,35 +205,36 @@ def _thickened(points: Array, name: str, notes: list[str]) -> list[Piece]:
         return [hull_piece(thickened(points), name)]
 
 
-_RUN = """
-import os, pickle, sys
-out = os.dup(1)
-os.dup2(2, 1)  # what CoACD says does not go where the answer goes
-import coacd
-vertices, faces, threshold = pickle.load(sys.stdin.buffer)
-coacd.set_log_level("error")
-parts = coacd.run_coacd(coacd.Mesh(vertices, faces), threshold=threshold, preprocess_mode="off", seed=0)
-with os.fdopen(out, "wb") as answer:
-    pickle.dump([corners for corners, _ in parts], answer)
-"""
 _MEND = "mend the mesh where it passes through itself, or place its hull with wb.Hull"
 MOST_SECONDS = 40.0
 """Time limit of CoACD for one part, seconds; the largest of real robots took a fraction of it."""
 
 
-def _coacd(part: Component, max_vertices: int, threshold: float, name: str) -> list[Array]:
+def _coacd(part: Component, max_vertices: int, threshold: float, name: str, child: Child) -> list[Array]:
     if find_spec("coacd") is None:
         raise MissingPackageError("a mesh that is not convex needs coacd: pip install coacd")
+    from wholebody.runner import EndedError
+
     _log.info("decomposing %s (%d triangles) into convex pieces", name, len(part.faces))
-    # CoACD's own cap on vertices (decimate) leaves parts of the surface outside; its re-meshing (preprocess) inflates
-    # thin parts by half, and a closed manifold does not need it.
-    # In a child process: self-intersecting meshes make it crash or run for ever.
-    asked = pickle.dumps((np.asarray(part.vertices), part.faces.astype(np.int32), threshold))
+    faces = part.faces.astype(np.int32)
     try:
-        done = subprocess.run([sys.executable, "-c", _RUN], input=asked, capture_output=True, timeout=MOST_SECONDS)
-    except subprocess.TimeoutExpired:
-        raise InputError(f"{name}: CoACD found no convex pieces in {MOST_SECONDS:g} s; {_MEND}") from None
-    if done.returncode != 0:
-        raise InputError(f"{name}: CoACD cannot cut it into convex pieces; {_MEND}")
-    parts = pickle.loads(done.stdout)
+        parts = child.call(run_coacd, np.asarray(part.vertices), faces, threshold, seconds=MOST_SECONDS)
+    except EndedError as error:
+        if error.overtime:
+            raise InputError(f"{name}: CoACD found no convex pieces in {MOST_SECONDS:g} s; {_MEND}") from None
+        raise InputError(f"{name}: CoACD cannot cut it into convex pieces; {_MEND}") from None
     return [simplified_hull(np.asarray(corners, dtype=float), max_vertices) for corners in parts]
+
+
+def run_coacd(vertices: Array, faces: NDArray[np.int32], threshold: float) -> list[Array]:
+    """Corners of the convex parts that CoACD finds, each (k, 3); for a child process.
+
+    Self-intersecting meshes make it crash or run for ever. Its own cap on vertices (decimate) leaves
+    parts of the surface outside; its re-meshing (preprocess) inflates thin parts by half, and a closed manifold does
+    not need it.
+    """
+    import coacd
+
+    coacd.set_log_level("error")
+    parts = coacd.run_coacd(coacd.Mesh(vertices, faces), threshold=threshold, preprocess_mode="off", seed=0)
+    return [corners for corners, _ in parts]

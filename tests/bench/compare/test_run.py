@@ -20,7 +20,7 @@ from wholebody.bench.compare.store import NAME, Store
 from wholebody.errors import InputError, WholebodyError
 
 TIMES = ("seconds", "cpu_seconds", "setup_seconds", "frame_p95")
-CAP = 5.0  # s: much more than a solve takes on a machine with other things to do, less than what hangs
+CAP = 3.0  # s: much more than a solve takes on a machine with other things to do, less than what hangs
 
 
 def settings(fakes: ModuleType, *does: str, cases: int = 1, sweep: int = 1, cap: float = 5.0) -> Settings:

@@ -61,21 +61,21 @@ def test_no_frame_overlaps_and_the_last_is_what_is_tracked(
     outside: Callable[..., float],
 ) -> None:
     scene, postures = SCENES[name](avatar)
-    frames = track(avatar, *postures)
-    rng, q, wanted_inside, pushed = np.random.default_rng(0), frames[0], 0.0, 0
-    for wanted in frames + [frames[-1]] * 30:
+    frames = track(avatar, *postures, frames=25)
+    rng, q, pushed = np.random.default_rng(0), frames[0], 0
+    for wanted in frames + [frames[-1]] * 20:
         before = q
         result = resolve_overlap(scene, q, wanted, rng)
         q = result.q
         assert np.isfinite(q).all()
-        assert deepest(scene, q) <= 1e-3
-        assert result.deepest == pytest.approx(deepest(scene, q), abs=5e-6)
+        depth = deepest(scene, q)
+        assert depth <= 1e-3
+        assert result.deepest == pytest.approx(depth, abs=5e-6)
         assert avatar.within_limits(q)
         assert outside(avatar, q) <= 1e-9
         assert scene.sweep(before, q, 4e-3) is None
-        wanted_inside = max(wanted_inside, deepest(scene, wanted))
         pushed += result.iterations > 0
-    assert wanted_inside > 0.02
+    assert max(deepest(scene, wanted) for wanted in frames[::5]) > 0.02
     assert pushed > 10
     assert np.abs(pin.difference(avatar.model, q, frames[-1])).max() <= 1e-3
 
@@ -104,7 +104,7 @@ def test_the_same_seed_gives_the_same_frames(avatar: wb.Figure, track: Callable[
     for _ in range(2):
         scene, postures = _arms(avatar)
         rng, q = np.random.default_rng(8), postures[0]
-        for wanted in track(avatar, *postures, frames=15):
+        for wanted in track(avatar, *postures, frames=10):
             q = resolve_overlap(scene, q, wanted, rng).q
         runs.append(q)
     assert (runs[0] == runs[1]).all()
