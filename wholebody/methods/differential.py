@@ -143,5 +143,5 @@ class Iteration:
     def _apart(self, tolerance: float) -> bool:
         """Whether all pairs keep their clearance."""
         clearances = self._problem.clearances
-        near = self._proximity.near(self._state.data, float(clearances.max(initial=0.0)))
+        near = self._proximity.query(self._state, float(clearances.max(initial=0.0)))
         return bool((near.distance >= clearances[near.number] - tolerance - COAL_ACCURACY).all())
