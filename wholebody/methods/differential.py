@@ -1,7 +1,7 @@
 """Differential inverse kinematics iterated until a problem is solved, by tools that make one step.
 
-Goals are soft tasks of the tool and what must hold are hard ones. The measures have a weight that fades, steps are of a
-bounded size, and a damping grows while steps go to and fro.
+Goals are soft tasks of the tool, constraints are hard ones. The measures have a decreasing weight, steps have a bounded
+size, and the damping grows while steps alternate in direction.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from wholebody.problem import Problem
 from wholebody.solution import TraceEntry
 from wholebody.workspace import Workspace
 
-SHARE = 0.5  # of the tolerance: to what everything is met, so that the judge, who rounds otherwise, agrees
-REST = 1e-2  # share of the tolerance: a step smaller than this has come to rest
+SHARE = 0.5  # of the tolerance, to which goals and constraints are met: the assessment rounds differently
+REST = 1e-2  # share of the tolerance: a smaller step counts as convergence
 COMFORT = 1e-2  # weight of the measures at the beginning, against goals of weight 1
 LEAST = 1e-3  # share of the tolerance: least weight of the measures, which goals then miss by less than the tolerance
-REGULAR = 1e-3  # share of the measures' weight: what moving itself costs
-DAMPING = 1e-3  # what moving costs once a step goes back on the one before, against goals of weight 1
+REGULAR = 1e-3  # share of the measures' weight: weight of the motion itself
+DAMPING = 1e-3  # weight of the motion after a step opposed to the previous one, against goals of weight 1
 STIFFER, LOOSER = 4.0, 0.5  # factors on that, after another such step and after any other
 MOST_DAMPING = 10.0
 
 
 class StepError(Exception):
-    """A tool found no step; with its words."""
+    """A tool found no step; the message is the tool's."""
 
 
 class Stepper(Protocol):
@@ -41,7 +41,7 @@ class Stepper(Protocol):
         Args:
             q: (nq,) the posture.
             weight: of the measures, against goals of weight 1.
-            damping: what moving costs.
+            damping: weight of the motion itself.
 
         Returns:
             The displacement (nv,).
@@ -73,8 +73,8 @@ class Iteration:
     Attributes:
         q: (nq,) the present posture.
         steps: how many were made.
-        rested: whether it ended because nothing moves any more.
-        failure: the tool's words where it found no step.
+        rested: whether it converged: nothing moves any more.
+        failure: the tool's message if it found no step.
         trace: one entry a posture.
     """
 
@@ -90,7 +90,7 @@ class Iteration:
         self._damping, self._last = 0.0, np.zeros(problem.scene.model.nv)
 
     def go(self) -> None:
-        """Iterate until everything is met, nothing moves, the tool gives up, or steps or time run out."""
+        """Iterate until everything is met, nothing moves, the tool fails, or steps or time run out."""
         settings, model = self._settings, self._problem.scene.model
         enough, length = SHARE * settings.tolerance, 0.0
         while True:
@@ -114,7 +114,7 @@ class Iteration:
             self.q = moved
 
     def _move(self) -> Array:
-        """The tool's displacement (nv,), no longer than it may be; the damping goes by its direction."""
+        """The tool's displacement (nv,), cut to the longest step; its direction sets the damping of the next one."""
         settings = self._settings
         weight = max(COMFORT * settings.decay**self.steps, LEAST * settings.tolerance)
         self.steps += 1

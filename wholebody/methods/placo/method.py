@@ -18,7 +18,7 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.workspace import Workspace
 
-STEP = 0.05  # rad, m: most that a joint or the root moves in one iteration
+STEP = 0.05  # rad, m: largest motion of a joint or the root in one iteration
 NEAR = 0.1  # m: pairs nearer than this have a row; placo's trigger
 LET_IN = 0.4  # share of the tolerance by which pairs may be nearer than their clearance
 DECAY = 0.75  # of the measures' weight from one iteration to the next; less ends sooner and with more effort
@@ -28,12 +28,13 @@ DECAY = 0.75  # of the measures' weight from one iteration to the next; less end
 class Placo:
     """placo's `KinematicsSolver`, by its documented tasks, iterated.
 
-    Goals are soft tasks, holds hard ones; joint limits and its self-collision constraint, to whose model the objects
-    are added, are hard too; the measures are joints tasks whose weight fades. An iteration is one of its programs.
+    Goals are soft tasks and holds hard ones. Joint limits and placo's self-collision constraint, whose model includes
+    the objects, are hard too. The measures are joints tasks with decreasing weight. An iteration is one of its
+    programs.
 
     Takes Point, Frame, Orientation, Axis(direction=...), CenterOfMass, Posture and Relative goals; Hold, Plane with
-    side "on", Balance and Freeze; Effort and Displacement. Everything else is refused by name. There is one
-    start. Where placo finds no solution of a program, the posture before it is the answer, with placo's words.
+    side "on", Balance and Freeze; Effort and Displacement. All other terms are refused by name. There is one
+    start. If placo finds no solution of a program, the answer is the posture before it, and the message quotes placo.
 
     Attributes:
         tolerance: metres and radians to which goals and constraints are met.
@@ -61,12 +62,12 @@ class Placo:
         return "placo"
 
     def accepts(self, problem: Problem) -> str | None:
-        """None where placo has classes for all terms and joints; else the sentence that names what it has none for."""
+        """None if placo has classes for all terms and joints; otherwise the sentence that names the others."""
         check_problem(problem, "Placo.accepts: problem")
         return refusal(self.name, unsupported(problem))
 
     def prepare(self, problem: Problem) -> None:
-        """Build placo's robot for a problem; `solve` does it where this was not called.
+        """Build placo's robot for a problem; `solve` does it if this was not called.
 
         Raises:
             InputError: placo cannot express the problem, or its scene changed after it was stated.
@@ -80,7 +81,7 @@ class Placo:
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
 
         Args:
-            problem: what is asked.
+            problem: the problem.
             progress: see `wholebody.methods.control.Progress`.
 
         Raises:
@@ -103,22 +104,22 @@ class Placo:
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
-        """What follows the goals of a problem by solving every step anew.
+        """A tracker that solves the problem anew at every step.
 
         Raises:
-            InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
+            InputError: dt is not a positive finite number, or the scene changed after the problem was made.
         """
         return SolvingTracker(self, problem, dt)
 
 
 class _Room:
-    """Where the robot that one solve built waits for the next one on the same scene, which may be about the same."""
+    """Keeps the robot of one solve for the next solve on the same scene, which may have a similar problem."""
 
     def __init__(self) -> None:
         self._robot: Robot | None = None
 
     def robot(self, problem: Problem, workspace: Workspace) -> Robot:
-        """Placo's robot for a problem, with things where the workspace sees them."""
+        """The robot for a problem, with the placements of things in the workspace."""
         refused = unsupported(problem)
         if refused:
             raise UnsupportedTermError("placo", refused)
@@ -144,7 +145,7 @@ class _Programs:
         self._solver.enable_joint_limits(True)
         self._solver.enable_velocity_limits(True)
         apart = self._solver.add_avoid_self_collisions_constraint()
-        # rounding alone makes a held foot on a floor infeasible
+        # without it, rounding makes a held foot on a floor infeasible
         apart.self_collisions_margin = -SWELL - LET_IN * tolerance
         apart.self_collisions_trigger = NEAR - SWELL
         apart.configure("apart", "hard", 1.0)
