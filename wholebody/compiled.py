@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 LOOPS = (
     "wholebody.geometry.contact_rows",
     "wholebody.geometry.continuous.moved_pairs",
+    "wholebody.methods.ccd.limbs",
     "wholebody.methods.newton.linear_algebra.gram",
     "wholebody.methods.qp.active_set",
 )

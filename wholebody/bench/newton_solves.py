@@ -20,6 +20,7 @@ from wholebody.methods.newton.tracking import NewtonTracker
 
 PAPER_BODIES = 30  # 210 variables and about 1455 non-zeros, as in the paper
 PAPER_WAY = (0.03, -0.03, 0.02)  # m: as far as takes three systems
+CIRCLE = 0.05  # rad: from move to move of a drag
 FINE = 1e-8  # m, rad: tolerance at which two methods are compared
 
 
@@ -72,6 +73,24 @@ def paper_row(repeats: int) -> SolveRow:
     tip = np.array((LINK, 0.0, 0.0))
     made.point_goal(last, made.placement(last).act(tip) + np.array(PAPER_WAY), place=tip)
     return assembly_row("the paper's size", made, repeats)
+
+
+def drag_of_assembly_row(moves: int) -> SolveRow:
+    """The same chain dragged in a circle as its users do it: a goal at a new place, and a solve, at every move."""
+    made, last, tip = chain(PAPER_BODIES), f"b{PAPER_BODIES - 1}", np.array((LINK, 0.0, 0.0))
+    here, times, found = made.placement(last).act(tip), [], []
+    for angle in CIRCLE * np.arange(moves):
+        target = here + (0.03 * np.cos(angle) - 0.05, 0.03 * np.sin(angle), -0.03)
+        began = time.process_time()
+        found.append(made.drop_goals().point_goal(last, target, place=tip).solve())
+        times.append(time.process_time() - began)
+    pattern, systems = made.system().pattern, float(np.mean([one.systems for one in found]))
+    us, errors = 1e6 * float(np.median(times)), " ".join(f"{value:.1e}" for value in found[-1].residuals[-4:])
+    iterations = float(np.mean([one.iterations for one in found]))
+    each = us / max(systems, 1.0) / pattern.width
+    return SolveRow(
+        "the same, a move of a drag", pattern.width, len(pattern.rows), iterations, systems, 1e-3 * us, each, errors
+    )
 
 
 def loop_rows(repeats: int) -> list[SolveRow]:

@@ -31,7 +31,8 @@ def run(arguments: argparse.Namespace) -> int:
     check_count(repeats, "--repeats")
     facts = machine()
     many = 10 * repeats
-    solves = [newton_solves.paper_row(many), newton_solves.nearest_row(many), *newton_solves.loop_rows(many)]
+    paper = [newton_solves.paper_row(many), newton_solves.drag_of_assembly_row(many)]
+    solves = [*paper, newton_solves.nearest_row(many), *newton_solves.loop_rows(many)]
     agreements = newton_solves.agreement_rows(many)
     drags = [drag_row(frames, contacts) for contacts in (False, True)]
     linear = list(newton.linear_rows(sizes, repeats))

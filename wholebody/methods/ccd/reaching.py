@@ -68,7 +68,7 @@ class Reach:
         self._carry(aims, goals)
         steps = aims.plan(limbs)
         error, last = _error(aims, goals), inf
-        sweeps, rested = 0, not steps
+        sweeps, rested = 0, not len(steps.nodes)
         while error > tolerance and sweeps < most and not rested and not self._control.over:
             if sweeps % WINDOW == 0:
                 rested = error > PROGRESS * last
@@ -98,7 +98,7 @@ class Reach:
         limbs = self.limbs
         pin.forwardKinematics(self._model, self._data, q)
         limbs.read(q, self._data)
-        for node, value in enumerate(limbs.values):
+        for node, value in enumerate(limbs.values.tolist()):
             low, high = max(limbs.lower[node], -pi), min(limbs.upper[node], pi)
             new = float(rng.uniform(low, high)) if size == inf else value + size * float(rng.normal())
             limbs.values[node] = min(max(new, limbs.lower[node]), limbs.upper[node])
@@ -109,7 +109,7 @@ class Reach:
         """Write where the points and axes are now."""
         k = 0
         for goal in goals:
-            frame = self.limbs.frames[goal.node]
+            frame = self.limbs.frame(goal.node)
             if goal.place is not None:
                 aims.here[k] = moved(frame, *goal.local)
                 k += 1
