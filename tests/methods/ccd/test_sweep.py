@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import wholebody as wb
 from tests.reference import limbs as reference
-from wholebody.methods.ccd.limbs import Limbs, movable
+from wholebody.methods.ccd.limbs import Limbs, compiled_kernel, movable
 from wholebody.methods.ccd.limbs_kernel import within
 from wholebody.methods.ccd.sweep import Aims, Plan, sweep
 
@@ -171,3 +171,28 @@ def _sliding_arm(rng: np.random.Generator) -> Any:
 def test_a_plan_of_no_steps_moves_nothing() -> None:
     plan = Plan.of([])
     assert [len(part) for part in plan] == [0, 1, 0, 0]
+
+
+def test_aims_go_along_with_their_nodes_and_errors_are_distances_and_angles() -> None:
+    model, kernel = wb.load("avatar").model, compiled_kernel()
+    limbs = Limbs(model, [joint for joint in range(1, model.njoints) if movable(model, joint)])
+    data, rng = model.createData(), np.random.default_rng(2)
+    for _ in range(50):
+        q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
+        pin.forwardKinematics(model, data, q)
+        limbs.read(q, data)
+        limbs.forward()
+        node, place, turn = int(rng.integers(-1, len(limbs.joints))), rng.normal(size=3), pin.exp3(rng.normal(size=3))
+        stand = pin.SE3.Identity() if node < 0 else data.oMi[limbs.joints[node]]
+        local, here = np.vstack([place, turn.T]), np.zeros((4, 3))
+        points = np.array([True, False, False, False])
+        kernel.carry(limbs.frames, np.full(4, node), local, points, here)
+        assert np.abs(here[0] - stand.act(place)).max() < 1e-12
+        assert np.abs(here[1:].T - stand.rotation @ turn).max() < 1e-12
+        off, angle = 0.5 * rng.normal(size=3), float(rng.uniform(0.0, 3.1))
+        axis = rng.normal(size=3)
+        wanted = stand.rotation @ turn @ pin.exp3(angle * axis / np.linalg.norm(axis))
+        there = np.vstack([here[0] + off, wanted.T])
+        found = kernel.greatest_error(here, there, points)
+        assert found == pytest.approx(max(float(np.linalg.norm(off)), angle), abs=1e-7)
+        assert kernel.greatest_error(here[1:], there[1:], points[1:]) == pytest.approx(angle, abs=1e-7)

@@ -131,6 +131,9 @@ def compiled_kernel() -> Any:
     limbs_kernel.forward(places, twelve, places, none, three, none, twelve, six)
     limbs_kernel.sweep(six, places, none, none, none, three, three, none, places, places, places, places)
     limbs_kernel.distance(three, three, none)
+    points = np.zeros(0, dtype=bool)
+    limbs_kernel.carry(twelve, places, three, points, three)
+    limbs_kernel.greatest_error(three, three, points)
     return limbs_kernel
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from math import atan2, ceil, cos, floor, inf, pi, sin
+from math import acos, atan2, ceil, cos, floor, inf, pi, sin
 
-from wholebody.arrays import Array, Indices
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
 
 X, Y, Z, OBLIQUE, SLIDE = range(5)
@@ -166,6 +166,45 @@ def distance(here: Array, there: Array, weights: Array) -> float:
         for axis in range(3):
             total += weights[k] * (there[k, axis] - here[k, axis]) ** 2
     return float(total**0.5)
+
+
+@compiled()
+def carry(frames: Array, nodes: Indices, local: Array, points: Mask, here: Array) -> None:
+    """Write where points and directions are now.
+
+    Args:
+        frames: (n + 1, 12) as `forward` wrote them.
+        nodes: (m,) that carry each; -1 is the world.
+        local: (m, 3) each in its node's frame.
+        points: (m,) which are points.
+        here: (m, 3) written.
+    """
+    for k in range(len(nodes)):
+        frame = frames[nodes[k]]
+        for row in range(3):
+            here[k, row] = (
+                frame[3 * row] * local[k, 0] + frame[3 * row + 1] * local[k, 1] + frame[3 * row + 2] * local[k, 2]
+            )
+            if points[k]:
+                here[k, row] += frame[9 + row]
+
+
+@compiled()
+def greatest_error(here: Array, there: Array, points: Mask) -> float:
+    """Largest distance of a point (m, 3) from its place, or angle of three directions, one after the other."""
+    worst, k = 0.0, 0
+    while k < len(here):
+        square = 0.0
+        for n in range(k, k + 1 if points[k] else k + 3):
+            for axis in range(3):
+                square += (here[n, axis] - there[n, axis]) ** 2
+        if points[k]:
+            worst = max(worst, square**0.5)
+            k += 1
+        else:  # the sum over the three axes is 4 (1 - cos angle) = 8 sin^2(angle / 2)
+            worst = max(worst, acos(max(-1.0, 1.0 - square / 4.0)))
+            k += 3
+    return worst
 
 
 @compiled()

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.methods.ccd.limbs import Limbs, compiled_kernel
 
 Vector = Sequence[float]
@@ -94,6 +94,11 @@ class Aims:
             if points or (arrows and not limbs.slides(node)):
                 steps.append((node, (*points, *arrows), len(points)))
         return Plan.of(steps)
+
+    @property
+    def points(self) -> Mask:
+        """(m,) which are points."""
+        return ~np.array(self._direction, dtype=bool)
 
     def distance(self) -> float:
         """Root of the weighted sum of squared distances left."""
