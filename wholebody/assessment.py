@@ -1,4 +1,4 @@
-"""What any method's answer is judged by, computed from the posture alone.
+"""The assessment of any method's answer, computed from the posture alone.
 
 Independent of every method: it looks at all pairs without culling and without memory of earlier postures, and takes
 contact normals' derivatives from Pinocchio's own joint Jacobians. Optimality and what stands in the way are computed
@@ -23,7 +23,7 @@ from wholebody.first_order import MET, Blocker, FirstOrder
 from wholebody.problem import Problem
 
 STILL = 1e-2  # rad, m: optimality below which a posture counts as the nearest to goals that it does not meet
-NAMED = 4  # blockers that a message names at the most
+NAMED = 4  # most blockers that a message names
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,13 @@ class Assessment:
     """How good a posture is for a problem.
 
     Attributes:
-        goal_error: largest distance left to a goal, metres.
-        goal_angle: largest angle left to a goal, radians.
-        penetration: depth of the deepest overlap of any pair, metres; 0 where nothing overlaps.
+        goal_error: largest remaining distance of a goal, metres.
+        goal_angle: largest remaining angle of a goal, radians.
+        penetration: depth of the deepest overlap of any pair, metres; 0 if nothing overlaps.
         least_distance: least signed distance of any pair, metres; inf without pairs.
-        clearance_violation: by how much the worst pair misses the distance asked of it, metres.
-        limit_violation: how far the worst joint is out of its limits, radians or metres.
-        constraint_violation: how far the worst constraint is from holding, metres or radians.
+        clearance_violation: largest shortfall of a pair from its required distance, metres.
+        limit_violation: largest violation of a joint limit, radians or metres.
+        constraint_violation: largest violation of a constraint, metres or radians.
         measure: weighted sum of the measures.
         goal_errors: (goals,) norm of each goal's error, metres or radians (whichever is larger).
         first_order: optimality and blockers, computed when they are asked for.
@@ -87,7 +87,7 @@ class Assessment:
 
     @property
     def in_the_way(self) -> str:
-        """The hardest blockers in words, to be added to a sentence; empty where goals are met and everything holds."""
+        """The strongest blockers in words, to append to a sentence; empty if goals are met and everything holds."""
         if not self.blockers:
             stretched = not self.met(MET) and self.optimality <= STILL
             return "; nothing pushes back: the limbs do not reach" if stretched else ""
@@ -100,7 +100,7 @@ def assess(problem: Problem, q: Array) -> Assessment:
     """Judge a posture.
 
     Args:
-        problem: what was asked.
+        problem: the problem.
         q: (nq,) the posture.
 
     Raises:

@@ -1,8 +1,8 @@
-"""First-order optimality of a posture, and what stands in its way: which limits, constraints and contacts push back.
+"""First-order optimality of a posture, and its blockers: the limits, constraints and contacts with large multipliers.
 
-At an optimum the objective's gradient is a combination of the gradients of everything at work, with signs where it
-works to one side only (Karush, Kuhn and Tucker). The combination is found by nonnegative least squares; what it leaves
-says how far from an optimum the posture is, and its largest parts say what is in the way.
+At an optimum the objective's gradient is a combination of the gradients of all active constraints, with nonnegative
+multipliers for inequalities (Karush, Kuhn and Tucker). Nonnegative least squares finds the combination. Its residual
+measures the distance from an optimum, and its largest parts are the blockers.
 """
 
 from __future__ import annotations
@@ -17,28 +17,30 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.all_pairs import AllPairs, Label, NearPairs
-from wholebody.arrays import Array
+from wholebody.arrays import Array, Mask
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State, Wrench
 from wholebody.problem import Problem
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 
-ACTIVE = 1e-4  # m, rad: nearer to its bound than this a constraint may push back
+ACTIVE = 1e-4  # m, rad: a constraint nearer to its bound than this counts as active
 FLAT = 1e-2  # share of the largest curvature below which a degree of freedom counts as having that much
 MET = 1e-4  # m, rad: goals nearer than this count as met, and what must hold as holding
+INDEPENDENT = 1e-9  # share of its length that a direction must have of its own to count as independent of others
+MOST_CHANGES = 20  # times the number of rows: changes of the set that pushes, at the most
 WORTH = 0.05  # share of the largest push from which on something counts as being in the way
 
 
 @dataclass(frozen=True)
 class Blocker:
-    """Something that keeps a posture from a better one.
+    """A limit, constraint or contact that blocks a better posture.
 
     Attributes:
         kind: "contact" between two owners, "limit" of a joint, "bound" on a joint (as by `Freeze`), or "constraint".
         names: the two segments or objects; the joint; or the constraint as in "constraints[0], Hold".
-        share: how hard it pushes back, from 0 to 1 for the hardest.
-        violated: whether it does not hold here.
-        frame: of a constraint on one frame, its name.
+        share: its part of the gradient, relative to the strongest blocker, from 0 to 1.
+        violated: whether it is violated at the posture.
+        frame: name of the frame of a constraint on one frame.
     """
 
     kind: Literal["contact", "limit", "bound", "constraint"]
@@ -48,14 +50,14 @@ class Blocker:
     frame: str | None = None
 
     def __str__(self) -> str:
-        """Say it in words."""
+        """Describe it in words."""
         if self.kind == "contact":
             return f"{self.names[0]} against {self.names[1]}"
         return {"limit": "the limit of ", "bound": "the bound on ", "constraint": ""}[self.kind] + self.names[0]
 
 
 class _Rows:
-    """Gradients of what is at work, with what each belongs to."""
+    """Gradients of active constraints, with their labels."""
 
     def __init__(self, nv: int) -> None:
         self.rows, self.labels = [np.zeros((0, nv))], list[Label]()
@@ -143,7 +145,7 @@ def _optimality(asked: _Asked, state: State, active: _Active) -> float:
 def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -> tuple[Blocker, ...]:
     """What keeps a posture from meeting the goals, or from holding what must hold; the hardest first.
 
-    Where something does not hold, the violated things come first, by how much, then what pushes against mending them.
+    If something is violated, the violated constraints come first, ordered by violation, then those that block repair.
     """
     nv = state.model.nv
     signed, one_sided, rows, numbers = _active(asked, state, near)
@@ -238,14 +240,73 @@ def _of_joint(model: pin.Model, column: int, limited: bool) -> Label:
 
 def _balanced(objective: Array, signed: _Rows, one_sided: _Rows) -> tuple[Array, Array]:
     """How hard each labelled row pushes against the objective's gradient (nv,), and what is left of it (nv,)."""
-    from scipy.optimize import nnls
-
     equal, pushing = np.vstack(signed.rows), np.vstack(one_sided.rows)
-    rows = np.vstack([equal, -equal, pushing])
-    if not rows.size:
-        return np.zeros(len(signed.labels) + len(pushing)), objective
-    push, _ = nnls(rows.T, objective, maxiter=20 * (len(rows) + len(objective)))
-    left = objective - push @ rows
-    size = push * np.sqrt((rows**2).sum(axis=1))
-    count, named = len(equal), len(signed.labels)
-    return np.concatenate([(size[:count] + size[count : 2 * count])[:named], size[2 * count :]]), left
+    basis = _row_space(equal)
+    room = objective - objective @ basis.T @ basis
+    push, left = nonnegative_least_squares(pushing - pushing @ basis.T @ basis, room, np.linalg.norm(pushing, axis=1))
+    turned = np.linalg.lstsq(equal.T, objective - push @ pushing, rcond=None)[0] if len(equal) else np.zeros(0)
+    sizes = [np.abs(turned) * np.linalg.norm(equal, axis=1), push * np.linalg.norm(pushing, axis=1)]
+    return np.concatenate([sizes[0][: len(signed.labels)], sizes[1]]), left
+
+
+def _row_space(rows: Array) -> Array:
+    """Orthonormal rows (r, n) that span the same as the rows (m, n)."""
+    if not len(rows):
+        return rows
+    _, values, basis = np.linalg.svd(rows, full_matrices=False)
+    return np.asarray(basis[values > INDEPENDENT * values[0]])
+
+
+def nonnegative_least_squares(rows: Array, right: Array, lengths: Array) -> tuple[Array, Array]:
+    """The nonnegative combination of rows (m, n) that is nearest to a right side (n,), and what it leaves (n,).
+
+    Lawson and Hanson 1974, "Solving least squares problems", chapter 23: the row that agrees most with what is left
+    joins those that push, and rows leave whose share would turn negative. scipy's does the same, but loading
+    scipy.optimize takes longer than a whole solve.
+
+    Args:
+        rows: (m, n).
+        right: (n,).
+        lengths: (m,) what is long for each row; one that is shorter than `INDEPENDENT` of it counts as zero.
+
+    Returns:
+        The shares (m,), nonnegative, and right - shares @ rows.
+    """
+    norms = np.linalg.norm(rows, axis=1)
+    counts = norms > INDEPENDENT * lengths
+    scale = np.where(counts, norms, 1.0)
+    units = np.where(counts[:, None], rows / scale[:, None], 0.0)
+    products = units @ units.T
+    share, pushing, barred = np.zeros(len(rows)), np.zeros(len(rows), dtype=bool), ~counts
+    left, enough = right, INDEPENDENT * float(np.linalg.norm(right))
+    for _ in range(MOST_CHANGES * len(rows)):
+        agrees = np.where(pushing | barred, -np.inf, units @ left)
+        new = int(agrees.argmax())
+        if agrees[new] <= enough:
+            break
+        pushing[new] = True
+        trial = _shares(units, products, right, pushing)
+        if trial is None or trial[new] <= 0.0:  # to rounding it is a combination of those that push
+            pushing[new], barred[new] = False, True
+            continue
+        while trial is not None and (falling := pushing & (trial <= 0.0)).any():
+            part = np.full(len(rows), np.inf)
+            part[falling] = share[falling] / (share[falling] - trial[falling])
+            share += part.min() * (trial - share)
+            pushing[part <= part.min()] = False
+            share[~pushing] = 0.0
+            trial = _shares(units, products, right, pushing)
+        share = share if trial is None else trial
+        left, barred = right - share @ units, ~counts
+    return share / scale, left
+
+
+def _shares(units: Array, products: Array, right: Array, pushing: Mask) -> Array | None:
+    """Shares (m,) of the rows that push in the combination nearest to a right side, any sign; None: they depend."""
+    share, rows, square = np.zeros(len(units)), units[pushing], products[np.ix_(pushing, pushing)]
+    try:
+        first = np.linalg.solve(square, rows @ right)
+        share[pushing] = first + np.linalg.solve(square, rows @ (right - first @ rows))  # mends the squared condition
+    except np.linalg.LinAlgError:
+        return None
+    return share

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wholebody.bench import newton, newton_solves
+from wholebody.bench import newton
 from wholebody.bench.tables import read_rows
 from wholebody.cli.main import main
 
@@ -20,15 +20,15 @@ def test_the_shapes_are_assembled() -> None:
 
 
 def test_the_papers_size_is_met() -> None:
-    row = newton_solves.paper_row(1)
+    row = newton.paper_row(1)
     assert abs(row.variables - 212) <= 5
     assert abs(row.nonzeros - 1455) <= 60
     assert row.systems == 3
 
 
 def test_a_move_of_a_drag_is_of_the_papers_size() -> None:
-    row = newton_solves.drag_of_assembly_row(5)
-    assert (row.variables, row.nonzeros) == (newton_solves.paper_row(1).variables, newton_solves.paper_row(1).nonzeros)
+    row = newton.drag_of_assembly_row(5)
+    assert (row.variables, row.nonzeros) == (newton.paper_row(1).variables, newton.paper_row(1).nonzeros)
     assert 1.0 <= row.systems <= 4.0
 
 

@@ -2,7 +2,7 @@
 
 Cyclic coordinate descent turns one joint at a time: on vectors of three, a call into numpy costs more than all the
 arithmetic. Joints are nodes of a tree, in the model's order (a chain is a tree without branches); what lies between two
-nodes and does not move is part of the later node's placement.
+nodes and does not move is a part of the later node's placement.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ Placement = tuple[float, ...]
 """Twelve floats: the rotation row by row, then the translation."""
 
 WORLD: Placement = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-SAME = 1e-12  # an axis or a rotation this near to a simple one is the simple one
+SAME = 1e-12  # an axis or a rotation nearer than this to a simple one is replaced by the simple one
 
 
 class Limbs:
-    """Joints with one degree of freedom, their values and limits, and where they are.
+    """Joints with one degree of freedom: their values, limits and placements.
 
     Attributes:
         joints: Pinocchio's index of each node's joint, ascending.
         values: (n,) radians or metres, one a node; change them and call `forward`.
-        lower, upper: (n,) limits of each node; infinite where there is none.
+        lower, upper: (n,) limits of each node; infinite for no limit.
         frames: (n + 1, 12) after `forward`: placement of each node in the world, rotation row by row, then translation;
             the last row is the world itself.
         lines: (n, 6) after `forward`: unit axis and origin of each node in the world.
-        parents: (n,) node that each hangs on; -1 is the world.
+        parents: (n,) parent node of each; -1 is the world.
         places: (n, 12) placement of each in its parent's frame before it moves, as in `frames`.
         kinds: (n,) X, Y, Z, OBLIQUE or SLIDE of `limbs_kernel`.
         signs: (n,) -1 where a joint turns about the negative axis.
         axes: (n, 3) unit axis in the joint's own frame.
-        paths: for each node, the nodes that move it, itself included, from the tip inwards.
+        paths: for each node, the nodes that move it, including itself, from the tip inwards.
     """
 
     def __init__(self, model: pin.Model, joints: Iterable[int]) -> None:
-        """Find how the joints hang together; `read` then says where they are.
+        """Find the tree of the joints; `read` then reads their values.
 
         Args:
             model: Pinocchio's model.
@@ -90,7 +90,7 @@ class Limbs:
         return -1
 
     def read(self, q: Array, data: Any) -> None:
-        """Take values from a posture q (nq,), and from `data` of the same posture where other joints are."""
+        """Read values from a posture q (nq,), and placements of other joints from `data` at the same posture."""
         self.values[self._plain] = q[self._plain_q]
         for node in self._wide:
             first = self._first[node]
@@ -102,7 +102,7 @@ class Limbs:
             self.places[node] = _settled(floats(base))
 
     def write(self, q: Array) -> None:
-        """Put the values into a posture q (nq,), in place."""
+        """Write the values into a posture q (nq,), in place."""
         q[self._plain_q] = self.values[self._plain]
         for node in self._wide:
             first, value = self._first[node], float(self.values[node])
@@ -119,13 +119,13 @@ class Limbs:
         return tuple(self.frames[node].tolist())
 
     def slides(self, node: int) -> bool:
-        """Whether a node slides rather than turns."""
+        """Whether a node is prismatic."""
         return bool(self.kinds[node] == SLIDE)
 
 
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
-    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    """The module of compiled loops, compiled or loaded from the cache; called before a solve, not during it."""
     none, places = np.zeros(0), np.zeros(0, dtype=np.intp)
     three, six, twelve = np.zeros((0, 3)), np.zeros((0, 6)), np.zeros((0, 12))
     limbs_kernel.forward(places, twelve, places, none, three, none, twelve, six)
@@ -138,7 +138,7 @@ def compiled_kernel() -> Any:
 
 
 def movable(model: pin.Model, joint: int) -> bool:
-    """Whether a joint can be a node: it turns about one axis or slides along one."""
+    """Whether a joint can be a node: it is revolute or prismatic with one axis."""
     made = model.joints[joint]
     if made.nv != 1 or made.nq > 2:
         return False
@@ -176,7 +176,7 @@ def _settled(placement: Placement) -> Placement:
 
 
 def _kind(joint: Any) -> tuple[int, float, tuple[float, float, float]]:
-    """What a joint does, which way round, and its axis."""
+    """Kind, sign and axis of a joint."""
     subspace = np.asarray(joint.createData().S).ravel().tolist()
     sliding = max(abs(value) for value in subspace[3:]) < SAME
     x, y, z = subspace[:3] if sliding else subspace[3:]

@@ -17,15 +17,15 @@ from wholebody.methods.ccd.sweep import Aims, sweep
 from wholebody.methods.ccd.terms import Request, Wish
 from wholebody.methods.control import Control
 
-LEVER = 0.3  # m per radian: how far from its origin a frame's axes are held; about the length of a forearm
+LEVER = 0.3  # m per radian: weight of orientation against position; about the length of a forearm
 NOWHERE = (0.0, 0.0, 0.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-WINDOW = 25  # sweeps over which progress is judged: near a goal the descent is linear, and sometimes slow
-PROGRESS = 0.97  # a window that leaves more than this share of the error is at rest
+WINDOW = 25  # sweeps over which progress is judged: near a goal convergence is linear, and sometimes slow
+PROGRESS = 0.97  # the descent ends if a window leaves more than this share of the error
 
 
 class Reached(NamedTuple):
-    """Where a descent ended: the largest error left (metres or radians), sweeps used, and whether it came to rest."""
+    """End of a descent: the largest remaining error (metres or radians), sweeps used, and whether it converged."""
 
     error: float
     sweeps: int
@@ -33,7 +33,7 @@ class Reached(NamedTuple):
 
 
 class _Goals:
-    """The points and axes of all goals, where each should be, and where it is on the node that carries it.
+    """The points and axes of all goals with their targets, each in the frame of the node that carries it.
 
     A goal's place comes first, then its three axes. Places have the weight of their goal, axes half of it: the squared
     distances of three axes from themselves turned by a small angle add up to twice its square.
@@ -65,12 +65,12 @@ class _Goals:
         self._points = self.aims.points
 
     def carry(self) -> None:
-        """Go along with the limbs."""
+        """Update the present values."""
         self._kernel.carry(self._frames, self._nodes, self._local, self._points, self.aims.here)
 
     @property
     def error(self) -> float:
-        """Largest distance or angle left."""
+        """Largest remaining distance or angle."""
         return float(self._kernel.greatest_error(self.aims.here, self.aims.there, self._points))
 
 
@@ -119,12 +119,12 @@ class Reach:
         return q, Reached(error, sweeps, rested)
 
     def disturbed(self, q: Array, size: float, rng: np.random.Generator) -> Array:
-        """Copy of a posture q (nq,) with its joints drawn at random, about where they are or anywhere.
+        """Copy of a posture q (nq,) with random joints, near their values or anywhere.
 
         Args:
             q: (nq,) posture.
             size: standard deviation, radians or metres; infinite for anywhere within the limits.
-            rng: where the numbers come from.
+            rng: the random generator.
         """
         q = q.copy()
         limbs = self.limbs

@@ -6,10 +6,10 @@ of all points, weighted by w, are a constant minus 2 (A cos phi + B sin phi) wit
 
     A = sum w r' . t' = sum w (r . t - (u . r) (u . t)),        B = sum w u . (r x t),
 
-so the best turn is phi = atan2(B, A). For one point it is the signed angle between the two projections; their equation
-5, an arc cosine, has no sign and holds for unit vectors only. Directions count like points, without the joint's origin:
-with them a frame is turned as well as moved (Wang and Chen 1991, A Combined Optimization Method for Solving the Inverse
-Kinematics Problem of Mechanical Manipulators, IEEE Transactions on Robotics and Automation 7(4)).
+so the best rotation is phi = atan2(B, A). For one point it is the signed angle between the two projections; equation 5
+of the paper, an arc cosine, has no sign and holds for unit vectors only. Directions count like points at the origin:
+with them a frame is rotated as well as moved (Wang and Chen 1991, A Combined Optimization Method for Solving the
+Inverse Kinematics Problem of Mechanical Manipulators, IEEE Transactions on Robotics and Automation 7(4)).
 """
 
 from __future__ import annotations
@@ -57,33 +57,33 @@ def moving_all(nodes: tuple[int, ...], aims: int, points: int) -> Plan:
 
 
 class Aims:
-    """Points and directions carried by nodes, with the place each should come to.
+    """Points and directions carried by nodes, with their targets.
 
     Attributes:
-        here: (m, 3) where they are now.
-        there: (m, 3) where they should be.
+        here: (m, 3) their present values.
+        there: (m, 3) their targets.
         weights: (m,) factor on each squared distance.
     """
 
     def __init__(self) -> None:
-        """Nothing is asked yet."""
+        """Make an empty set."""
         self.here, self.there, self.weights = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
         self._nodes: list[int] = []
         self._direction: list[bool] = []
 
     def add(self, node: int, here: Vector, there: Vector, *, weight: float = 1.0, direction: bool = False) -> None:
-        """Ask for a point, or a direction, that a node carries; both (3,) in the world."""
+        """Add a point, or a direction, of a node with its target; both (3,) in the world."""
         self.here, self.there = np.vstack([self.here, here]), np.vstack([self.there, there])
         self.weights = np.append(self.weights, weight)
         self._nodes.append(node)
         self._direction.append(direction)
 
     def plan(self, limbs: Limbs, nodes: Iterable[int] | None = None) -> Plan:
-        """Nodes that move something, from the tips inwards.
+        """Nodes that move an aim, from the tips inwards.
 
         Args:
-            limbs: whose nodes.
-            nodes: those that may move; all that move something where None.
+            limbs: the limbs of the nodes.
+            nodes: the nodes that may move; None for all that move an aim.
         """
         allowed = range(len(limbs.joints)) if nodes is None else nodes
         steps = []
@@ -101,7 +101,7 @@ class Aims:
         return ~np.array(self._direction, dtype=bool)
 
     def distance(self) -> float:
-        """Root of the weighted sum of squared distances left."""
+        """Root of the weighted sum of squared remaining distances."""
         return distance(self.here, self.there, self.weights)
 
 
@@ -111,10 +111,10 @@ def distance(here: Array, there: Array, weights: Array) -> float:
 
 
 def sweep(limbs: Limbs, aims: Aims, plan: Plan) -> float:
-    """Give each joint its best value, within its limits, and carry the aims along.
+    """Give each joint its best value, within its limits, and move the aims with it.
 
-    The joints outside the one at work have moved, but its axis has not, so only the aims need to follow: one sweep is
-    linear in the number of joints. Call `limbs.forward()` before the next one.
+    When a joint is processed, the joints farther out have moved, but its axis has not, so only the aims are updated: a
+    sweep is linear in the number of joints. Call `limbs.forward()` before the next one.
 
     Returns:
         The largest change of a joint, radians or metres.

@@ -1,4 +1,4 @@
-"""Assemblies: bodies and joints that no URDF can say, such as closed chains, rings, stars and loose parts."""
+"""Assemblies: bodies and joints that URDF cannot describe, such as closed chains, rings, stars and loose parts."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from wholebody.pool import OneAtATime
 from wholebody.tasks.inputs import direction, point, target_placement
 
 WORLD = "world"
-UNIT_TOLERANCE = 1e-3  # how far a quaternion may be from unit length before it is taken for a mistake
-FINEST = 1e-12  # m, rad: least tolerance, where all is exact but for rounding
+UNIT_TOLERANCE = 1e-3  # largest deviation of a quaternion from unit length; more is refused as a mistake
+FINEST = 1e-12  # m, rad: least tolerance; below it only rounding remains
 
 
 @dataclass
@@ -64,14 +64,14 @@ class _Prepared:
 class Assembly:
     """Rigid bodies, joints between them and with the world, and goals; solved in full coordinates.
 
-    Joints are given at the bodies' present placements: `at` and `axis` in the world. Where the two sides do not fit
-    yet, `at_first` and `at_second` say the place in either body's frame instead. Bodies need not be connected.
+    Joints are given at the bodies' present placements: `at` and `axis` in the world. If the two sides do not fit
+    yet, `at_first` and `at_second` give the position in either body's frame instead. Bodies need not be connected.
 
-    A solve moves the bodies, so an assembly is for one thread at a time. It can be pickled, and a copy is independent.
+    A solve moves the bodies, so an assembly serves one thread at a time. It can be pickled; a copy is independent.
     """
 
     def __init__(self) -> None:
-        """Begin with the world alone."""
+        """Make an assembly with the world alone."""
         self._names: dict[str, int] = {}
         self._places: list[Array] = []
         self._sizes: list[float] = []
@@ -83,7 +83,7 @@ class Assembly:
         self.structures = 0
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what was stated and where the bodies are; what a solve prepares is prepared anew."""
+        """Return the bodies, joints and goals, and the placements; data that a solve prepares are prepared anew."""
         return {name: value for name, value in self.__dict__.items() if name not in ("_prepared", "_alone")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -101,10 +101,10 @@ class Assembly:
         Args:
             name: one that no other body has.
             at: (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3.
-            size: metres from its origin to its rim; turning it counts as moving the rim.
+            size: metres from its origin to its rim; a rotation of the body counts as the motion of the rim.
 
         Raises:
-            InputError: the name is taken, the size is not positive, or the placement cannot be read.
+            InputError: the name exists already, the size is not positive, or the placement cannot be read.
         """
         if text(name, "the name of a body") == WORLD or name in self._names:
             raise InputError(f"body {name!r}: the name is taken; give another one")
@@ -122,7 +122,7 @@ class Assembly:
         return tuple(self._names)
 
     def placement(self, name: str) -> Any:
-        """Where a body is (pin.SE3)."""
+        """Placement of a body (pin.SE3)."""
         return pin.XYZQUATToSE3(self._place(self._index(name, "placement")))
 
     # ---- joints
@@ -165,7 +165,7 @@ class Assembly:
         low, high = (-np.inf, np.inf) if limits is None else numbers(limits, (2,), f"{what}: limits").tolist()
         if low >= high:
             raise InputError(f"{what}: limits {low:g} and {high:g} leave no room; give the lower one first")
-        ends = self._ends(a, b, "revolute joint", first, second, **where)  # remembers the joint, when all else is right
+        ends = self._ends(a, b, "revolute joint", first, second, **where)  # registers the joint, after all other checks
         basis_a = axes_along(ours)
         # the second body's axes agree with the first's at the present placements, so that the angle is zero now
         basis_b = (turn_b.inverse() * turn_a * basis_a) if axis_second is None else axes_along(theirs)
@@ -176,7 +176,7 @@ class Assembly:
         return self._changed()
 
     def prismatic(self, first: str, second: str, *, axis: ArrayLike) -> Assembly:
-        """Two bodies slide along one direction (3,) in the world, without turning."""
+        """Two bodies translate along one direction (3,) in the world, without rotation."""
         what = f"the prismatic joint of {shown(first)} and {shown(second)}"
         a, b = self._pair(first, second, "prismatic joint")
         along = direction(axis, f"{what}: axis")
@@ -190,7 +190,7 @@ class Assembly:
         return self._changed()
 
     def fixed(self, first: str, second: str, *, placement_second: PlacementLike | None = None) -> Assembly:
-        """Two bodies keep their placement to each other: the present one, or the second's in the first's frame."""
+        """Two bodies keep their relative placement: the present one, or the second's given one in the first's frame."""
         what = f"the fixed joint of {shown(first)} and {shown(second)}"
         a, b = self._pair(first, second, "fixed joint")
         here = pin.XYZQUATToSE3(self._place(a)).actInv(pin.XYZQUATToSE3(self._place(b)))
@@ -203,15 +203,15 @@ class Assembly:
     def on_plane(
         self, body: str, place: ArrayLike, *, normal: ArrayLike, through: ArrayLike, of: str = WORLD, side: str = "on"
     ) -> Assembly:
-        """A point of a body, (3,) in its frame, stays in a plane that the world or another body carries.
+        """A point of a body, (3,) in its frame, stays in a plane that is fixed to the world or to another body.
 
         Args:
             body: name.
             place: (3,) the point, metres.
             normal: (3,) of the plane, in the frame of `of`.
             through: (3,) a point of the plane, in the frame of `of`.
-            of: which body carries the plane.
-            side: "on", or "above" where the point may leave along the normal.
+            of: name of the body to which the plane is fixed.
+            side: "on", or "above" if the point may move along the normal.
         """
         what = f"the plane of {shown(body)} and {shown(of)}"
         choice(side, ("on", "above"), f"{what}: side")
@@ -226,14 +226,14 @@ class Assembly:
     # ---- goals
 
     def point_goal(self, body: str, target: ArrayLike, *, place: ArrayLike = (0.0, 0.0, 0.0)) -> Assembly:
-        """Bring a point of a body, (3,) in its frame, to a place in the world (3,), if it can be."""
+        """Move a point of a body, (3,) in its frame, to a position in the world (3,), if possible."""
         what = f"the goal of {shown(body)}"
         ends = point(place, f"{what}: place"), point(target, f"{what}: target")
         self._goals.coincide(self._moved(body, what), -1, what, *ends, goal=True)
         return self._changed_goals()
 
     def frame_goal(self, body: str, target: PlacementLike) -> Assembly:
-        """Bring a body to a placement in the world, if it can be."""
+        """Move a body to a placement in the world, if possible."""
         what = f"the goal of {shown(body)}"
         wanted, index = target_placement(target, what), self._moved(body, what)
         self._goals.coincide(index, -1, what, np.zeros(3), np.array(wanted.translation), goal=True)
@@ -256,14 +256,14 @@ class Assembly:
         return System(len(self._places), [*self._held(), *self._goals.batches(len(self._places))], self._weight())
 
     def variables(self) -> Array:
-        """(7 n,) where the bodies are."""
+        """(7 n,) the placements of the bodies."""
         return np.concatenate(self._places)
 
     def place(self, variables: ArrayLike) -> Assembly:
-        """Put the bodies elsewhere.
+        """Set the placements of the bodies.
 
         Args:
-            variables: (7 n,) as `variables` returns them: of each body its origin [m] and its quaternion (x, y, z, w).
+            variables: (7 n,) as `variables` returns them: for each body its origin [m] and quaternion (x, y, z, w).
 
         Raises:
             InputError: another number of values, one that is not finite, or a quaternion that is not of unit length.
@@ -283,14 +283,14 @@ class Assembly:
         inequalities: Kind = "slack",
         nearest: bool = False,
     ) -> AssemblySolution:
-        """Move the bodies until joints and goals hold, each step the least motion; they stay there.
+        """Move the bodies until joints and goals hold; each step is the least motion. They keep their new placements.
 
         Args:
             tolerance: metres and radians, from 1e-12.
             iterations: most Newton iterations.
             algebra: "auto", "normal", "llt", "kkt", "schur", "dense" or "svd".
             inequalities: "slack" or "barrier".
-            nearest: look for the place nearest to where the bodies were (eq. 1), which many least steps miss by a
+            nearest: find the placements nearest to those before (eq. 1), which many least steps miss by a
                 little; without inequalities only.
 
         Raises:
@@ -380,7 +380,7 @@ class Assembly:
         at_first: Any = None,
         at_second: Any = None,
     ) -> tuple[Array, Array]:
-        """The joint's place in either body."""
+        """The joint's position in either body."""
         where = f"{kind} of {first!r} and {second!r}"
         if (at is None) == (at_first is None) or (at_first is None) != (at_second is None):
             raise InputError(f"{where}: give its place as at=(x, y, z) in the world, or as at_first and at_second")
