@@ -70,8 +70,7 @@ class AllPairs:
         number = np.flatnonzero(self.distance < within)
         results, (near, placed) = self._results, self._views or (None, None)
         found = near[number] if near is not None else [read_result(results.distanceResults[k]) for k in number.tolist()]
-        pieces = [self._built.geometry.collisionPairs[k] for k in number.tolist()]
-        pair = np.array([(both.first, both.second) for both in pieces], dtype=np.intp).reshape(-1, 2)
+        pair = self._built.table.pairs[number]
         if placed is not None:
             placement = placed[pair]
         else:

@@ -18,6 +18,7 @@ LOOPS = (
     "wholebody.geometry.continuous.moved_pairs",
     "wholebody.geometry.proximity",
     "wholebody.linearisation",
+    "wholebody.methods.ccd.limbs",
     "wholebody.methods.newton.linear_algebra.gram",
     "wholebody.methods.qp.active_set",
     "wholebody.methods.qp.subproblem",

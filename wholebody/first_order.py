@@ -7,7 +7,6 @@ measures the distance from an optimum, and its largest parts are the blockers.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,8 +18,10 @@ import pinocchio as pin
 
 from wholebody.all_pairs import AllPairs, Label, NearPairs
 from wholebody.arrays import Array, Mask
+from wholebody.figures.figure import Figure
 from wholebody.figures.state import State, Wrench
 from wholebody.problem import Problem
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 
 ACTIVE = 1e-4  # m, rad: a constraint nearer to its bound than this counts as active
 FLAT = 1e-2  # share of the largest curvature below which a degree of freedom counts as having that much
@@ -66,6 +67,16 @@ class _Rows:
         self.labels += labels
 
 
+class _Asked(NamedTuple):
+    """What was asked of a posture when it was judged."""
+
+    goals: tuple[Goal, ...]
+    constraints: tuple[Constraint, ...]
+    bounds: tuple[Bound, ...]
+    measures: tuple[Measure, ...]
+    figure: Figure
+
+
 class FirstOrder:
     """Optimality and blockers of a judged posture: each is computed when it is first asked for, as things were then.
 
@@ -76,7 +87,9 @@ class FirstOrder:
     def __init__(self, problem: Problem, pairs: AllPairs, fits: bool) -> None:
         """Keep what was asked, the posture where `pairs` are, and the pairs that push there."""
         self.fits = fits
-        self._problem, self._built, self._q = copy.copy(problem), problem.scene.built, pairs.state.q.copy()
+        scene = problem.scene
+        self._asked = _Asked(problem.goals, problem.constraints, problem.bounds, problem.measures, scene.figure)
+        self._built, self._q = scene.built, pairs.state.q.copy()
         self._near = pairs.nearer(problem.clearances + ACTIVE)
         self._clearances = problem.clearances[self._near.number]
 
@@ -88,7 +101,7 @@ class FirstOrder:
     def optimality(self) -> float:
         """See `wholebody.assessment.Assessment`."""
         with self._lent() as state:
-            return _optimality(self._problem, state, _active(self._problem, state, self._near))
+            return _optimality(self._asked, state, _active(self._asked, state, self._near))
 
     @cached_property
     def blockers(self) -> tuple[Blocker, ...]:
@@ -96,7 +109,7 @@ class FirstOrder:
         if self.fits:
             return ()
         with self._lent() as state:
-            return _blockers(self._problem, state, self._near, self._clearances)
+            return _blockers(self._asked, state, self._near, self._clearances)
 
     @contextmanager
     def _lent(self) -> Iterator[State]:
@@ -109,15 +122,15 @@ def _dense(part: Wrench | Array, state: State) -> Array:
     return state.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part)
 
 
-def _optimality(problem: Problem, state: State, active: _Active) -> float:
+def _optimality(asked: _Asked, state: State, active: _Active) -> float:
     """What is left of the objective's gradient after the best combination of all active gradients."""
     nv = state.model.nv
-    goals = [(np.atleast_1d(goal.error(state)), _dense(goal.jacobian(state), state), goal) for goal in problem.goals]
+    goals = [(np.atleast_1d(goal.error(state)), _dense(goal.jacobian(state), state), goal) for goal in asked.goals]
     met = all(np.abs(error).max(initial=0.0) <= MET for error, _, _ in goals)
     signed, one_sided = active.signed, active.one_sided
     if met:
-        objective = sum((term.weight * term.gradient(state) for term in problem.measures), np.zeros(nv))
-        curvature = sum((term.weight * term.curvature(state) for term in problem.measures), np.zeros(nv))
+        objective = sum((term.weight * term.gradient(state) for term in asked.measures), np.zeros(nv))
+        curvature = sum((term.weight * term.curvature(state) for term in asked.measures), np.zeros(nv))
         signed.rows += [jacobian for _, jacobian, _ in goals]
     else:
         objective = sum((goal.weight * error @ jacobian for error, jacobian, goal in goals), np.zeros(nv))
@@ -129,19 +142,19 @@ def _optimality(problem: Problem, state: State, active: _Active) -> float:
     return float((np.abs(left) / scale).max())
 
 
-def _blockers(problem: Problem, state: State, near: NearPairs, clearances: Array) -> tuple[Blocker, ...]:
+def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -> tuple[Blocker, ...]:
     """What keeps a posture from meeting the goals, or from holding what must hold; the hardest first.
 
     If something is violated, the violated constraints come first, ordered by violation, then those that block repair.
     """
     nv = state.model.nv
-    signed, one_sided, rows, numbers = _active(problem, state, near)
+    signed, one_sided, rows, numbers = _active(asked, state, near)
     pull = np.zeros(nv)
     violated: dict[Label, float] = {}
     lack = clearances - near.found[:, 0]
     for row in np.flatnonzero(lack > MET).tolist():
         violated[near.label(row)] = float(lack[row])
-    for number, constraint in enumerate(problem.constraints):
+    for number, constraint in enumerate(asked.constraints):
         value = np.atleast_1d(constraint.value(state))
         missed = np.minimum(value - constraint.lower, 0.0) + np.maximum(value - constraint.upper, 0.0)
         if np.abs(missed).max(initial=0.0) > MET:
@@ -152,14 +165,14 @@ def _blockers(problem: Problem, state: State, near: NearPairs, clearances: Array
             pull -= violated.get(near.label(number), 0.0) * row
         signed, one_sided = _without(signed, violated), _without(one_sided, violated)
     else:
-        for goal in problem.goals:
+        for goal in asked.goals:
             pull += goal.weight * np.atleast_1d(goal.error(state)) @ _dense(goal.jacobian(state), state)
     push, _ = _balanced(pull, signed, one_sided)
     found: dict[Label, float] = {}
     for label, size in zip([*signed.labels, *one_sided.labels], push.tolist(), strict=True):
         found[label] = found.get(label, 0.0) + size
     most, deepest = max(found.values(), default=0.0), max(violated.values(), default=0.0)
-    frames = {_constraint(k, term): getattr(term, "frame", None) for k, term in enumerate(problem.constraints)}
+    frames = {_constraint(k, term): getattr(term, "frame", None) for k, term in enumerate(asked.constraints)}
     first = [Blocker(*label, size / deepest, True, frames.get(label)) for label, size in violated.items()]
     second = [
         Blocker(*label, size / most, False, frames.get(label)) for label, size in found.items() if size > WORTH * most
@@ -195,12 +208,12 @@ class _Active(NamedTuple):
     contacts: list[int]
 
 
-def _active(problem: Problem, state: State, near: NearPairs) -> _Active:
+def _active(asked: _Asked, state: State, near: NearPairs) -> _Active:
     nv = state.model.nv
     signed, one_sided = _Rows(nv), _Rows(nv)
     gaps, contacts = near.gradients(state)
     one_sided.add(gaps, [near.label(number) for number in contacts])
-    for number, constraint in enumerate(problem.constraints):
+    for number, constraint in enumerate(asked.constraints):
         value = np.atleast_1d(constraint.value(state))
         jacobian = _dense(constraint.jacobian(state), state)
         low, high = value <= constraint.lower + ACTIVE, value >= constraint.upper - ACTIVE
@@ -208,9 +221,9 @@ def _active(problem: Problem, state: State, near: NearPairs) -> _Active:
         signed.add(jacobian[low & high], [label] * int((low & high).sum()))
         one_sided.add(jacobian[low & ~high], [label] * int((low & ~high).sum()))
         one_sided.add(-jacobian[high & ~low], [label] * int((high & ~low).sum()))
-    lower, upper = problem.scene.figure.tangent_bounds(state.q)
+    lower, upper = asked.figure.tangent_bounds(state.q)
     limited_low, limited_high = lower >= -ACTIVE, upper <= ACTIVE
-    for bound in problem.bounds:
+    for bound in asked.bounds:
         low_bound, high_bound = bound.bounds(state, None)
         lower, upper = np.maximum(lower, low_bound), np.minimum(upper, high_bound)
     identity = np.eye(nv)

@@ -26,6 +26,12 @@ def test_the_papers_size_is_met() -> None:
     assert row.systems == 3
 
 
+def test_a_move_of_a_drag_is_of_the_papers_size() -> None:
+    row = newton.drag_of_assembly_row(5)
+    assert (row.variables, row.nonzeros) == (newton.paper_row(1).variables, newton.paper_row(1).nonzeros)
+    assert 1.0 <= row.systems <= 4.0
+
+
 def test_exponents_are_slopes() -> None:
     rows = [newton.LinearRow("ring", n, "kkt", 0, 0, 0, 0, 0.0, 3.0 * n**1.1) for n in (10, 100, 300, 1000)]
     assert np.isclose(newton.exponent(rows, "ring", "kkt"), 1.1)

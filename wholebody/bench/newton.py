@@ -16,7 +16,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench.newton_shapes import SHAPES, chain, four_bar, median_us, pulled_chain, ring, three_bar
+from wholebody.bench.newton_shapes import LINK, SHAPES, chain, four_bar, median_us, pulled_chain, ring, three_bar
 from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
 from wholebody.methods.newton.assembly import Assembly
@@ -32,6 +32,7 @@ SIZES = (10, 30, 100, 300, 1000)
 SMALLEST_FITTED = 30  # bodies: smaller systems cost what any call costs
 ALGEBRAS = ("normal", "llt", "kkt", "schur", "dense")
 PAPER_BODIES = 30  # 210 variables and about 1455 non-zeros, as in the paper
+CIRCLE = 0.05  # rad: from move to move of a drag
 FINE = 1e-8  # m, rad: tolerance at which two methods are compared
 TABLE_TOP = 0.74  # m
 TOUCHING = 1e-4  # m: nearer than this counts as contact
@@ -148,6 +149,20 @@ def paper_row(repeats: int) -> SolveRow:
     return assembly_row("the paper's size", pulled_chain(PAPER_BODIES), repeats)
 
 
+def drag_of_assembly_row(moves: int) -> SolveRow:
+    """The same chain dragged in a circle through the public interface: a new place of the goal, and a solve."""
+    made, last, tip = chain(PAPER_BODIES), f"b{PAPER_BODIES - 1}", np.array((LINK, 0.0, 0.0))
+    here, times, found = made.placement(last).act(tip), [], []
+    for angle in CIRCLE * np.arange(moves):
+        target = here + (0.03 * np.cos(angle) - 0.05, 0.03 * np.sin(angle), -0.03)
+        began = time.process_time()
+        found.append(made.drop_goals().point_goal(last, target, place=tip).solve())
+        times.append(time.process_time() - began)
+    counts = float(np.mean([one.iterations for one in found])), float(np.mean([one.systems for one in found]))
+    us, errors = 1e6 * float(np.median(times)), found[-1].residuals
+    return _solve_row("the same, a move of a drag", made.system().pattern, counts, us, errors)
+
+
 def loop_rows(repeats: int) -> list[SolveRow]:
     """Closed loops beside open chains with as many bodies, each moved by a goal."""
     closed, opened = four_bar(), three_bar()
@@ -197,7 +212,9 @@ def _reach_row(case: str, active_system: ActiveSystem, x: Array, repeats: int) -
     return _solve_row(case, active_system.system.pattern, (found.iterations, found.systems), us, found.residuals)
 
 
-def _solve_row(case: str, pattern: Pattern, counts: tuple[int, int], us: float, errors: Sequence[float]) -> SolveRow:
+def _solve_row(
+    case: str, pattern: Pattern, counts: tuple[float, float], us: float, errors: Sequence[float]
+) -> SolveRow:
     """A row; `counts` are iterations and systems."""
     each, last = us / max(counts[1], 1) / pattern.width, " ".join(f"{value:.1e}" for value in errors[-4:])
     return SolveRow(case, pattern.width, len(pattern.rows), *counts, 1e-3 * us, each, last)

@@ -10,7 +10,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.ccd.limbs import Limbs, floats, movable, moved, rotated, seen_from, turned
+from tests.reference.limbs import turned
+from wholebody.methods.ccd.limbs import Limbs, floats, movable, moved, rotated, seen_from
 
 
 @pytest.mark.parametrize("name", ["human", "avatar", "hand"])

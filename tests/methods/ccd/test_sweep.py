@@ -12,8 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import wholebody as wb
-from wholebody.methods.ccd.limbs import Limbs
-from wholebody.methods.ccd.sweep import Aims, sweep, within
+from tests.reference import limbs as reference
+from wholebody.methods.ccd.limbs import Limbs, compiled_kernel, movable
+from wholebody.methods.ccd.limbs_kernel import within
+from wholebody.methods.ccd.sweep import Aims, Plan, sweep
 
 
 def _one_joint(made: Any, low: float, high: float) -> tuple[Any, Limbs]:
@@ -105,3 +107,92 @@ def test_a_target_out_of_reach_is_said_to_be_so(planar_arm: Callable[..., Any]) 
     solution = wb.CCD().solve(wb.Problem(wb.Scene(figure), goals=[wb.Point("tip", (0.6, 0.6, 0.0))]))
     assert solution.status == "unreachable"
     assert solution.assessment.goal_error == pytest.approx(np.hypot(0.6, 0.6) - 0.7, abs=1e-4)
+
+
+@pytest.mark.parametrize("name", ["human", "avatar", "slides"])
+def test_compiled_kinematics_and_sweeps_do_what_plain_floats_do(name: str) -> None:
+    """On random postures, aims and plans, entry by entry; the same numbers but for the last digits."""
+    rng = np.random.default_rng(5)
+    model = _sliding_arm(rng) if name == "slides" else wb.load(name).model
+    joints = [joint for joint in range(1, model.njoints) if movable(model, joint)]
+    data = model.createData()
+    for case in range(200):
+        chosen = sorted(rng.choice(joints, size=int(rng.integers(1, len(joints) + 1)), replace=False).tolist())
+        limbs = Limbs(model, chosen)
+        q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
+        pin.forwardKinematics(model, data, q)
+        limbs.read(q, data)
+        limbs.forward()
+        frames, lines = reference.forward(limbs)
+        assert np.abs(limbs.frames - frames).max() < 1e-13
+        assert np.abs(limbs.lines - lines).max() < 1e-13
+        count = int(rng.integers(1, 5))
+        here, there = rng.normal(size=(2, count, 3))
+        aims = Aims()
+        for k in range(count):
+            tip, weight = int(rng.integers(len(chosen))), float(rng.uniform(0.1, 2.0))
+            aims.add(tip, here[k], there[k], weight=weight, direction=bool(rng.random() < 0.4))
+        plan = aims.plan(limbs) if case % 2 else aims.plan(limbs, rng.choice(len(chosen), 3).tolist())
+        cuts = plan.first.tolist()
+        steps = [
+            (node, tuple(plan.moved[first:last].tolist()), points)
+            for node, first, last, points in zip(
+                plan.nodes.tolist(), cuts, cuts[1:], plan.points.tolist(), strict=False
+            )
+        ]
+        values, carried = limbs.values.tolist(), [tuple(place) for place in here.tolist()]
+        targets = [tuple(place) for place in there.tolist()]
+        expected = reference.sweep(limbs, values, carried, targets, aims.weights.tolist(), steps)
+        assert sweep(limbs, aims, plan) == pytest.approx(expected, abs=1e-12)
+        assert np.abs(limbs.values - values).max() < 1e-12
+        assert np.abs(aims.here - carried).max() < 1e-12
+        assert aims.distance() == pytest.approx(np.sqrt(aims.weights @ ((there - aims.here) ** 2).sum(axis=1)))
+
+
+def _sliding_arm(rng: np.random.Generator) -> Any:
+    """A tree of joints that turn and slide about all kinds of axes, some without limits."""
+    model, parent = pin.Model(), 0
+    for number in range(12):
+        axis = rng.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        kinds = (
+            pin.JointModelRX(), pin.JointModelRY(), pin.JointModelRZ(), pin.JointModelPX(), pin.JointModelPZ(),
+            pin.JointModelRevoluteUnaligned(axis), pin.JointModelPrismaticUnaligned(axis),
+            pin.JointModelRevoluteUnaligned(np.array([0.0, -1.0, 0.0])),
+        )  # fmt: skip
+        bounds = [np.array([value]) for value in (1.0, 1.0, -rng.uniform(0.1, 4.0), rng.uniform(0.1, 4.0))]
+        place = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3)) if number % 3 else pin.SE3.Identity()
+        made = kinds[number % len(kinds)]
+        parent = model.addJoint(int(rng.integers(0, parent + 1)), made, place, f"joint{number}", *bounds)
+    model.addJoint(parent, pin.JointModelRUBY(), pin.SE3.Random(), "endless")
+    return model
+
+
+def test_a_plan_of_no_steps_moves_nothing() -> None:
+    plan = Plan.of([])
+    assert [len(part) for part in plan] == [0, 1, 0, 0]
+
+
+def test_aims_go_along_with_their_nodes_and_errors_are_distances_and_angles() -> None:
+    model, kernel = wb.load("avatar").model, compiled_kernel()
+    limbs = Limbs(model, [joint for joint in range(1, model.njoints) if movable(model, joint)])
+    data, rng = model.createData(), np.random.default_rng(2)
+    for _ in range(50):
+        q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
+        pin.forwardKinematics(model, data, q)
+        limbs.read(q, data)
+        limbs.forward()
+        node, place, turn = int(rng.integers(-1, len(limbs.joints))), rng.normal(size=3), pin.exp3(rng.normal(size=3))
+        stand = pin.SE3.Identity() if node < 0 else data.oMi[limbs.joints[node]]
+        local, here = np.vstack([place, turn.T]), np.zeros((4, 3))
+        points = np.array([True, False, False, False])
+        kernel.carry(limbs.frames, np.full(4, node), local, points, here)
+        assert np.abs(here[0] - stand.act(place)).max() < 1e-12
+        assert np.abs(here[1:].T - stand.rotation @ turn).max() < 1e-12
+        off, angle = 0.5 * rng.normal(size=3), float(rng.uniform(0.0, 3.1))
+        axis = rng.normal(size=3)
+        wanted = stand.rotation @ turn @ pin.exp3(angle * axis / np.linalg.norm(axis))
+        there = np.vstack([here[0] + off, wanted.T])
+        found = kernel.greatest_error(here, there, points)
+        assert found == pytest.approx(max(float(np.linalg.norm(off)), angle), abs=1e-7)
+        assert kernel.greatest_error(here[1:], there[1:], points[1:]) == pytest.approx(angle, abs=1e-7)

@@ -30,7 +30,8 @@ def run(arguments: argparse.Namespace) -> int:
     check_count(repeats, "--repeats")
     facts = machine()
     many = 10 * repeats
-    solves = [newton.paper_row(many), newton.nearest_row(many), *newton.loop_rows(many)]
+    paper = [newton.paper_row(many), newton.drag_of_assembly_row(many)]
+    solves = [*paper, newton.nearest_row(many), *newton.loop_rows(many)]
     agreements = newton.agreement_rows(many)
     drags = [newton.drag_row(frames, contacts) for contacts in (False, True)]
     linear = list(newton.linear_rows(sizes, repeats))

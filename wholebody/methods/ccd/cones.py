@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.reach_cones import ReachCone
-from wholebody.methods.ccd.limbs import WORLD, Limbs, Placement, floats, rotated, seen_from
+from wholebody.methods.ccd.limbs import Limbs, Placement, floats, rotated, seen_from
 from wholebody.methods.ccd.sweep import Aims, sweep
 
 Direction = tuple[float, float, float]
@@ -93,8 +94,10 @@ class ConeGuard:
         path = limbs.paths[self._limb] if self._limb >= 0 else ()
         self.nodes = tuple(node for node in path if node not in under)
         self._local: Direction = self._axis
-        self._stand: Placement = WORLD
-        self._last: list[float] | None = None
+        self._stand: Placement = floats(self._base_placement)
+        self._stands = self._base >= 0 and limbs.joints[self._base] == self._base_joint  # the cone, in a node's frame
+        self._last: Array | None = None
+        self._rows = np.array(self.nodes, dtype=np.intp)
 
     def holds(self, data: Any) -> bool:
         """Whether the limb is in its cone at the joint placements of Pinocchio's data."""
@@ -106,11 +109,13 @@ class ConeGuard:
         if not self.nodes:
             return
         own = self._limbs.joints[self._limb]
-        self._local = rotated(floats(data.oMi[own].actInv(data.oMi[self._limb_joint])), *self._axis)
-        base = data.oMi[self._base_joint] * self._base_placement
-        if self._base >= 0:
-            base = data.oMi[self._limbs.joints[self._base]].actInv(base)
-        self._stand = floats(base)
+        if own != self._limb_joint:  # else the limb stands in its node's frame, always
+            self._local = rotated(floats(data.oMi[own].actInv(data.oMi[self._limb_joint])), *self._axis)
+        if not self._stands:
+            base = data.oMi[self._base_joint] * self._base_placement
+            if self._base >= 0:
+                base = data.oMi[self._limbs.joints[self._base]].actInv(base)
+            self._stand = floats(base)
         self._last = None
         self._remember()
 
@@ -128,33 +133,32 @@ class ConeGuard:
 
     def _direction(self) -> Direction:
         """The limb's direction in the cone's reference frame."""
-        frames = self._limbs.frames
-        world = rotated(frames[self._limb], *self._local)
-        return seen_from(self._stand, *seen_from(frames[self._base], *world))
+        limbs = self._limbs
+        world = rotated(limbs.frame(self._limb), *self._local)
+        return seen_from(self._stand, *seen_from(limbs.frame(self._base), *world))
 
     def _remember(self) -> bool:
         if not self._polygon.contains(self._direction()):
             return False
-        self._last = [self._limbs.values[node] for node in self.nodes]
+        self._last = self._limbs.values[self._rows]
         return True
 
     def _turn_back(self) -> None:
         """Turn the joints of the limb until it points to the nearest direction of its cone."""
         limbs = self._limbs
         wanted = rotated(self._stand, *self._polygon.nearest(self._direction()))
-        target = rotated(limbs.frames[self._base], *wanted)
+        target = rotated(limbs.frame(self._base), *wanted)
         for _ in range(SWEEPS):
             aims = Aims()
-            aims.add(self._limb, rotated(limbs.frames[self._limb], *self._local), target, direction=True)
+            aims.add(self._limb, rotated(limbs.frame(self._limb), *self._local), target, direction=True)
             sweep(limbs, aims, aims.plan(limbs, self.nodes))
             limbs.forward()
             if self._polygon.contains(self._direction()):
                 return
 
-    def _retreat(self, last: list[float]) -> None:
+    def _retreat(self, last: Array) -> None:
         """Move from the last values inside as far towards the present ones as the cone allows."""
-        values = self._limbs.values
-        wanted = [values[node] for node in self.nodes]
+        wanted = self._limbs.values[self._rows]
         inside, outside = 0.0, 1.0
         for _ in range(HALVINGS):
             middle = 0.5 * (inside + outside)
@@ -165,9 +169,8 @@ class ConeGuard:
                 outside = middle
         self._blend(last, wanted, inside)
 
-    def _blend(self, first: list[float], second: list[float], share: float) -> None:
-        for node, a, b in zip(self.nodes, first, second, strict=True):
-            self._limbs.values[node] = a + share * (b - a)
+    def _blend(self, first: Array, second: Array, share: float) -> None:
+        self._limbs.values[self._rows] = first + share * (second - first)
         self._limbs.forward()
 
 

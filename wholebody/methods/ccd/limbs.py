@@ -1,51 +1,29 @@
-"""Kinematics of some joints of a figure on plain floats.
+"""Kinematics of some joints of a figure, as compiled loops.
 
-Cyclic coordinate descent turns one joint at a time, so arrays would not make its inner loop faster: on vectors of
-three, a call into numpy costs more than all the arithmetic. Joints are nodes of a tree, in the model's order (a chain
-is a tree without branches); a fixed transform between two nodes is part of the later node's placement.
+Cyclic coordinate descent turns one joint at a time: on vectors of three, a call into numpy costs more than all the
+arithmetic. Joints are nodes of a tree, in the model's order (a chain is a tree without branches); what lies between two
+nodes and does not move is a part of the later node's placement.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 from math import atan2, cos, inf, sin
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.methods.ccd import limbs_kernel
+from wholebody.methods.ccd.limbs_kernel import OBLIQUE, SLIDE, X, Y, Z
 
-Placement = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
-Line = tuple[float, float, float, float, float, float]
+Placement = tuple[float, ...]
+"""Twelve floats: the rotation row by row, then the translation."""
 
 WORLD: Placement = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-X, Y, Z, OBLIQUE, SLIDE = range(5)
-"""Kinds of joints: revolute about an axis of their own frame, revolute about another axis, or prismatic."""
-
 SAME = 1e-12  # an axis or a rotation nearer than this to a simple one is replaced by the simple one
-
-
-class Node(NamedTuple):
-    """One joint.
-
-    Attributes:
-        parent: index of its parent node; -1 is the world.
-        turn: rotation from the parent, row by row, or None for the identity.
-        x, y, z: translation from the parent, metres.
-        kind: X, Y, Z, OBLIQUE or SLIDE.
-        sign: -1 if the joint turns about the negative axis.
-        axis: unit axis in the joint's own frame.
-    """
-
-    parent: int
-    turn: tuple[float, ...] | None
-    x: float
-    y: float
-    z: float
-    kind: int
-    sign: float
-    axis: tuple[float, float, float]
 
 
 class Limbs:
@@ -53,11 +31,16 @@ class Limbs:
 
     Attributes:
         joints: Pinocchio's index of each node's joint, ascending.
-        values: radians or metres, one a node; change them and call `forward`.
-        lower, upper: limits of each node; infinite for no limit.
-        frames: after `forward`: placement of each node in the world, rotation row by row, then translation; the last
-            entry is the world itself.
-        lines: after `forward`: unit axis and origin of each node in the world.
+        values: (n,) radians or metres, one a node; change them and call `forward`.
+        lower, upper: (n,) limits of each node; infinite for no limit.
+        frames: (n + 1, 12) after `forward`: placement of each node in the world, rotation row by row, then translation;
+            the last row is the world itself.
+        lines: (n, 6) after `forward`: unit axis and origin of each node in the world.
+        parents: (n,) parent node of each; -1 is the world.
+        places: (n, 12) placement of each in its parent's frame before it moves, as in `frames`.
+        kinds: (n,) X, Y, Z, OBLIQUE or SLIDE of `limbs_kernel`.
+        signs: (n,) -1 where a joint turns about the negative axis.
+        axes: (n, 3) unit axis in the joint's own frame.
         paths: for each node, the nodes that move it, including itself, from the tip inwards.
     """
 
@@ -72,27 +55,31 @@ class Limbs:
         self.joints = tuple(sorted(set(joints)))
         self.node_of = {joint: node for node, joint in enumerate(self.joints)}
         count = len(self.joints)
-        self.values = [0.0] * count
-        self.lower, self.upper = [-inf] * count, [inf] * count
-        self.frames: list[Placement] = [WORLD] * (count + 1)
-        self.lines: list[Line] = [(0.0, 0.0, 1.0, 0.0, 0.0, 0.0)] * count
-        parents = [self.carrier(model.parents[joint]) for joint in self.joints]
+        self._kernel = compiled_kernel()
+        self.values, self.lower, self.upper = np.zeros(count), np.full(count, -inf), np.full(count, inf)
+        self.frames, self.lines = np.tile(np.array(WORLD), (count + 1, 1)), np.zeros((count, 6))
+        self.parents = np.array([self.carrier(model.parents[joint]) for joint in self.joints], dtype=np.intp)
         self.paths: list[tuple[int, ...]] = []
-        for node, parent in enumerate(parents):
+        for node, parent in enumerate(self.parents.tolist()):
             self.paths.append((node, *self.paths[parent]) if parent >= 0 else (node,))
-        self._nodes: list[Node] = []
-        self._loose: list[int] = []
+        kinds = [_kind(model.joints[joint]) for joint in self.joints]
+        self.kinds = np.array([kind for kind, _, _ in kinds], dtype=np.intp)
+        self.signs = np.array([sign for _, sign, _ in kinds], dtype=float)
+        self.axes = np.array([axis for _, _, axis in kinds], dtype=float).reshape(-1, 3)
+        self.places = np.tile(np.array(WORLD), (count, 1))
+        self._first = np.array([model.joints[joint].idx_q for joint in self.joints], dtype=np.intp)
+        wide = np.array([model.joints[joint].nq == 2 for joint in self.joints], dtype=bool)
+        self._plain, self._wide = np.flatnonzero(~wide), np.flatnonzero(wide).tolist()  # one value, or cosine and sine
+        self._plain_q = self._first[self._plain]
+        self.lower[self._plain] = np.array(model.lowerPositionLimit)[self._plain_q]
+        self.upper[self._plain] = np.array(model.upperPositionLimit)[self._plain_q]
+        self._loose: list[tuple[int, int, int]] = []  # node, joint it hangs on, and that of its parent node or -1
         for node, joint in enumerate(self.joints):
-            kind, sign, axis = _kind(model.joints[joint])
-            self._nodes.append(_placed(Node(parents[node], None, 0.0, 0.0, 0.0, kind, sign, axis), WORLD))
-            place, parent = model.joints[joint], self.joints[parents[node]] if parents[node] >= 0 else 0
-            if place.nq == 1:
-                self.lower[node] = float(model.lowerPositionLimit[place.idx_q])
-                self.upper[node] = float(model.upperPositionLimit[place.idx_q])
-            if parent and parent == model.parents[joint]:
-                self._nodes[node] = _placed(self._nodes[node], floats(model.jointPlacements[joint]))
+            above, parent = int(model.parents[joint]), int(self.parents[node])
+            if parent >= 0 and self.joints[parent] == above:
+                self.places[node] = _settled(floats(model.jointPlacements[joint]))
             else:
-                self._loose.append(node)
+                self._loose.append((node, above, self.joints[parent] if parent >= 0 else -1))
 
     def carrier(self, joint: int) -> int:
         """Node that moves a joint of the model: its own, or the nearest towards the root; -1 if none does."""
@@ -104,78 +91,50 @@ class Limbs:
 
     def read(self, q: Array, data: Any) -> None:
         """Read values from a posture q (nq,), and placements of other joints from `data` at the same posture."""
-        for node, joint in enumerate(self.joints):
-            place = self.model.joints[joint]
-            first = place.idx_q
-            self.values[node] = float(q[first]) if place.nq == 1 else atan2(float(q[first + 1]), float(q[first]))
-        for node in self._loose:
-            joint, parent = self.joints[node], self._nodes[node].parent
-            base = data.oMi[int(self.model.parents[joint])] * self.model.jointPlacements[joint]
+        self.values[self._plain] = q[self._plain_q]
+        for node in self._wide:
+            first = self._first[node]
+            self.values[node] = atan2(float(q[first + 1]), float(q[first]))
+        for node, above, parent in self._loose:
+            base = data.oMi[above] * self.model.jointPlacements[self.joints[node]]
             if parent >= 0:
-                base = data.oMi[self.joints[parent]].actInv(base)
-            self._nodes[node] = _placed(self._nodes[node], floats(base))
+                base = data.oMi[parent].actInv(base)
+            self.places[node] = _settled(floats(base))
 
     def write(self, q: Array) -> None:
         """Write the values into a posture q (nq,), in place."""
-        for node, joint in enumerate(self.joints):
-            place = self.model.joints[joint]
-            value = self.values[node]
-            if place.nq == 1:
-                q[place.idx_q] = value
-            else:
-                q[place.idx_q], q[place.idx_q + 1] = cos(value), sin(value)
+        q[self._plain_q] = self.values[self._plain]
+        for node in self._wide:
+            first, value = self._first[node], float(self.values[node])
+            q[first], q[first + 1] = cos(value), sin(value)
 
     def forward(self) -> None:
         """Compute `frames` and `lines` from `values`."""
-        frames, lines, values = self.frames, self.lines, self.values
-        for k, (parent, turn, px, py, pz, kind, sign, axis) in enumerate(self._nodes):
-            a, b, c, d, e, f, g, h, i, x, y, z = frames[parent]
-            x += a * px + b * py + c * pz
-            y += d * px + e * py + f * pz
-            z += g * px + h * py + i * pz
-            if turn is not None:
-                A, B, C, D, E, F, G, H, J = turn
-                a, b, c = a * A + b * D + c * G, a * B + b * E + c * H, a * C + b * F + c * J
-                d, e, f = d * A + e * D + f * G, d * B + e * E + f * H, d * C + e * F + f * J
-                g, h, i = g * A + h * D + i * G, g * B + h * E + i * H, g * C + h * F + i * J
-            value = sign * values[k]
-            if kind == Y:
-                co, si = cos(value), sin(value)
-                lines[k] = (sign * b, sign * e, sign * h, x, y, z)
-                frames[k] = (
-                    co * a - si * c, b, si * a + co * c, co * d - si * f, e, si * d + co * f,
-                    co * g - si * i, h, si * g + co * i, x, y, z,
-                )  # fmt: skip
-            elif kind == X:
-                co, si = cos(value), sin(value)
-                lines[k] = (sign * a, sign * d, sign * g, x, y, z)
-                frames[k] = (
-                    a, co * b + si * c, co * c - si * b, d, co * e + si * f, co * f - si * e,
-                    g, co * h + si * i, co * i - si * h, x, y, z,
-                )  # fmt: skip
-            elif kind == Z:
-                co, si = cos(value), sin(value)
-                lines[k] = (sign * c, sign * f, sign * i, x, y, z)
-                frames[k] = (
-                    co * a + si * b, co * b - si * a, c, co * d + si * e, co * e - si * d, f,
-                    co * g + si * h, co * h - si * g, i, x, y, z,
-                )  # fmt: skip
-            else:
-                u, v, w = axis
-                ux, uy, uz = a * u + b * v + c * w, d * u + e * v + f * w, g * u + h * v + i * w
-                if kind == SLIDE:
-                    x, y, z = x + value * ux, y + value * uy, z + value * uz
-                    frames[k] = (a, b, c, d, e, f, g, h, i, x, y, z)
-                else:
-                    a, d, g = turned(ux, uy, uz, cos(value), sin(value), a, d, g)
-                    b, e, h = turned(ux, uy, uz, cos(value), sin(value), b, e, h)
-                    c, f, i = turned(ux, uy, uz, cos(value), sin(value), c, f, i)
-                    frames[k] = (a, b, c, d, e, f, g, h, i, x, y, z)
-                lines[k] = (ux, uy, uz, x, y, z)
+        self._kernel.forward(
+            self.parents, self.places, self.kinds, self.signs, self.axes, self.values, self.frames, self.lines
+        )
+
+    def frame(self, node: int) -> Placement:
+        """Placement of a node after `forward`, -1 being the world, as twelve floats."""
+        return tuple(self.frames[node].tolist())
 
     def slides(self, node: int) -> bool:
         """Whether a node is prismatic."""
-        return self._nodes[node].kind == SLIDE
+        return bool(self.kinds[node] == SLIDE)
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or loaded from the cache; called before a solve, not during it."""
+    none, places = np.zeros(0), np.zeros(0, dtype=np.intp)
+    three, six, twelve = np.zeros((0, 3)), np.zeros((0, 6)), np.zeros((0, 12))
+    limbs_kernel.forward(places, twelve, places, none, three, none, twelve, six)
+    limbs_kernel.sweep(six, places, none, none, none, three, three, none, places, places, places, places)
+    limbs_kernel.distance(three, three, none)
+    points = np.zeros(0, dtype=bool)
+    limbs_kernel.carry(twelve, places, three, points, three)
+    limbs_kernel.greatest_error(three, three, points)
+    return limbs_kernel
 
 
 def movable(model: pin.Model, joint: int) -> bool:
@@ -210,22 +169,10 @@ def seen_from(frame: Placement, x: float, y: float, z: float) -> tuple[float, fl
     return a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
 
 
-def turned(
-    ux: float, uy: float, uz: float, co: float, si: float, x: float, y: float, z: float
-) -> tuple[float, float, float]:
-    """A vector turned about a unit axis u (Rodrigues)."""
-    along = (1.0 - co) * (ux * x + uy * y + uz * z)
-    return (
-        co * x + si * (uy * z - uz * y) + along * ux,
-        co * y + si * (uz * x - ux * z) + along * uy,
-        co * z + si * (ux * y - uy * x) + along * uz,
-    )
-
-
-def _placed(node: Node, placement: Placement) -> Node:
-    turn = placement[:9]
-    near = max(abs(value - plain) for value, plain in zip(turn, WORLD[:9], strict=True)) < SAME
-    return node._replace(turn=None if near else turn, x=placement[9], y=placement[10], z=placement[11])
+def _settled(placement: Placement) -> Placement:
+    """The placement without a rotation that is none but for rounding."""
+    near = max(abs(value - plain) for value, plain in zip(placement[:9], WORLD[:9], strict=True)) < SAME
+    return (*WORLD[:9], *placement[9:]) if near else placement
 
 
 def _kind(joint: Any) -> tuple[int, float, tuple[float, float, float]]:

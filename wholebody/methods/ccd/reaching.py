@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import acos, inf, pi
+from math import inf, pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,12 +12,13 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.methods.ccd.cones import guards
-from wholebody.methods.ccd.limbs import Limbs, Placement, floats, moved, rotated
+from wholebody.methods.ccd.limbs import Limbs, Placement, compiled_kernel, floats, moved, rotated
 from wholebody.methods.ccd.sweep import Aims, sweep
 from wholebody.methods.ccd.terms import Request, Wish
 from wholebody.methods.control import Control
 
 LEVER = 0.3  # m per radian: weight of orientation against position; about the length of a forearm
+NOWHERE = (0.0, 0.0, 0.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 WINDOW = 25  # sweeps over which progress is judged: near a goal convergence is linear, and sometimes slow
 PROGRESS = 0.97  # the descent ends if a window leaves more than this share of the error
@@ -31,15 +32,46 @@ class Reached(NamedTuple):
     rested: bool
 
 
-class _Aim(NamedTuple):
-    """One goal: its node, the point and axes in the node's frame, their targets, and its index in the aims."""
+class _Goals:
+    """The points and axes of all goals with their targets, each in the frame of the node that carries it.
 
-    node: int
-    local: tuple[float, float, float]
-    place: tuple[float, float, float] | None
-    axes: tuple[tuple[float, float, float], ...]
-    wanted: tuple[tuple[float, float, float], ...]
-    weight: float
+    A goal's place comes first, then its three axes. Places have the weight of their goal, axes half of it: the squared
+    distances of three axes from themselves turned by a small angle add up to twice its square.
+
+    Attributes:
+        aims: as sweeps take them.
+    """
+
+    def __init__(self, model: Any, limbs: Limbs, data: Any, wishes: Sequence[Wish]) -> None:
+        """Take the wishes, with joints that these limbs do not move where `data` has them."""
+        self.aims, self._frames, self._kernel = Aims(), limbs.frames, compiled_kernel()
+        nodes, local = [], []
+        for wish in wishes:
+            frame = model.frames[wish.frame]
+            joint = int(frame.parentJoint)
+            node, placed = limbs.carrier(joint), data.oMi[joint] * frame.placement
+            at = data.oMi[limbs.joints[node]].actInv(placed) if node >= 0 else pin.SE3.Identity()
+            stand: Placement = floats(at)
+            if wish.place is not None:
+                nodes.append(node)
+                local.append(moved(stand, *wish.offset))
+                self.aims.add(node, NOWHERE, wish.place, weight=wish.weight)
+            if wish.rotation is not None:
+                for axis, wanted in zip(AXES, wish.rotation.T, strict=True):
+                    nodes.append(node)
+                    local.append(rotated(stand, *axis))
+                    self.aims.add(node, NOWHERE, wanted, weight=0.5 * LEVER * LEVER * wish.weight, direction=True)
+        self._nodes, self._local = np.array(nodes, dtype=np.intp), np.array(local, dtype=float).reshape(-1, 3)
+        self._points = self.aims.points
+
+    def carry(self) -> None:
+        """Update the present values."""
+        self._kernel.carry(self._frames, self._nodes, self._local, self._points, self.aims.here)
+
+    @property
+    def error(self) -> float:
+        """Largest remaining distance or angle."""
+        return float(self._kernel.greatest_error(self.aims.here, self.aims.there, self._points))
 
 
 class Reach:
@@ -63,12 +95,12 @@ class Reach:
         for guard in self._guards:
             guard.read(self._data)
             guard.keep()
-        goals = [_aim(self._model, limbs, self._data, wish) for wish in self._request.wishes]
-        aims = _aims(goals)
-        self._carry(aims, goals)
+        goals = _Goals(self._model, limbs, self._data, self._request.wishes)
+        goals.carry()
+        aims = goals.aims
         steps = aims.plan(limbs)
-        error, last = _error(aims, goals), inf
-        sweeps, rested = 0, not steps
+        error, last = goals.error, inf
+        sweeps, rested = 0, not len(steps.nodes)
         while error > tolerance and sweeps < most and not rested and not self._control.over:
             if sweeps % WINDOW == 0:
                 rested = error > PROGRESS * last
@@ -79,8 +111,8 @@ class Reach:
             limbs.forward()
             for guard in self._guards:
                 guard.keep()
-            self._carry(aims, goals)
-            error = _error(aims, goals)
+            goals.carry()
+            error = goals.error
             sweeps += 1
             rested = change < 1e-9
         limbs.write(q)
@@ -98,67 +130,9 @@ class Reach:
         limbs = self.limbs
         pin.forwardKinematics(self._model, self._data, q)
         limbs.read(q, self._data)
-        for node, value in enumerate(limbs.values):
+        for node, value in enumerate(limbs.values.tolist()):
             low, high = max(limbs.lower[node], -pi), min(limbs.upper[node], pi)
             new = float(rng.uniform(low, high)) if size == inf else value + size * float(rng.normal())
             limbs.values[node] = min(max(new, limbs.lower[node]), limbs.upper[node])
         limbs.write(q)
         return q
-
-    def _carry(self, aims: Aims, goals: Sequence[_Aim]) -> None:
-        """Write the present positions of the points and axes."""
-        k = 0
-        for goal in goals:
-            frame = self.limbs.frames[goal.node]
-            if goal.place is not None:
-                aims.here[k] = moved(frame, *goal.local)
-                k += 1
-            for axis in goal.axes:
-                aims.here[k] = rotated(frame, *axis)
-                k += 1
-
-
-def _aim(model: Any, limbs: Limbs, data: Any, wish: Wish) -> _Aim:
-    frame = model.frames[wish.frame]
-    joint = int(frame.parentJoint)
-    node = limbs.carrier(joint)
-    at = data.oMi[limbs.joints[node]].actInv(data.oMi[joint] * frame.placement) if node >= 0 else pin.SE3.Identity()
-    local: Placement = floats(at)
-    axes = wanted = ()
-    if wish.rotation is not None:
-        axes = tuple(rotated(local, *axis) for axis in AXES)  # type: ignore[assignment]
-        wanted = tuple(tuple(column) for column in wish.rotation.T.tolist())  # type: ignore[assignment]
-    return _Aim(node, moved(local, *wish.offset), wish.place, axes, wanted, wish.weight)
-
-
-def _aims(goals: Sequence[_Aim]) -> Aims:
-    """Points with the weight of their goal, axes with half of it.
-
-    Rotating three axes by a small angle gives squared distances whose sum is twice the square of the angle.
-    """
-    aims, nowhere = Aims(), (0.0, 0.0, 0.0)
-    for goal in goals:
-        if goal.place is not None:
-            aims.add(goal.node, nowhere, goal.place, weight=goal.weight)
-        for wanted in goal.wanted:
-            aims.add(goal.node, nowhere, wanted, weight=0.5 * LEVER * LEVER * goal.weight, direction=True)
-    return aims
-
-
-def _error(aims: Aims, goals: Sequence[_Aim]) -> float:
-    """Largest remaining distance or angle."""
-    worst, k = 0.0, 0
-    for goal in goals:
-        if goal.place is not None:
-            (x, y, z), (tx, ty, tz) = aims.here[k], goal.place
-            worst = max(worst, ((x - tx) ** 2 + (y - ty) ** 2 + (z - tz) ** 2) ** 0.5)
-            k += 1
-        if goal.axes:
-            square = 0.0
-            for n, wanted in enumerate(goal.wanted):
-                here = aims.here[k + n]
-                square += sum((a - b) ** 2 for a, b in zip(here, wanted, strict=True))
-            # the sum over the three axes is 4 (1 - cos angle) = 8 sin^2(angle / 2)
-            worst = max(worst, acos(max(-1.0, 1.0 - square / 4.0)))
-            k += 3
-    return worst

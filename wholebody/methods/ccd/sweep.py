@@ -15,51 +15,71 @@ Inverse Kinematics Problem of Mechanical Manipulators, IEEE Transactions on Robo
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import atan2, ceil, cos, floor, hypot, inf, pi, sin
+from functools import lru_cache
+from typing import NamedTuple
 
-from wholebody.methods.ccd.limbs import Limbs
+import numpy as np
 
-TURN = 2.0 * pi
-FLAT = 1e-12  # m^2: below this a joint cannot change the distances, and the angle would be rounding error
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.methods.ccd.limbs import Limbs, compiled_kernel
+
+Vector = Sequence[float]
+
+
+class Plan(NamedTuple):
+    """Which nodes have their turns in a sweep, and what each moves.
+
+    Attributes:
+        nodes: (s,) nodes in the order of their turns.
+        first: (s + 1,) where in `moved` each of them begins.
+        moved: aims that each moves, points before directions.
+        points: (s,) how many of these are points.
+    """
+
+    nodes: Indices
+    first: Indices
+    moved: Indices
+    points: Indices
+
+    @classmethod
+    def of(cls, steps: Sequence[tuple[int, Sequence[int], int]]) -> Plan:
+        """From steps: (node, what it moves, how many of these are points)."""
+        moved = [k for _, mine, _ in steps for k in mine]
+        first = np.concatenate([[0], np.cumsum([len(mine) for _, mine, _ in steps])])
+        parts = ([node for node, _, _ in steps], first, moved, [points for _, _, points in steps])
+        return cls(*(np.array(part, dtype=np.intp) for part in parts))
+
+
+@lru_cache(maxsize=256)
+def moving_all(nodes: tuple[int, ...], aims: int, points: int) -> Plan:
+    """The plan in which each of these nodes, in this order, moves all aims, of which the first are points."""
+    return Plan.of([(node, range(aims), points) for node in nodes])
 
 
 class Aims:
     """Points and directions carried by nodes, with their targets.
 
     Attributes:
-        here: their present values, three floats each.
-        there: their targets.
-        weights: factor on each squared distance.
+        here: (m, 3) their present values.
+        there: (m, 3) their targets.
+        weights: (m,) factor on each squared distance.
     """
 
     def __init__(self) -> None:
         """Make an empty set."""
-        self.here: list[tuple[float, float, float]] = []
-        self.there: list[tuple[float, float, float]] = []
-        self.weights: list[float] = []
+        self.here, self.there, self.weights = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
         self._nodes: list[int] = []
         self._direction: list[bool] = []
 
-    def add(
-        self,
-        node: int,
-        here: tuple[float, float, float],
-        there: tuple[float, float, float],
-        *,
-        weight: float = 1.0,
-        direction: bool = False,
-    ) -> None:
-        """Add a point, or a direction, of a node with its target; both in the world."""
-        self.here.append(here)
-        self.there.append(there)
-        self.weights.append(weight)
+    def add(self, node: int, here: Vector, there: Vector, *, weight: float = 1.0, direction: bool = False) -> None:
+        """Add a point, or a direction, of a node with its target; both (3,) in the world."""
+        self.here, self.there = np.vstack([self.here, here]), np.vstack([self.there, there])
+        self.weights = np.append(self.weights, weight)
         self._nodes.append(node)
         self._direction.append(direction)
 
-    def plan(self, limbs: Limbs, nodes: Iterable[int] | None = None) -> list[tuple[int, tuple[int, ...], int]]:
-        """Nodes that move an aim, from the tips inwards: (node, aims that it moves, number of points among them).
-
-        In the aims of a node, points come before directions.
+    def plan(self, limbs: Limbs, nodes: Iterable[int] | None = None) -> Plan:
+        """Nodes that move an aim, from the tips inwards.
 
         Args:
             limbs: the limbs of the nodes.
@@ -73,17 +93,24 @@ class Aims:
             arrows = [k for k in mine if self._direction[k]]
             if points or (arrows and not limbs.slides(node)):
                 steps.append((node, (*points, *arrows), len(points)))
-        return steps
+        return Plan.of(steps)
+
+    @property
+    def points(self) -> Mask:
+        """(m,) which are points."""
+        return ~np.array(self._direction, dtype=bool)
 
     def distance(self) -> float:
         """Root of the weighted sum of squared remaining distances."""
-        total = 0.0
-        for (x, y, z), (tx, ty, tz), weight in zip(self.here, self.there, self.weights, strict=True):
-            total += weight * ((tx - x) ** 2 + (ty - y) ** 2 + (tz - z) ** 2)
-        return float(total**0.5)
+        return distance(self.here, self.there, self.weights)
 
 
-def sweep(limbs: Limbs, aims: Aims, steps: Sequence[tuple[int, tuple[int, ...], int]]) -> float:
+def distance(here: Array, there: Array, weights: Array) -> float:
+    """Root of the sum of squared distances between (m, 3) and (m, 3), with weights (m,)."""
+    return float(compiled_kernel().distance(here, there, weights))
+
+
+def sweep(limbs: Limbs, aims: Aims, plan: Plan) -> float:
     """Give each joint its best value, within its limits, and move the aims with it.
 
     When a joint is processed, the joints farther out have moved, but its axis has not, so only the aims are updated: a
@@ -92,81 +119,13 @@ def sweep(limbs: Limbs, aims: Aims, steps: Sequence[tuple[int, tuple[int, ...], 
     Returns:
         The largest change of a joint, radians or metres.
     """
-    here, there, weights = aims.here, aims.there, aims.weights
-    lines, values, lower, upper = limbs.lines, limbs.values, limbs.lower, limbs.upper
-    largest = 0.0
-    for node, mine, points in steps:
-        ux, uy, uz, ox, oy, oz = lines[node]
-        if limbs.slides(node):
-            change = _slide(limbs, aims, node, mine, points)
-            largest = max(largest, abs(change))
-            continue
-        cosine = sine = size = 0.0
-        for n, k in enumerate(mine):
-            x, y, z = here[k]
-            tx, ty, tz = there[k]
-            if n < points:
-                x -= ox
-                y -= oy
-                z -= oz
-                tx -= ox
-                ty -= oy
-                tz -= oz
-            weight = weights[k]
-            cosine += weight * (x * tx + y * ty + z * tz - (ux * x + uy * y + uz * z) * (ux * tx + uy * ty + uz * tz))
-            sine += weight * (tx * (uy * z - uz * y) + ty * (uz * x - ux * z) + tz * (ux * y - uy * x))
-            size += weight
-        if hypot(cosine, sine) <= FLAT * size:
-            continue
-        old = values[node]
-        new = old + atan2(sine, cosine)
-        if not lower[node] <= new <= upper[node]:
-            new = within(new, lower[node], upper[node])
-        change = new - old
-        if change == 0.0:
-            continue
-        values[node] = new
-        largest = max(largest, abs(change))
-        co, si = cos(change), sin(change)
-        for n, k in enumerate(mine):
-            x, y, z = here[k]
-            if n < points:
-                x -= ox
-                y -= oy
-                z -= oz
-            along = (1.0 - co) * (ux * x + uy * y + uz * z)
-            px = co * x + si * (uy * z - uz * y) + along * ux
-            py = co * y + si * (uz * x - ux * z) + along * uy
-            pz = co * z + si * (ux * y - uy * x) + along * uz
-            here[k] = (px + ox, py + oy, pz + oz) if n < points else (px, py, pz)
-    return largest
+    return carried(limbs, aims.here, aims.there, aims.weights, plan)
 
 
-def within(best: float, lower: float, upper: float) -> float:
-    """The allowed angle nearest to the best one on the circle: the same after whole turns, or the nearer limit.
-
-    The objective A cos + B sin, which is maximised, decreases with the angular distance from the best angle.
-    """
-    turns = ceil((lower - best) / TURN) if lower > -inf else floor((upper - best) / TURN)
-    angle = best + TURN * turns
-    if lower <= angle <= upper:
-        return angle
-    return lower if cos(lower - best) >= cos(upper - best) else upper
-
-
-def _slide(limbs: Limbs, aims: Aims, node: int, mine: tuple[int, ...], points: int) -> float:
-    """The best displacement of a prismatic joint: the mean distance of its points from their targets along it."""
-    ux, uy, uz, _, _, _ = limbs.lines[node]
-    total = weight = 0.0
-    for k in mine[:points]:
-        (x, y, z), (tx, ty, tz) = aims.here[k], aims.there[k]
-        total += aims.weights[k] * (ux * (tx - x) + uy * (ty - y) + uz * (tz - z))
-        weight += aims.weights[k]
-    old = limbs.values[node]
-    new = min(max(old + total / weight, limbs.lower[node]), limbs.upper[node])
-    limbs.values[node] = new
-    change = new - old
-    for k in mine[:points]:
-        x, y, z = aims.here[k]
-        aims.here[k] = (x + change * ux, y + change * uy, z + change * uz)
-    return change
+def carried(limbs: Limbs, here: Array, there: Array, weights: Array, plan: Plan) -> float:
+    """The same for aims as arrays: (m, 3), which is carried along in place, (m, 3) and (m,)."""
+    return float(
+        compiled_kernel().sweep(
+            limbs.lines, limbs.kinds, limbs.values, limbs.lower, limbs.upper, here, there, weights, *plan
+        )
+    )

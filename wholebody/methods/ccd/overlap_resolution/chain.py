@@ -11,7 +11,7 @@ from wholebody.arrays import Array
 from wholebody.methods.ccd.cones import guards
 from wholebody.methods.ccd.limbs import Limbs, moved, rotated, seen_from
 from wholebody.methods.ccd.overlap_resolution.links import Link, LinkFinder, Overlap, Vector
-from wholebody.methods.ccd.sweep import Aims, sweep
+from wholebody.methods.ccd.sweep import carried, distance, moving_all
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
 
@@ -20,6 +20,7 @@ CLOSE = 1e-4  # m: a goal nearer than this is reached
 SWEEPS = 5  # for one goal; it is computed anew afterwards, so more sweeps waste time
 SLOW = 0.9  # a sweep that leaves more than this share of the distance is the last one
 PARALLEL = 0.26  # sine of 15 degrees: a bone at a smaller angle to the obstacle's surface is nearly parallel to it
+ALIKE = np.ones(3)  # weights of axes, and of a point, that count alike
 SHORT = 0.02  # m: a link shorter than this has no meaningful direction
 
 
@@ -121,34 +122,29 @@ class ChainResolver:
         """Cyclic coordinate descent that moves a point of a node by a vector."""
         limbs = self.limbs
         goal = (effector[0] + push[0], effector[1] + push[1], effector[2] + push[2])
-        frame = limbs.frames[node]
+        frame = limbs.frame(node)
         local = seen_from(frame, effector[0] - frame[9], effector[1] - frame[10], effector[2] - frame[11])
-        aims = Aims()
-        aims.add(node, effector, goal)
-        steps = [(k, (0,), 1) for k in nodes]
-        left = aims.distance()
+        here, there, plan = np.array([effector]), np.array([goal]), moving_all(tuple(nodes), 1, 1)
+        left = distance(here, there, ALIKE[:1])
         for _ in range(SWEEPS):
-            sweep(limbs, aims, steps)
+            carried(limbs, here, there, ALIKE[:1], plan)
             limbs.forward()
             self.keep_cones()
-            aims.here[0] = moved(limbs.frames[node], *local)
-            before, left = left, aims.distance()
+            here[0] = moved(limbs.frame(node), *local)
+            before, left = left, distance(here, there, ALIKE[:1])
             if left < CLOSE or left > SLOW * before:
                 return
 
     def _translate(self, link: Link, push: Vector, inner: Sequence[int]) -> None:
         """Move the link by pure translation: its joint's origin moves, and its own joints keep its orientation."""
         limbs = self.limbs
-        own = [node for node in link.nodes if node not in inner]
-        before = limbs.frames[link.node]
-        first = limbs.frames[own[-1]]
+        own = tuple(node for node in link.nodes if node not in inner)
+        first = limbs.frame(own[-1])
+        there = _columns(limbs.frames[link.node]).copy()
         self._reach_out(inner[0], inner, (first[9], first[10], first[11]), push)
-        axes = [rotated(before, *axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+        plan = moving_all(own, 3, 0)
         for _ in range(SWEEPS):
-            frame, aims = limbs.frames[link.node], Aims()
-            for k, wanted in enumerate(axes):
-                aims.add(link.node, (frame[k], frame[3 + k], frame[6 + k]), wanted, direction=True)
-            change = sweep(limbs, aims, [(node, (0, 1, 2), 0) for node in own])
+            change = carried(limbs, _columns(limbs.frames[link.node]).copy(), there, ALIKE, plan)
             limbs.forward()
             if change < CLOSE:
                 break
@@ -161,17 +157,22 @@ class ChainResolver:
 
     def _parallel(self, link: Link, push: Vector) -> bool:
         """Whether the link's bone is nearly parallel to the obstacle's surface."""
-        frames = self.limbs.frames
-        here = frames[link.node]
+        here = self.limbs.frame(link.node)
         after = [node for node in self._bearing if node > link.node]
         if after:
-            x, y, z = (frames[after[0]][k] - here[k] for k in (9, 10, 11))
+            there = self.limbs.frame(after[0])
+            x, y, z = (there[k] - here[k] for k in (9, 10, 11))
         else:
             x, y, z = rotated(here, *self._tip)
         bone = (x * x + y * y + z * z) ** 0.5
         length = (push[0] ** 2 + push[1] ** 2 + push[2] ** 2) ** 0.5
         along = abs(x * push[0] + y * push[1] + z * push[2])
         return bool(bone > SHORT and along < PARALLEL * bone * length)
+
+
+def _columns(frame: Array) -> Array:
+    """(3, 3) axes of a row of `Limbs.frames`, one a row."""
+    return np.asarray(frame[:9].reshape(3, 3).T)
 
 
 def _three(vector: Any) -> Vector:

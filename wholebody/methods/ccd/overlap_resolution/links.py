@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.geometry.penetration import global_depth
 from wholebody.geometry.separation import least_separation
 from wholebody.methods.ccd.limbs import Limbs
 from wholebody.workspace import Workspace
@@ -128,11 +127,15 @@ class LinkFinder:
             overlap, is_a = group[0]
             size = -overlap.depth if is_a else overlap.depth
             return size * overlap.normal[0], size * overlap.normal[1], size * overlap.normal[2]
-        depths = np.array([overlap.depth for overlap, _ in group])
-        normals = np.array([overlap.normal for overlap, _ in group])
-        normals[[is_a for _, is_a in group]] *= -1.0
-        x, y, z = global_depth(depths, normals).tolist()
-        if not self._exact or (x * x + y * y + z * z) ** 0.5 >= CANCELLED * float(depths.max()):
+        x = y = z = total = 0.0
+        for overlap, is_a in group:
+            square = overlap.depth * (-overlap.depth if is_a else overlap.depth)
+            x += square * overlap.normal[0]
+            y += square * overlap.normal[1]
+            z += square * overlap.normal[2]
+            total += overlap.depth
+        x, y, z = x / total, y / total, z / total
+        if not self._exact or (x * x + y * y + z * z) ** 0.5 >= CANCELLED * max(overlap.depth for overlap, _ in group):
             return x, y, z
         return self._separation(owner, group) or (x, y, z)
 
