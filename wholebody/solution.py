@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -43,6 +44,9 @@ class Solution:
         trace: one entry an iteration.
         method: name of the method and of what it used.
         message: one sentence for a reader.
+        programs: how many quadratic programs each closed, such as {"osqp": 1, "active set": 7}: the QP solver by its
+            name, the hot start as "active set", "semismooth newton" where neither did, and "not exact" where none did.
+            Empty for methods without programs.
     """
 
     q: Array
@@ -53,6 +57,7 @@ class Solution:
     trace: tuple[TraceEntry, ...] = field(repr=False)
     method: str
     message: str
+    programs: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def solved(self) -> bool:

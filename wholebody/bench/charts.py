@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from wholebody.bench.step import StepTime
 
 GREY = "#666666"
-THICK = "wholebody/osqp"  # drawn wide and first: with DAQP the same programs have the same answers, and would hide it
+THICK = "wholebody"  # drawn wide and first: with other solvers the same programs have the same answers, and hide it
 
 
 def step_times(times: Sequence[StepTime], path: Path) -> tuple[Path, Path]:
@@ -77,12 +77,12 @@ def reach_times(rows: Sequence[ReachRow], path: Path) -> tuple[Path, Path]:
     """Share of the random reaches that were answered within a time."""
     chart, axes = plot_style.figure(1, 1, (6.4, 3.4))
     axis = axes[0][0]
-    for solver in dict.fromkeys(row.solver for row in rows):
-        mine = [row for row in rows if row.solver == solver]
+    for method in dict.fromkeys(row.method for row in rows):
+        mine = [row for row in rows if row.method == method]
         times = np.sort([row.milliseconds for row in mine if row.status == "solved"])
         share = 100.0 * np.arange(1, len(times) + 1) / len(mine)
-        color = plot_style.COLORS.get(f"wholebody/{solver}", "#000000")
-        axis.step(times, share, where="post", color=color, linewidth=1.8, label=f"wholebody/{solver}")
+        color = plot_style.look(method).color
+        axis.step(times, share, where="post", color=color, linewidth=1.8, label=method)
     plot_style.plain_log(axis)
     axis.set_ylim(0.0, 103.0)
     axis.set_xlabel("time of a solve [ms]")

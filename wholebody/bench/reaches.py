@@ -14,9 +14,13 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.arrays import Array
+from wholebody.bench.adapters import adapters
+from wholebody.bench.closed import said
 from wholebody.bench.problem_sets.bodies import CLEARANCE, TIPS
 from wholebody.bench.problem_sets.clutter import THINGS, reach_among
 from wholebody.bench.report import render
+
+TOLERANCE = 1e-5  # m, rad: what methods are asked for
 
 
 @dataclass(frozen=True)
@@ -34,11 +38,12 @@ class ReachRow:
 
     Attributes:
         seed: what it was made from.
-        solver: of the QP method.
+        method: which, such as "qp" or "qp/osqp".
         status: as the method said.
         how: "directly", "by homotopy", "from another start", or the message of what was not solved.
         milliseconds: of the solve.
         iterations: of the method.
+        programs: what closed its quadratic programs, and how many.
         goal_error: distance left, as judged independently [m].
         penetration: deepest overlap, as judged [m].
         clearance_violation: by how much the worst pair misses its clearance, as judged [m].
@@ -49,11 +54,12 @@ class ReachRow:
     """
 
     seed: int
-    solver: str
+    method: str
     status: str
     how: str
     milliseconds: float
     iterations: int
+    programs: str
     goal_error: float
     penetration: float
     clearance_violation: float
@@ -79,19 +85,21 @@ def reach(seed: int, figure: wb.Figure | None = None) -> Reach:
     return Reach(seed, problem, witness)
 
 
-def solve_reach(seed: int, solver: str, figure: wb.Figure | None = None) -> ReachRow:
+def solve_reach(seed: int, method: str, figure: wb.Figure | None = None) -> ReachRow:
     """Make and solve one reach with a fresh method."""
     made = reach(seed, figure)
-    solution = wb.QP(solver=solver).solve(made.problem)
+    (adapter,) = adapters([method])
+    solution = adapter.make(TOLERANCE, None).solve(made.problem)
     judged = wb.assess(made.problem, solution.q)
     how = solution.message.removeprefix("solved ")
     return ReachRow(
         seed=seed,
-        solver=solver,
+        method=method,
         status=solution.status,
         how=how,
         milliseconds=1e3 * solution.seconds,
         iterations=solution.iterations,
+        programs=said(solution.programs),
         goal_error=judged.goal_error,
         penetration=judged.penetration,
         clearance_violation=judged.clearance_violation,
@@ -102,18 +110,18 @@ def solve_reach(seed: int, solver: str, figure: wb.Figure | None = None) -> Reac
     )
 
 
-def run(seeds: range, solver: str, jobs: int = 1) -> Iterator[ReachRow]:
+def run(seeds: range, method: str, jobs: int = 1) -> Iterator[ReachRow]:
     """Solve the reaches of these seeds, in processes of their own where `jobs` is more than one; in order."""
     if jobs <= 1:
         figure = wb.load("human")
         for seed in seeds:
-            yield solve_reach(seed, solver, figure)
+            yield solve_reach(seed, method, figure)
         return
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        yield from pool.map(solve_reach, seeds, [solver] * len(seeds), chunksize=4)
+        yield from pool.map(solve_reach, seeds, [method] * len(seeds), chunksize=4)
 
 
 def reaches_report(rows: Sequence[ReachRow], facts: Mapping[str, str], jobs: int) -> str:

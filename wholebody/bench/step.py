@@ -15,6 +15,7 @@ from wholebody.arrays import Array
 from wholebody.bench import track as setting
 from wholebody.bench.adapters import make_tool
 from wholebody.bench.adapters.base import Tool
+from wholebody.bench.closed import said
 from wholebody.bench.judge import Verdict, judge
 from wholebody.bench.report import render
 from wholebody.bench.track import CLEARANCE, Track
@@ -54,7 +55,7 @@ class StepRow:
         failures: steps for which the tool found no answer.
         rows: mean number of contact rows; nan where the tool does not tell.
         exact: share of steps whose program was solved to rounding; nan where it does not tell.
-        at_once: share of steps closed from the last active set, without the QP solver; nan where it does not tell.
+        programs: what closed its programs, and how many; empty where it does not tell.
     """
 
     reach: str
@@ -83,7 +84,7 @@ class StepRow:
     failures: int
     rows: float
     exact: float
-    at_once: float
+    programs: str
 
 
 @dataclass(frozen=True)
@@ -212,7 +213,7 @@ def _row(track: Track, name: str, runs: dict[str, list[_Run]], verdict: Verdict)
         failures=mine[0].tool.failures,
         rows=told.get("rows", float("nan")),
         exact=told.get("exact", float("nan")),
-        at_once=told.get("at_once", float("nan")),
+        programs=said(mine[0].tool.programs()),
     )
 
 
@@ -226,7 +227,7 @@ def goal_lines(rows: Sequence[StepRow]) -> list[str]:
     """What was to be reached and what was: one line for each of our solvers on each reach."""
     lines = []
     for row in rows:
-        if not row.tool.startswith("wholebody/") or row.reach not in JUDGED:
+        if not row.tool.startswith("wholebody") or row.reach not in JUDGED:
             continue
         asked = [
             ("median", row.ratio, 0.5, row.ratio <= 0.5),

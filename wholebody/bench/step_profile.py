@@ -12,9 +12,9 @@ from wholebody.bench.track import DT, Track
 WITHIN_STEP = 0.06  # m beyond the clearance: as far as a step of `QP` looks
 
 
-def linearise_us(track: Track, solver: str) -> tuple[float, float]:
+def linearise_us(track: Track) -> tuple[float, float]:
     """Median time of a whole step and of its linearisation alone, both of one run [us of the processor]."""
-    tool = WholebodyTool(track, solver)
+    tool = WholebodyTool(track)
     tool.step(track.targets[0])
     tool.reset(track.start)
     lineariser = tool.problem.lineariser(tool.problem.workspace(), DT)

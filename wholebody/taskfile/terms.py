@@ -147,7 +147,8 @@ METHODS = {
     "qp": Form(
         "Sequential quadratic programming.",
         (
-            Key("solver", kinds.Text(), 'QP solver: "osqp" (if left out), "daqp", or what `wholebody doctor` lists'),
+            Key("solver", kinds.Text(), 'QP solver: "osqp" if left out, "active_set", or one `wholebody doctor` lists'),
+            Key("hot_start", kinds.Flag(), "whether the last active set is tried before the solver; true if left out"),
             Key("tolerance", _number(TOLERANCE), "metres and radians to which goals are met; 1e-5 if left out"),
             Key("iterations", _number(ITERATIONS), "of one descent"),
             Key("budget", _number(BUDGET), "programs for further tries; 1000 if left out"),

@@ -34,6 +34,7 @@ class Record:
         cpu_seconds: the same of the processor [s].
         setup_seconds: to build a model of its own from the problem [s]; 0 for one that needs none.
         iterations: as the method counts them; of a frame, mean, where goals move.
+        programs: what closed its quadratic programs, and how many; empty for methods without, and where goals move.
         goal_error, goal_angle: left, as judged [m], [rad]; 95 % of the frames where goals move.
         penetration, clearance_violation, limit_violation, constraint_violation: as judged; the worst frame.
         measure, optimality: as judged; of the last frame.
@@ -56,6 +57,7 @@ class Record:
     cpu_seconds: float = inf
     setup_seconds: float = 0.0
     iterations: float = 0.0
+    programs: str = ""
     goal_error: float = inf
     goal_angle: float = inf
     penetration: float = inf

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, nan
 
+from wholebody.bench.closed import summed
 from wholebody.bench.compare.record import COARSE, FAILED, FINE, OVERTIME, REFUSED
 from wholebody.bench.compare.results import Results, effort_excess, middle
 
@@ -27,6 +28,7 @@ class Summary:
         cpu_median_ms: of the processor.
         setup_ms: to build a model of its own, median.
         iterations: median.
+        programs: what closed its quadratic programs, of all problems together.
         worst_median: median of the worst error [m or rad].
         deepest_mm: deepest overlap of all answers [mm].
         effort: above the best known, median over the successes, as a share.
@@ -49,6 +51,7 @@ class Summary:
     cpu_median_ms: float
     setup_ms: float
     iterations: float
+    programs: str
     worst_median: float
     deepest_mm: float
     effort: float
@@ -102,6 +105,7 @@ def _summary(results: Results, family: str, adapter: str) -> Summary:
         cpu_median_ms=1e3 * middle([record.cpu_seconds for record in answered]),
         setup_ms=1e3 * middle([record.setup_seconds for record in answered]),
         iterations=middle([record.iterations for record in answered]),
+        programs=summed(record.programs for record in answered),
         worst_median=middle([record.worst for record in answered]),
         deepest_mm=1e3 * max((record.penetration for record in answered), default=nan),
         effort=middle(efforts),

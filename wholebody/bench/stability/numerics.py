@@ -167,8 +167,9 @@ class QPLimit(HardCase):
 
     name, group, title = "qp-iteration-limit", GROUP, "A QP that hits its iteration limit"
     why = (
-        "OSQP may take five iterations for each quadratic program, and everything that would finish its answer exactly "
-        "is taken away: every step is built on an answer that is none. Methods without such programs get one iteration."
+        "OSQP solves every quadratic program and may take five iterations for it, and everything that would finish its "
+        "answer exactly is taken away: every step is built on an answer that is none. Methods without such programs "
+        "get one iteration."
     )
     acceptable = "An honest answer, outside of the table and within limits; or solved all the same."
     expected, near = "honest", np.inf

@@ -38,12 +38,16 @@ class WorkingSet:
         pushing = np.array([name in self._pushing for name in key.tolist()], dtype=bool)
         chosen = (program.least > -NEAR) | pushing
         lower, upper = self._lower, self._upper
+        closed: list[str] = []
+        iterations = 0
         for attempt in range(ROUNDS + 1):
             if attempt == ROUNDS:
                 chosen[:] = True
             smaller = program.with_elastic(chosen)
             guess = None if lower is None or upper is None else ActiveSet(lower, upper, pushing[chosen])
             answer = self.solver.solve(smaller, guess)
+            closed.append(answer.by)
+            iterations += answer.iterations
             missed = (program.elastic @ answer.x < program.least - 1e-9) & ~chosen
             lower, upper = answer.active.lower, answer.active.upper
             pushing = np.zeros(len(key), dtype=bool)
@@ -52,7 +56,8 @@ class WorkingSet:
                 break
             chosen |= missed
         self._lower, self._upper, self._pushing = lower, upper, set(key[pushing].tolist())
-        return answer._replace(active=ActiveSet(answer.active.lower, answer.active.upper, pushing))
+        active = ActiveSet(answer.active.lower, answer.active.upper, pushing)
+        return answer._replace(active=active, iterations=iterations, by=self.solver.count(closed))
 
     def forget(self) -> None:
         """Drop the guess."""

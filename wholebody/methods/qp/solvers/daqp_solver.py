@@ -53,4 +53,4 @@ class DAQPSolver(QPSolver):
             solution = finish(program, x, iterations, self.name)
             if solution is not None:
                 return solution
-        return last_resort(program, x, iterations, self.name)
+        return last_resort(program, x, iterations)

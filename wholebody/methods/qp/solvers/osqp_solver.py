@@ -29,8 +29,9 @@ class OSQPSolver(QPSolver):
 
     name = "osqp"
 
-    def __init__(self) -> None:
+    def __init__(self, hot_start: bool = True) -> None:
         """Begin without a workspace."""
+        super().__init__(hot_start)
         self._workspace: _Workspace | None = None
 
     def load(self) -> None:
@@ -49,7 +50,7 @@ class OSQPSolver(QPSolver):
             solution = finish(program, x, iterations, self.name)
             if solution is not None:
                 return solution
-        return last_resort(program, x, iterations, self.name)
+        return last_resort(program, x, iterations)
 
 
 class _Workspace:

@@ -17,8 +17,9 @@ HEAVIEST = 1e5  # weights are cut to this: solvers find the active set of a mild
 class QpsolversSolver(QPSolver):
     """A solver of qpsolvers on the split form; rebuilt at every call, since qpsolvers keeps no workspace."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, hot_start: bool = True) -> None:
         """Take a name that `qpsolvers.available_solvers` lists."""
+        super().__init__(hot_start)
         from qpsolvers import sparse_solvers
 
         self.name = name
@@ -44,4 +45,4 @@ class QpsolversSolver(QPSolver):
                 solver=self.name,
             )  # fmt: skip
         x = np.zeros(n) if answer.x is None else np.where(np.isfinite(answer.x[:n]), answer.x[:n], 0.0)
-        return finish(program, x, 1, self.name) or last_resort(program, x, 1, self.name)
+        return finish(program, x, 1, self.name) or last_resort(program, x, 1)

@@ -11,8 +11,8 @@ from wholebody.methods.qp.solvers.base import QPSolver
 
 
 def solver_names() -> tuple[str, ...]:
-    """Names that `make_solver` takes on this machine: "osqp", "daqp" and what qpsolvers finds installed."""
-    names = ["osqp"]
+    """Names that `make_solver` takes on this machine: "osqp", "active_set", "daqp", what qpsolvers finds installed."""
+    names = ["osqp", "active_set"]
     if find_spec("daqp") is not None:
         names.append("daqp")
     if find_spec("qpsolvers") is not None:
@@ -22,8 +22,12 @@ def solver_names() -> tuple[str, ...]:
     return tuple(names)
 
 
-def make_solver(name: str) -> QPSolver:
-    """A QP solver by name.
+def make_solver(name: str, hot_start: bool = True) -> QPSolver:
+    """A QP solver by name, for the programs of one run.
+
+    Args:
+        name: one of `solver_names`.
+        hot_start: see `QPSolver`.
 
     Raises:
         InputError: not a text.
@@ -36,15 +40,19 @@ def make_solver(name: str) -> QPSolver:
     if name == "osqp":
         from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
 
-        return OSQPSolver()
+        return OSQPSolver(hot_start)
+    if name == "active_set":
+        from wholebody.methods.qp.solvers.active_set_solver import ActiveSetSolver
+
+        return ActiveSetSolver(hot_start)
     if name == "daqp":
         if find_spec("daqp") is None:
             raise MissingPackageError("the QP solver daqp is not installed; install it with: pip install daqp")
         from wholebody.methods.qp.solvers.daqp_solver import DAQPSolver
 
-        return DAQPSolver()
+        return DAQPSolver(hot_start)
     if name not in solver_names():
         raise UnknownNameError("QP solver", name, solver_names())
     from wholebody.methods.qp.solvers.qpsolvers_solver import QpsolversSolver
 
-    return QpsolversSolver(name)
+    return QpsolversSolver(name, hot_start)
