@@ -17,6 +17,7 @@ LOOPS = (
     "wholebody.geometry.continuous.moved_pairs",
     "wholebody.methods.newton.linear_algebra.gram",
     "wholebody.methods.qp.active_set",
+    "wholebody.methods.qp.solvers.osqp_solver",
 )
 """Modules with compiled loops; each has a function `compiled_kernel`, which makes them ready."""
 

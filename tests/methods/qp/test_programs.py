@@ -171,7 +171,7 @@ def test_split_form_has_the_same_value(random_program):
     """At residuals r = T x - e and slacks s = max(0, l - C x), up to the constant."""
     rng = np.random.default_rng(2)
     program = random_program(rng)
-    form = split(program, np.inf)
+    form = split(program)
     for _ in range(5):
         x = rng.uniform(program.lower, program.upper)
         z = np.concatenate([x, program.rows @ x - program.target, np.maximum(program.least - program.elastic @ x, 0.0)])

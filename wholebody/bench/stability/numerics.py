@@ -17,7 +17,7 @@ from wholebody.methods.qp.method import QP
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.fallback import GUESS_TOLERANCE
-from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver, _Workspace
+from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import Point
@@ -218,11 +218,9 @@ class Unfinished(OSQPSolver):
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """What some iterations lead to, inside the box of the program."""
-        if self._workspace is None or not self._workspace.fits(program):
-            self._workspace = _Workspace(program, self._workspace)
-        self._workspace.load(program)
-        x, used = self._workspace.run(LIMIT, 1e-3)
-        x = x.clip(program.lower, program.upper)
+        workspace = self.workspace(program)
+        used = workspace.run(LIMIT)
+        x = workspace.x().clip(program.lower, program.upper)
         return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, used, self.name)
 
 

@@ -11,8 +11,6 @@ from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.fallback import finish, last_resort
 from wholebody.methods.qp.solvers.split_form import split
 
-HEAVIEST = 1e5  # weights are cut to this: solvers find the active set of a milder program more reliably
-
 
 class QpsolversSolver(QPSolver):
     """A solver of qpsolvers on the split form; rebuilt at every call, since qpsolvers keeps no workspace."""
@@ -31,7 +29,7 @@ class QpsolversSolver(QPSolver):
         from scipy import sparse
 
         n, m = program.size, len(program.target)
-        form = split(program, HEAVIEST)
+        form = split(program)
         hessian, matrix = np.diag(form.diagonal), form.matrix
         if self._sparse:
             hessian, matrix = sparse.csc_matrix(hessian), sparse.csc_matrix(matrix)
