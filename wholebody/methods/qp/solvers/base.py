@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.methods.qp.active_set import lacking, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.fallback import NOT_EXACT, SEMISMOOTH, last_resort
@@ -75,6 +76,10 @@ class QPSolver(ABC):
         """How many programs each closed since this was last asked."""
         programs, self._programs = self._programs, {}
         return programs
+
+    def own(self) -> Array | None:
+        """(n,) the solver's own answer to the last program that it was given, before the active set was corrected."""
+        return None
 
     def load(self) -> None:
         """Import what `solve_cold` needs, for those who cannot wait for it later."""

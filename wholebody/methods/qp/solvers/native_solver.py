@@ -39,6 +39,11 @@ class NativeSolver(QPSolver):
         super().__init__(hot_start)
         self._shape = (0, 0, 0)
         self._workspace: Any = None
+        self._own: Array | None = None
+
+    def own(self) -> Array | None:
+        """See `QPSolver.own`."""
+        return self._own
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise, from the last answer where the workspace is of the program's size, and once more without it."""
@@ -52,7 +57,7 @@ class NativeSolver(QPSolver):
         for _ in range(1 if self._workspace is None else 2):
             found = self.minimise(form, n, m)
             iterations += found.iterations
-            x = np.where(np.isfinite(found.z[:n]), found.z[:n], 0.0) / SCALE
+            x = self._own = np.where(np.isfinite(found.z[:n]), found.z[:n], 0.0) / SCALE
             solution = solve_from(program, read_active(found.box, found.push[:k]), CORRECTIONS)
             if solution is not None:
                 return solution._replace(iterations=iterations, by=self.name)

@@ -39,6 +39,10 @@ class OSQPSolver(QPSolver):
         extension()
         compiled_kernel()
 
+    def own(self) -> Array | None:
+        """See `QPSolver.own`."""
+        return None if self._workspace is None else self._workspace.x()
+
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise; see `QPSolver.solve_cold`."""
         workspace = self.workspace(program)

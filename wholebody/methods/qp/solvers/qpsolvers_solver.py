@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.fallback import finish, last_resort
@@ -22,6 +23,11 @@ class QpsolversSolver(QPSolver):
 
         self.name = name
         self._sparse = name in sparse_solvers
+        self._own: Array | None = None
+
+    def own(self) -> Array | None:
+        """See `QPSolver.own`."""
+        return self._own
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise; see `QPSolver.solve_cold`."""
@@ -43,4 +49,5 @@ class QpsolversSolver(QPSolver):
                 solver=self.name,
             )  # fmt: skip
         x = np.zeros(n) if answer.x is None else np.where(np.isfinite(answer.x[:n]), answer.x[:n], 0.0)
+        self._own = x
         return finish(program, x, 1, self.name) or last_resort(program, x, 1)
