@@ -40,8 +40,10 @@ def load(folder: Path) -> list[Recorded]:
     """
     found = []
     for path in sorted(folder.glob("*.npz")):
-        family, case, place = path.stem.rsplit("-", 2)
-        found.append(Recorded(family, int(case), int(place), read(path)))
+        parts = path.stem.rsplit("-", 2)
+        if len(parts) != 3 or not (parts[1].isdecimal() and parts[2].isdecimal()):
+            raise FileFormatError(f"{path}: is not named as a recorded program is; keep other files elsewhere")
+        found.append(Recorded(parts[0], int(parts[1]), int(parts[2]), read(path)))
     if not found:
         raise FileFormatError(f"{folder}: has no programs; record some with `wholebody bench qp --out {folder.parent}`")
     return found
