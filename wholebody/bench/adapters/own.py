@@ -10,16 +10,24 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench.adapters.base import FIRST_FIT, LADDER, Adapter, Budget, Tool, few
+from wholebody.bench.adapters.base import FIRST_FIT, LADDER, Adapter, Budget, Tool, few, made
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.base import Method
+from wholebody.methods.qp.active_set import guess_active_set
+from wholebody.methods.qp.method import QP
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.fallback import GUESS_TOLERANCE
+from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
 from wholebody.tasks.base import Goal, Surroundings, filled
 
 _QP_BUDGETS: tuple[Budget, ...] = (
     *((tolerance, FIRST_FIT) for tolerance in (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),
     *LADDER[1:],
 )
+
+ONE_START = {"restarts": 0}
 
 NEWTONS: dict[str, dict[str, Any]] = {
     "slack": {"inequalities": "slack"},
@@ -42,7 +50,7 @@ def qp_settings(solver: str) -> dict[str, Any]:
     return {"solver": solver} if solver == "active_set" else {"solver": solver, "hot_start": False}
 
 
-def qp_adapter(solver: str, package: str | None = None) -> Adapter:
+def qp_adapter(solver: str) -> Adapter:
     """The QP method as it comes for "", else with the settings of `qp_settings`."""
     settings = qp_settings(solver)
     said = ", ".join(f"{name}={value!r}" for name, value in settings.items())
@@ -55,11 +63,11 @@ def qp_adapter(solver: str, package: str | None = None) -> Adapter:
     return Adapter(
         name=f"qp/{solver}" if solver else "qp",
         make=partial(_qp, settings),
+        hindered=partial(UnfinishedQP, **settings),
         loose=_QP_BUDGETS,
         setup=f"wb.QP({said}), all else as it comes: {closes}; stages and seeded starts follow where the first "
         "descent does not reach the goals. Budgets of first fit are wb.QP(measures=False), those of "
         "few iterations have one descent only.",
-        package=package,
     )
 
 
@@ -67,7 +75,8 @@ def ccd_adapter() -> Adapter:
     """Cyclic coordinate descent."""
     return Adapter(
         name="ccd",
-        make=_ccd,
+        make=partial(made, wb.CCD, ONE_START),
+        hindered=partial(wb.CCD, iterations=1),
         loose=(*few(2, 5, 20), *LADDER[:8]),
         setup="wb.CCD(), all else as it comes: 400 sweeps from one start and at most 12 further starts. A budget of "
         "few iterations has no further starts.",
@@ -83,7 +92,7 @@ def dls_adapter() -> Adapter:
     """Damped least squares, the textbook baseline."""
     return Adapter(
         name="dls",
-        make=_dls,
+        make=partial(made, wb.DampedLeastSquares, {}),
         loose=(*few(2, 3, 4, 6), *LADDER),
         setup="wb.DampedLeastSquares(), all else as it comes: one start, at most 300 steps, damping by Sugihara 2011.",
         differences=(
@@ -96,9 +105,11 @@ def dls_adapter() -> Adapter:
 
 def newton_adapter(way: str) -> Adapter:
     """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
+    newton = partial(wb.Newton, **NEWTONS[way])
     return Adapter(
         name=f"newton/{way}",
-        make=partial(_newton, way),
+        make=partial(made, newton, ONE_START),
+        hindered=partial(newton, iterations=1),
         loose=(*few(3, 6, 12, 25), *LADDER[1:]),
         setup=f"wb.Newton() with {_NEWTON_SETUPS[way]}; all else as it comes. A budget of few iterations has one "
         "start.",
@@ -109,35 +120,37 @@ def newton_adapter(way: str) -> Adapter:
 
 
 def _qp(settings: dict[str, Any], tolerance: float, iterations: int | None) -> Method:
-    from wholebody.methods.qp.method import QP
-
     if iterations is None or iterations == FIRST_FIT:
         return QP(**settings, tolerance=tolerance, measures=iterations is None)
     return QP(**settings, tolerance=tolerance, iterations=iterations, budget=0, restarts=0)
 
 
-def _ccd(tolerance: float, iterations: int | None) -> Method:
-    from wholebody.methods.ccd.method import CCD
-
-    if iterations is None:
-        return CCD(tolerance=tolerance)
-    return CCD(tolerance=tolerance, iterations=iterations, restarts=0)
+LIMIT = 5  # iterations: OSQP takes 25 to some hundreds for programs of a reach
 
 
-def _newton(way: str, tolerance: float, iterations: int | None) -> Method:
-    from wholebody.methods.newton.method import Newton
+class Unfinished(OSQPSolver):
+    """OSQP that is stopped early, without the active sets and the fallback that make its answers exact."""
 
-    if iterations is None:
-        return Newton(tolerance=tolerance, **NEWTONS[way])
-    return Newton(tolerance=tolerance, iterations=iterations, restarts=0, **NEWTONS[way])
+    name = "osqp, unfinished"
+
+    def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
+        """Minimise, not quite; a guess is not used."""
+        return self.solve_cold(program)
+
+    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
+        """What some iterations lead to, inside the box of the program."""
+        workspace = self.workspace(program)
+        used = workspace.run(LIMIT)
+        x = workspace.x().clip(program.lower, program.upper)
+        return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, used, self.name)
 
 
-def _dls(tolerance: float, iterations: int | None) -> Method:
-    from wholebody.methods.damped_least_squares import DampedLeastSquares
+class UnfinishedQP(QP):
+    """The QP method with such a solver."""
 
-    if iterations is None:
-        return DampedLeastSquares(tolerance=tolerance)
-    return DampedLeastSquares(tolerance=tolerance, iterations=iterations)
+    def _qp_solver(self) -> QPSolver:
+        """One that never finishes."""
+        return Unfinished()
 
 
 class MovingPoint(Goal):

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.bench.intervals import wilson
 from wholebody.bench.qp_programs.recording import Recorded
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.active_set_solver import ActiveSetSolver
@@ -191,13 +190,15 @@ def _summary(solver: str, mine: Sequence[QPRow], seed: int) -> QPSummary:
     drawn = np.random.default_rng(seed).choice(wall, (RESAMPLES, len(wall)))
     intervals = [np.quantile(np.quantile(drawn, share, axis=1), (MARGIN, 1.0 - MARGIN)) for share in (0.5, 0.95)]
     (median_low, median_high), (p95_low, p95_high) = intervals
-    low, high = wilson(closed, len(mine))
+    from scipy.stats import binomtest
+
+    share = binomtest(closed, len(mine)).proportion_ci(method="wilson")
     return QPSummary(
         solver=solver,
         programs=len(mine),
         closed=closed,
-        low=low,
-        high=high,
+        low=float(share.low),
+        high=float(share.high),
         handed_on=len(mine) - closed - failed,
         failed=failed,
         median_us=float(np.median(wall)),

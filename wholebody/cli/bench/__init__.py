@@ -13,6 +13,7 @@ from wholebody.cli.bench import (
     newton,
     qp,
     reaches,
+    regress,
     robots,
     scaling,
     solve,
@@ -44,5 +45,6 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         robots,
         attack,
         ablation,
+        regress,
     ):
         command.add_to(kinds)

@@ -26,10 +26,9 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure random reaches."""
-    from wholebody.bench import charts
     from wholebody.bench.adapters import adapters
     from wholebody.bench.machine import machine
-    from wholebody.bench.reaches import reaches_report, run
+    from wholebody.bench.reaches import reach_times, reaches_report, run
     from wholebody.bench.tables import write_rows
 
     count = 10 if arguments.quick else arguments.count
@@ -45,6 +44,6 @@ def run(arguments: argparse.Namespace) -> int:
                 print(f"seed {row.seed}, {method}: {row.status}; {row.how}")
     report = reaches_report(rows, facts, arguments.jobs)
     write_rows(arguments.out / "reaches.csv", facts, rows)
-    drawn = {"reaches": charts.reach_times(rows, arguments.out / "reaches")}
+    drawn = {"reaches": reach_times(rows, arguments.out / "reaches")}
     publish("reaches", report, drawn, {"reaches": "Share of the reaches solved within a time"}, arguments)
     return 0
