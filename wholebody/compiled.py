@@ -21,6 +21,7 @@ LOOPS = (
     "wholebody.methods.ccd.limbs",
     "wholebody.methods.newton.linear_algebra.gram",
     "wholebody.methods.qp.active_set",
+    "wholebody.methods.qp.solvers.osqp_solver",
     "wholebody.methods.qp.subproblem",
 )
 """Modules with compiled loops; each has a function `compiled_kernel`, which compiles or loads them."""

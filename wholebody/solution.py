@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -43,6 +44,9 @@ class Solution:
         trace: one entry an iteration.
         method: name of the method and of its solver.
         message: one sentence that explains the status.
+        programs: number of quadratic programs that each solver closed, such as {"osqp": 1, "active set": 7}. There,
+            "active set" is the hot start, "semismooth newton" closed what neither did, and "not exact" are programs
+            that none closed. Empty for methods without programs.
     """
 
     q: Array
@@ -53,6 +57,7 @@ class Solution:
     trace: tuple[TraceEntry, ...] = field(repr=False)
     method: str
     message: str
+    programs: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def solved(self) -> bool:

@@ -59,7 +59,7 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_reaches(tmp_path: Path, docs: Path) -> None:
-    words = ("--count", "2", "--first", "5", "--solver", "daqp", "--out", str(tmp_path / "out"))
+    words = ("--count", "2", "--first", "5", "--methods", "qp/daqp", "--out", str(tmp_path / "out"))
     assert bench("reaches", *words, "--update-docs", str(docs)) == 0
     _, rows = read_rows(tmp_path / "out" / "reaches.csv", ReachRow)
     assert [row.seed for row in rows] == [5, 6]
@@ -67,7 +67,7 @@ def test_reaches(tmp_path: Path, docs: Path) -> None:
 
 
 def test_solve(tmp_path: Path, docs: Path) -> None:
-    words = ("--count", "1", "--solver", "daqp", "--out", str(tmp_path / "out"), "--update-docs", str(docs))
+    words = ("--count", "1", "--methods", "qp/daqp", "--out", str(tmp_path / "out"), "--update-docs", str(docs))
     assert bench("solve", *words) == 0
     _, rows = read_rows(tmp_path / "out" / "solve.csv", SolveRow)
     assert [row.way for row in rows] == ["cold", "warm"]
@@ -83,7 +83,7 @@ def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
     times = [
         StepTime(reach, tool, 1, step, 100.0 + 13.0 * step, 90.0, 20.0 - step)
         for reach in VARIANTS
-        for tool in ("placo", "wholebody/osqp")
+        for tool in ("placo", "wholebody")
         for step in range(1, 30)
     ]
     for draw in (steps.step_times, steps.least_distances):
@@ -93,7 +93,7 @@ def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
 
 def test_every_tool_has_a_colour_of_its_own() -> None:
     assert set(STEPPING) <= set(plot_style.COLORS)
-    assert plot_style.look("qp/osqp").color == plot_style.COLORS["wholebody/osqp"]  # the same method in another chart
+    assert plot_style.look("qp").color == plot_style.COLORS["wholebody"]  # the same method in another chart
     assert len(set(plot_style.COLORS.values())) == len(plot_style.COLORS)
 
 

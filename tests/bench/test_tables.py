@@ -85,11 +85,11 @@ def step_row(**changes: object) -> StepRow:
 
 def test_what_fell_short_is_said() -> None:
     rows = [
-        step_row(tool="wholebody/osqp", reach="contact", ratio=0.4, ratio_p95=1.2, least_mm=8.5),
+        step_row(tool="wholebody", reach="contact", ratio=0.4, ratio_p95=1.2, least_mm=8.5),
         step_row(tool="placo", reach="contact"),
     ]
     (line,) = goal_lines(rows)
     assert "median 0.40 of placo's (at most 0.5: reached)" in line
     assert "p95 1.20 of placo's (at most 1: missed)" in line
     assert "least distance 0.85 of the clearance (at least 0.9: missed)" in line
-    assert "nothing" in goal_lines([step_row(tool="wholebody/osqp", ratio=math.nan, ratio_p95=math.nan)])[0]
+    assert "nothing" in goal_lines([step_row(tool="wholebody", ratio=math.nan, ratio_p95=math.nan)])[0]

@@ -168,7 +168,7 @@ def frame_chart(rows: Sequence[FrameRow], path: Path) -> tuple[Path, Path]:
         axis.fill_between(frame, 0.0, 1.0, where=touching, step="mid", transform=axis.get_xaxis_transform(),
                           color="#e6eef5", linewidth=0.0)  # fmt: skip
         axis.set_xlim(0, max(len(rows) - 1, 1))
-    above.plot(frame, time, color=plot_style.COLORS["wholebody/osqp"], linewidth=0.8, label="whole frame")
+    above.plot(frame, time, color=plot_style.COLORS["wholebody"], linewidth=0.8, label="whole frame")
     queries = [row.contact_ms for row in rows]
     above.plot(frame, queries, color="#d55e00", linewidth=0.8, label="collision queries")
     above.set(ylim=(0.0, 1.25 * max(float(np.quantile(time, 0.995)), 1e-3)), ylabel="frame time [ms]")

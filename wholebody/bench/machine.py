@@ -11,7 +11,8 @@ from pathlib import Path
 from wholebody.version import __version__
 
 PACKAGES = (
-    "pin", "coal", "numpy", "scipy", "osqp", "daqp", "qpsolvers", "placo", "pin-pink", "mink", "mujoco", "matplotlib",
+    "pin", "coal", "numpy", "scipy", "osqp", "daqp", "quadprog", "proxsuite", "piqp", "qpsolvers",
+    "placo", "pin-pink", "mink", "mujoco", "matplotlib",
 )  # fmt: skip
 THREADS = "OMP_NUM_THREADS"
 

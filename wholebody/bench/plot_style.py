@@ -7,13 +7,19 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 COLORS = {
-    "wholebody/osqp": "#0072b2",
+    "wholebody": "#0072b2",
+    "wholebody/active_set": "#004166",
+    "wholebody/osqp": "#4b6a9b",
     "wholebody/daqp": "#56b4e9",
+    "wholebody/quadprog": "#7f9fc4",
+    "wholebody/proxqp": "#9fb8d0",
+    "wholebody/piqp": "#b3c6e0",
     "placo": "#d55e00",
     "mink": "#009e73",
     "pink": "#cc79a7",
 }
-"""Of the tools that make a step: Okabe and Ito's colours, which people with any colour vision tell apart."""
+"""Of the tools that make a step: Okabe and Ito's colours, which people with any colour vision tell apart; our own with
+other settings are further blues."""
 
 
 class Look(NamedTuple):
@@ -25,8 +31,13 @@ class Look(NamedTuple):
 
 
 _LOOKS = {
+    "qp": Look(COLORS["wholebody"], "o", True),
+    "qp/active_set": Look(COLORS["wholebody/active_set"], ".", False),
     "qp/osqp": Look(COLORS["wholebody/osqp"], "o", True),
-    "qp/daqp": Look(COLORS["wholebody/daqp"], "o", True),
+    "qp/daqp": Look(COLORS["wholebody/daqp"], ".", False),
+    "qp/quadprog": Look(COLORS["wholebody/quadprog"], ".", False),
+    "qp/proxqp": Look(COLORS["wholebody/proxqp"], ".", False),
+    "qp/piqp": Look(COLORS["wholebody/piqp"], ".", False),
     "newton/slack": Look("#e69f00", "s", True),
     "newton/barrier": Look("#a06a00", "D", True),
     "newton/kkt": Look("#f3cf7a", "s", False),
@@ -36,7 +47,7 @@ _LOOKS = {
     "mink": Look(COLORS["mink"], "h", True),
     "pink": Look(COLORS["pink"], "*", True),
 }
-_SOLVERS = ("#7f9fc4", "#4b6a9b", "#9fb8d0", "#35507a", "#b3c6e0", "#5f86b3")
+_SOLVERS = ("#35507a", "#5f86b3", "#8aa0c0")
 """Shades for the QP method with further solvers: one family, seen at a glance."""
 _OTHERS = ("#882255", "#117733", "#999933", "#661100", "#aa4499", "#44aa99")
 

@@ -16,10 +16,14 @@ import numpy as np
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench import plot_style
+from wholebody.bench.adapters import adapters
+from wholebody.bench.closed import said
 from wholebody.bench.problem_sets.bodies import CLEARANCE, TIPS
 from wholebody.bench.problem_sets.reaching import THINGS, reach_among
 from wholebody.bench.report import render
 from wholebody.bench.tables import filled
+
+TOLERANCE = 1e-5  # m, rad: what methods are asked for
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,8 @@ class ReachRow:
 
     Attributes:
         seed: what it was made from.
+        method: which, such as "qp" or "qp/osqp".
+        programs: what closed its quadratic programs, and how many.
         how: "directly", "by homotopy", "from another start", or the message of what was not solved.
         penetration: deepest overlap.
         clearance_violation: by how much the worst pair misses its clearance.
@@ -45,11 +51,12 @@ class ReachRow:
     """
 
     seed: int
-    solver: str
+    method: str
     status: str
     how: str
     milliseconds: float
     iterations: int
+    programs: str
     goal_error: float
     penetration: float
     clearance_violation: float
@@ -70,35 +77,37 @@ def reach(seed: int, figure: wb.Figure | None = None) -> Reach:
     return Reach(seed, problem, witness)
 
 
-def solve_reach(seed: int, solver: str, figure: wb.Figure | None = None) -> ReachRow:
+def solve_reach(seed: int, method: str, figure: wb.Figure | None = None) -> ReachRow:
     """Make and solve one reach with a fresh method."""
     made = reach(seed, figure)
-    solution = wb.QP(solver=solver).solve(made.problem)
+    (adapter,) = adapters([method])
+    solution = adapter.make(TOLERANCE, None).solve(made.problem)
     judged = wb.assess(made.problem, solution.q)
     return filled(
         ReachRow,
         solution,
         judged,
         seed=seed,
-        solver=solver,
+        method=method,
+        programs=said(solution.programs),
         how=solution.message.removeprefix("solved "),
         milliseconds=1e3 * solution.seconds,
         witness_measure=wb.assess(made.problem, made.witness).measure,
     )
 
 
-def run(seeds: range, solver: str, jobs: int = 1) -> Iterator[ReachRow]:
+def run(seeds: range, method: str, jobs: int = 1) -> Iterator[ReachRow]:
     """Solve the reaches of these seeds, in processes of their own where `jobs` is more than one; in order."""
     if jobs <= 1:
         figure = wb.load("human")
         for seed in seeds:
-            yield solve_reach(seed, solver, figure)
+            yield solve_reach(seed, method, figure)
         return
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        yield from pool.map(solve_reach, seeds, [solver] * len(seeds), chunksize=4)
+        yield from pool.map(solve_reach, seeds, [method] * len(seeds), chunksize=4)
 
 
 def reaches_report(rows: Sequence[ReachRow], facts: Mapping[str, str], jobs: int) -> str:
@@ -110,12 +119,12 @@ def reach_times(rows: Sequence[ReachRow], path: Path) -> tuple[Path, Path]:
     """Share of the random reaches that were answered within a time."""
     chart, axes = plot_style.figure(1, 1, (6.4, 3.4))
     axis = axes[0][0]
-    for solver in dict.fromkeys(row.solver for row in rows):
-        mine = [row for row in rows if row.solver == solver]
+    for method in dict.fromkeys(row.method for row in rows):
+        mine = [row for row in rows if row.method == method]
         times = np.sort([row.milliseconds for row in mine if row.status == "solved"])
         share = 100.0 * np.arange(1, len(times) + 1) / len(mine)
-        color = plot_style.COLORS.get(f"wholebody/{solver}", "#000000")
-        axis.step(times, share, where="post", color=color, linewidth=1.8, label=f"wholebody/{solver}")
+        color = plot_style.look(method).color
+        axis.step(times, share, where="post", color=color, linewidth=1.8, label=method)
     plot_style.plain_log(axis)
     axis.set(ylim=(0.0, 103.0), xlabel="time of a solve [ms]", ylabel="reaches solved [%]")
     axis.legend(loc="lower right", frameon=False)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wholebody.bench.closed import summed
 from wholebody.bench.machine import sentence
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ def _environment() -> Environment:
         "quantile": quantile,
         "scaled": scaled,
         "strong": strong,
+        "summed": summed,
         "upfirst": upfirst,
         "words": words,
     }

@@ -13,11 +13,14 @@ from pathlib import Path
 import numpy as np
 
 import wholebody as wb
+from wholebody.bench.adapters.base import Adapter
+from wholebody.bench.closed import said
 from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
 from wholebody.files import Scratch
 
 TIMEOUT = 300.0  # s
+TOLERANCE = 1e-5  # m, rad: what methods are asked for
 PEAKS = """\
 import resource, sys
 from pathlib import Path
@@ -38,19 +41,22 @@ class SolveRow:
     """Times of one way to solve a task.
 
     Attributes:
+        method: which, such as "qp" or "qp/osqp".
         way: "cold": a problem and a method that have not been used; "warm": the same ones again.
         pairs: of pieces, that could touch.
         status: of all of them, or the worst.
+        programs: what closed its quadratic programs, and how many, of one solve.
         median_ms, p95_ms, cpu_median_ms: of a solve, the independent assessment included.
     """
 
     task: str
-    solver: str
+    method: str
     way: str
     count: int
     pairs: int
     status: str
     iterations: int
+    programs: str
     median_ms: float
     p95_ms: float
     cpu_median_ms: float
@@ -71,17 +77,17 @@ class MemoryRow:
     seconds: float
 
 
-def measure(task: Path, solver: str, count: int) -> list[SolveRow]:
+def measure(task: Path, adapter: Adapter, count: int) -> list[SolveRow]:
     """Solve a task `count` times cold and as often warm; one solve of each kind is made before and not counted."""
     rows = []
     used = wb.read_task(task).problem
-    method = wb.QP(solver=solver)
+    method = adapter.make(TOLERANCE, None)
     for way in ("cold", "warm"):
         fresh = way == "cold"
         wall, cpu, solutions = [], [], []
         for number in range(count + 1):
             problem = wb.read_task(task).problem if fresh else used
-            chosen = wb.QP(solver=solver) if fresh else method
+            chosen = adapter.make(TOLERANCE, None) if fresh else method
             gc.collect()
             gc.disable()
             worked, clock = time.thread_time(), time.perf_counter()
@@ -95,12 +101,13 @@ def measure(task: Path, solver: str, count: int) -> list[SolveRow]:
         rows.append(
             SolveRow(
                 task=task.stem,
-                solver=solver,
+                method=adapter.name,
                 way=way,
                 count=count,
                 pairs=len(used.scene.geometry.collisionPairs),
                 status=unsolved[0] if unsolved else "solved",
                 iterations=int(np.median([solution.iterations for solution in solutions])),
+                programs=said(solutions[-1].programs),
                 median_ms=float(np.median(wall)),
                 p95_ms=float(np.quantile(wall, 0.95)),
                 cpu_median_ms=float(np.median(cpu)),
@@ -128,13 +135,13 @@ def memory(task: Path) -> MemoryRow:
     return MemoryRow(f"wholebody pose {task.name}", own, children, seconds)
 
 
-def both(task: Path, solvers: tuple[str, ...], count: int, say: Callable[[str], None]) -> list[SolveRow]:
-    """Measure with each solver; `say` takes a line about each."""
+def measured(task: Path, methods: Sequence[Adapter], count: int, say: Callable[[str], None]) -> list[SolveRow]:
+    """Measure with each method; `say` takes a line about each."""
     rows = []
-    for solver in solvers:
-        rows += measure(task, solver, count)
+    for adapter in methods:
+        rows += measure(task, adapter, count)
         for row in rows[-2:]:
-            say(f"{row.task}, {row.solver}, {row.way}: {row.median_ms:.1f} ms, p95 {row.p95_ms:.1f} ms, {row.status}")
+            say(f"{row.task}, {row.method}, {row.way}: {row.median_ms:.1f} ms, p95 {row.p95_ms:.1f} ms, {row.status}")
     return rows
 
 

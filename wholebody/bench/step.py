@@ -18,13 +18,14 @@ from wholebody.bench import track as setting
 from wholebody.bench.adapters import make_tool
 from wholebody.bench.adapters.base import Tool
 from wholebody.bench.adapters.own import WholebodyTool
+from wholebody.bench.closed import said
 from wholebody.bench.report import render
 from wholebody.bench.tables import filled
 from wholebody.bench.track import CLEARANCE, DT, Track, Verdict, judge
 
 REFERENCE = "placo"
 GREY = "#666666"
-THICK = "wholebody/osqp"  # drawn wide and first: with DAQP the same programs have the same answers, and would hide it
+THICK = "wholebody"  # drawn wide and first: with other solvers the same programs have the same answers, and hide it
 JUDGED = ("free", "contact")  # reaches for which a figure was asked
 
 
@@ -46,9 +47,9 @@ class StepRow:
         acceleration: mean of all joints' absolute accelerations [rad/s^2].
         near, touching: mean number of pairs nearer than what counts, and in contact.
         failures: steps for which the tool found no answer.
-        rows: mean number of contact rows.
-        exact, at_once: shares of steps whose program was solved to rounding, and closed from the last active set
-            without the QP solver; nan, as rows are, where the tool does not tell.
+        rows, exact: mean number of contact rows, and share of steps whose program was solved to rounding; nan where
+            the tool does not tell.
+        programs: what closed its programs, and how many; empty where it does not tell.
     """
 
     reach: str
@@ -77,7 +78,7 @@ class StepRow:
     failures: int
     rows: float
     exact: float
-    at_once: float
+    programs: str
 
 
 @dataclass(frozen=True)
@@ -197,7 +198,8 @@ def _row(track: Track, name: str, runs: dict[str, list[_Run]], verdict: Verdict)
         near=float(verdict.near.mean()),
         touching=float(verdict.touching.mean()),
         failures=mine[0].tool.failures,
-        **{name: told.get(name, float("nan")) for name in ("rows", "exact", "at_once")},
+        programs=said(mine[0].tool.programs()),
+        **{name: told.get(name, float("nan")) for name in ("rows", "exact")},
     )
 
 
@@ -215,7 +217,7 @@ def goal_lines(rows: Sequence[StepRow]) -> list[str]:
     """What was to be reached and what was: one line for each of our solvers on each reach."""
     lines = []
     for row in rows:
-        if not row.tool.startswith("wholebody/") or row.reach not in JUDGED:
+        if not row.tool.startswith("wholebody") or row.reach not in JUDGED:
             continue
         asked = [
             ("median", row.ratio, 0.5, row.ratio <= 0.5),
@@ -253,12 +255,12 @@ def step_report(
 WITHIN_STEP = 0.06  # m beyond the clearance: as far as a step of `QP` looks
 
 
-def linearise_us(track: Track, solver: str) -> tuple[float, float]:
+def linearise_us(track: Track) -> tuple[float, float]:
     """Median time of a whole step and of its linearisation alone, both of one run [us of the processor].
 
     The linearisation is replayed by itself at the postures of the run.
     """
-    tool = WholebodyTool(track, solver)
+    tool = WholebodyTool(track)
     tool.step(track.targets[0])
     tool.reset(track.start)
     lineariser = tool.problem.lineariser(tool.problem.workspace(), DT)

@@ -67,6 +67,7 @@ def describe(task: Task, solution: Solution, folder: Path) -> dict[str, Any]:
         "message": solution.message,
         "seconds": solution.seconds,
         "iterations": solution.iterations,
+        "programs": dict(solution.programs),
         "goals": [goal._asdict() for goal in goals_left(task, q)],
         "measures": {type(term).__name__: float(term.value(state)) for term in task.problem.measures},
         "assessment": solution.assessment.summary(),

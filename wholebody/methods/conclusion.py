@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -35,6 +36,7 @@ class Ending:
         remark: text at the end of every message.
         contradictions: contradictions of the problem that the search found; None if it did not look for any.
         judgement: the assessment of the posture, if the search has made it already.
+        programs: number of quadratic programs that each solver closed; empty for a method without programs.
     """
 
     q: Array
@@ -48,6 +50,7 @@ class Ending:
     remark: str = ""
     contradictions: tuple[Contradiction, ...] | None = None
     judgement: Assessment | None = None
+    programs: Mapping[str, int] = field(default_factory=dict)
 
 
 def counted(tolerance: float) -> float:
@@ -86,6 +89,7 @@ def concluded(
         trace=ending.trace,
         method=method,
         message=said + judgement.in_the_way + ending.remark,
+        programs=ending.programs,
     )
 
 

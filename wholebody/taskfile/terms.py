@@ -153,9 +153,8 @@ METHODS = {
     "qp": Form(
         "Sequential quadratic programming.",
         (
-            Key(
-                "solver", kinds.Text(), 'QP solver: "osqp" (if left out), "daqp", or one that `wholebody doctor` lists'
-            ),
+            Key("solver", kinds.Text(), 'QP solver: "osqp" if left out, "active_set", or one `wholebody doctor` lists'),
+            Key("hot_start", kinds.Flag(), "whether the last active set is tried before the solver; true if left out"),
             Key("tolerance", _number(TOLERANCE), "metres and radians to which goals are met; 1e-5 if left out"),
             Key("iterations", _number(ITERATIONS), "most iterations of one descent"),
             Key("budget", _number(BUDGET), "quadratic programs for further descents; 1000 if left out"),

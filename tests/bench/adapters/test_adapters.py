@@ -95,7 +95,7 @@ def test_out_of_reach_by_a_metre_is_not_called_solved(adapter: Adapter, reach: w
 
 @by_name
 def test_what_it_cannot_express_is_refused_by_name(adapter: Adapter, table: wb.Problem) -> None:
-    if adapter.name.startswith(("qp/", "newton/")):
+    if f"{adapter.name}/".startswith(("qp/", "newton/")):
         pytest.skip("it takes every term that there is")
     refused = [wb.Plane("head", (0, 0, 1), side="above"), wb.ReachCones()]
     problem = wb.Problem(table.scene, goals=table.goals, constraints=refused)

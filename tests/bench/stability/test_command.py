@@ -19,7 +19,7 @@ from wholebody.cli.bench import stability
 from wholebody.errors import InputError
 
 CASES = ("out-by-1-mm", "edge-on-edge", "not-a-number")
-METHODS = ("qp/osqp", "ccd")
+METHODS = ("qp", "ccd")
 
 
 def bench(*words: str) -> int:
@@ -38,7 +38,7 @@ def test_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert rows[-1].verdict == "refusal"
     assert "finite" in rows[-1].sentence
     texts = " ".join(ElementTree.parse(tmp_path / "stability.svg").getroot().itertext())
-    assert all(word in texts for word in ("Out of reach by 1 mm", "Edge on edge", "osqp", "ccd", "●", "–"))
+    assert all(word in texts for word in ("Out of reach by 1 mm", "Edge on edge", "qp", "ccd", "●", "–"))
     assert "3 of 3" in capsys.readouterr().out
     assert "| out-by-1-mm |" in (tmp_path / "stability.md").read_text()
 
@@ -57,13 +57,13 @@ def found() -> Result:
 
 
 def test_the_page_tells_every_case_with_its_picture_and_verdicts(found: Result) -> None:
-    drawn = {"edge-on-edge": [(Path("x/edge-on-edge.jpg"), "The answer of qp/osqp; transparent, the start.")]}
+    drawn = {"edge-on-edge": [(Path("x/edge-on-edge.jpg"), "The answer of qp; transparent, the start.")]}
     text = page.page(found, adapters(METHODS), {"wholebody": "1"}, drawn, "assets/stability")
     for case in found.cases:
         assert f"### {case.title}\n\n{case.why}\n\n*Acceptable.* {case.acceptable}" in text
     assert "(assets/stability/edge-on-edge.jpg)" in text
-    assert "| ● honest best effort: best known | `qp/osqp` |" in text
-    assert "| `qp/osqp` | 0 | 2 | 0 | 0 | 0 | 2 |" in text
+    assert "| ● honest best effort: best known | `qp` |" in text
+    assert "| `qp` | 0 | 2 | 0 | 0 | 0 | 2 |" in text
     assert "No answer was wrong." in text
     assert "`ccd`: wb.CCD()" in text
 

@@ -34,7 +34,7 @@ class Adapter:
     """A method as it takes part in comparisons.
 
     Attributes:
-        name: "qp/osqp", "ccd", "newton/slack", ...; it has one colour in all charts.
+        name: "qp", "qp/osqp", "ccd", "newton/slack", ...; it has one colour in all charts.
         make: a fresh method from a tolerance and the most iterations, as in a `Budget`.
         loose: budgets from cheap to exact, that draw its curve of speed against accuracy; those of first fit go before.
         setup: how it was set up, for reports.
@@ -93,4 +93,8 @@ class Tool(ABC):
 
     def remarks(self) -> dict[str, float]:
         """What a tool tells of its own steps; empty where it tells nothing."""
+        return {}
+
+    def programs(self) -> dict[str, int]:
+        """How many quadratic programs each way to solve them closed; empty where the tool does not tell."""
         return {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import partial
 from typing import Any
 
@@ -18,7 +19,7 @@ from wholebody.methods.qp.method import QP
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.fallback import GUESS_TOLERANCE
-from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver, _Workspace
+from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
 from wholebody.tasks.base import Goal, Surroundings, filled
 
 _QP_BUDGETS: tuple[Budget, ...] = (
@@ -42,14 +43,29 @@ _NEWTON_SETUPS = {
 }
 
 
+def qp_settings(solver: str) -> dict[str, Any]:
+    """The settings of an entrant: as it comes for "", active sets throughout, else every program by that solver."""
+    if not solver:
+        return {}
+    return {"solver": solver} if solver == "active_set" else {"solver": solver, "hot_start": False}
+
+
 def qp_adapter(solver: str) -> Adapter:
-    """The QP method with one of its solvers."""
+    """The QP method as it comes for "", else with the settings of `qp_settings`."""
+    settings = qp_settings(solver)
+    said = ", ".join(f"{name}={value!r}" for name, value in settings.items())
+    if not solver:
+        closes = "the first program of a solve is OSQP's, later ones begin with the last active set, corrected"
+    elif solver == "active_set":
+        closes = "active sets are corrected throughout; OSQP is asked where they do not settle"
+    else:
+        closes = f"every program is {solver}'s"
     return Adapter(
-        name=f"qp/{solver}",
-        make=partial(_qp, solver),
-        hindered=partial(UnfinishedQP, solver=solver),
+        name=f"qp/{solver}" if solver else "qp",
+        make=partial(_qp, settings),
+        hindered=partial(UnfinishedQP, **settings),
         loose=_QP_BUDGETS,
-        setup=f"wb.QP(solver={solver!r}), all else as it comes: stages and seeded starts follow where the first "
+        setup=f"wb.QP({said}), all else as it comes: {closes}; stages and seeded starts follow where the first "
         "descent does not reach the goals. Budgets of first fit are wb.QP(measures=False), those of "
         "few iterations have one descent only.",
     )
@@ -103,10 +119,10 @@ def newton_adapter(way: str) -> Adapter:
     )
 
 
-def _qp(solver: str, tolerance: float, iterations: int | None) -> Method:
+def _qp(settings: dict[str, Any], tolerance: float, iterations: int | None) -> Method:
     if iterations is None or iterations == FIRST_FIT:
-        return QP(solver=solver, tolerance=tolerance, measures=iterations is None)
-    return QP(solver=solver, tolerance=tolerance, iterations=iterations, budget=0, restarts=0)
+        return QP(**settings, tolerance=tolerance, measures=iterations is None)
+    return QP(**settings, tolerance=tolerance, iterations=iterations, budget=0, restarts=0)
 
 
 LIMIT = 5  # iterations: OSQP takes 25 to some hundreds for programs of a reach
@@ -123,11 +139,9 @@ class Unfinished(OSQPSolver):
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """What some iterations lead to, inside the box of the program."""
-        if self._workspace is None or not self._workspace.fits(program):
-            self._workspace = _Workspace(program, self._workspace)
-        self._workspace.load(program)
-        x, used = self._workspace.run(LIMIT, 1e-3)
-        x = x.clip(program.lower, program.upper)
+        workspace = self.workspace(program)
+        used = workspace.run(LIMIT)
+        x = workspace.x().clip(program.lower, program.upper)
         return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, used, self.name)
 
 
@@ -166,9 +180,9 @@ class MovingPoint(Goal):
 class WholebodyTool(Tool):
     """One program a step, with the workspace of the step before."""
 
-    def __init__(self, track: Track, solver: str) -> None:
-        """State the problem; the target is moved afterwards."""
-        self.name = f"wholebody/{solver}"
+    def __init__(self, track: Track, solver: str = "") -> None:
+        """State the problem; the target is moved afterwards. The solver is one of `qp_settings`."""
+        self.name = f"wholebody/{solver}" if solver else "wholebody"
         self._target = np.array(track.targets[0])
         self.problem = wb.Problem(
             track.scene,
@@ -181,31 +195,34 @@ class WholebodyTool(Tool):
             measures=[wb.Displacement()],
             clearance=CLEARANCE,
         )
-        self._tracker = wb.QP(solver=solver).tracker(self.problem, DT)
+        self._tracker = wb.QP(**qp_settings(solver)).tracker(self.problem, DT)
         self._q = np.array(track.start)
-        self._told: list[tuple[int, bool, int]] = []
+        self._told: list[tuple[int, bool]] = []
+        self._programs: Counter[str] = Counter()
 
     def reset(self, q: Array) -> None:
         """Go to a posture."""
         self._q = np.array(q)
         self._told.clear()
+        self._programs.clear()
 
     def step(self, target: Array) -> None:
         """Move one step."""
         self._target[:] = target
         step = self._tracker.step(self._q)
         self._q = step.q
-        self._told.append((step.rows, step.exact, step.iterations))
+        self._told.append((step.rows, step.exact))
+        self._programs.update(step.programs)
 
     def posture(self) -> Array:
         """Where it is."""
         return np.array(self._q)
 
     def remarks(self) -> dict[str, float]:
-        """Mean number of contact rows, and shares of steps that were closed exactly, and without the solver."""
-        rows, exact, iterations = zip(*self._told, strict=True)
-        return {
-            "rows": float(np.mean(rows)),
-            "exact": float(np.mean(exact)),
-            "at_once": float(np.mean(np.array(iterations) == 0)),
-        }
+        """Mean number of contact rows, and share of steps whose program was solved exactly."""
+        rows, exact = zip(*self._told, strict=True)
+        return {"rows": float(np.mean(rows)), "exact": float(np.mean(exact))}
+
+    def programs(self) -> dict[str, int]:
+        """How many programs each closed."""
+        return dict(self._programs)

@@ -32,7 +32,7 @@ class _Row(NamedTuple):
 def adapters(names: Iterable[str] | None = None) -> tuple[Adapter, ...]:
     """The adapters of these names, in the order given; all installed ones where None.
 
-    The name of a method with several adapters, "qp" or "newton", means all of them that are installed.
+    The name of a method with several adapters and none of that name, such as "newton", means all that are installed.
 
     Raises:
         UnknownNameError: there is no such adapter.
@@ -78,7 +78,8 @@ def _outside(name: str) -> Adapter:
 def _rows() -> dict[str, _Row]:
     from wholebody.methods.qp.solvers.registry import solver_names
 
-    rows = {f"qp/{solver}": _Row(partial(qp_adapter, solver)) for solver in ("osqp", "daqp")}
+    rows = {"qp": _Row(partial(qp_adapter, ""))}
+    rows |= {f"qp/{solver}": _Row(partial(qp_adapter, solver)) for solver in ("active_set", "osqp", "daqp")}
     for solver, module in SOLVERS.items():
         rows[f"qp/{solver}"] = _Row(partial(qp_adapter, solver), (module,), "solvers")
     for solver in solver_names():  # any other that qpsolvers finds on this machine
@@ -94,8 +95,11 @@ def _rows() -> dict[str, _Row]:
 
 
 STEPPING = {
+    "wholebody": ("osqp",),
+    "wholebody/active_set": ("osqp",),
     "wholebody/osqp": ("osqp",),
     "wholebody/daqp": ("daqp",),
+    **{f"wholebody/{solver}": (module,) for solver, module in SOLVERS.items()},
     "placo": ("placo",),
     "pink": ("pink", "daqp"),
     "mink": ("mink", "mujoco", "daqp"),
@@ -122,7 +126,7 @@ def chosen_tools(names: Iterable[str] | None) -> tuple[str, ...]:
         if name not in STEPPING:
             raise UnknownNameError("tool", name, STEPPING)
         if name not in installed_tools():
-            extra = "placo" if name == "placo" else "compare"
+            extra = "placo" if name == "placo" else "solvers" if name.startswith("wholebody/") else "compare"
             raise MissingPackageError(f"{name} is not installed; install it with: pip install 'wholebody[{extra}]'")
     return chosen
 

@@ -22,14 +22,14 @@ from wholebody.bench.compare.results import Quantity, Results, middle
 ACCURACIES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 1e-7, 1e-8)
 """From where an accuracy is worth the name to where coal's distances end."""
 
-OURS = "qp/osqp"
-"""Our default solver, with all its budgets: with least measures as `wb.QP()` has it, and the first that fits."""
+OURS = "qp"
+"""Our default method, with all its budgets: with least measures as `wb.QP()` has it, and the first that fits."""
 
 HALF, MOST = 0.5, 0.9
 """Shares of the cases that the time to an accuracy is of: the median, and nine in ten."""
 
 FAMILY = "qp/"
-"""The same method with other solvers, which is not another method."""
+"""The same method with other settings for its programs, which is not another method."""
 
 
 @dataclass(frozen=True)

@@ -97,13 +97,17 @@ def errors(results: Results, family: str, adapter: str) -> Figures:
 
 
 def named(adapters: Sequence[str]) -> str:
-    """Return methods in words, with the solvers of one method that cannot be told apart."""
-    ours = [name.removeprefix(FAMILY) for name in adapters if name.startswith(FAMILY)]
-    solvers = f" (any of {', '.join(ours)})" if len(ours) > 1 else ""
-    return ", ".join(f"`{name}`{solvers if name == FAMILY[:-1] else ''}" for name in algorithms(adapters))
+    """Return methods in words, with the settings of one method that cannot be told apart."""
+    ours = [f"`{name}`" for name in adapters if _is_ours(name)]
+    alike = f" (any of {', '.join(ours)})" if len(ours) > 1 else ""
+    return ", ".join(f"`{name}`{alike if name == FAMILY[:-1] else ''}" for name in algorithms(adapters))
 
 
 def algorithms(adapters: Sequence[str]) -> list[str]:
-    """Return the names of methods; several solvers of one method have the name of the method."""
-    several = sum(name.startswith(FAMILY) for name in adapters) > 1
-    return list(dict.fromkeys(FAMILY[:-1] if several and name.startswith(FAMILY) else name for name in adapters))
+    """Return the names of methods; several settings of one method have the name of the method."""
+    several = sum(_is_ours(name) for name in adapters) > 1
+    return list(dict.fromkeys(FAMILY[:-1] if several and _is_ours(name) else name for name in adapters))
+
+
+def _is_ours(name: str) -> bool:
+    return f"{name}/".startswith(FAMILY)

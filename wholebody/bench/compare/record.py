@@ -29,6 +29,7 @@ class Record:
         seconds, cpu_seconds: of the call without the judgement in it; of a frame, median, where goals move.
         setup_seconds: to build a model of its own from the problem; 0 for one that needs none.
         iterations: as the method counts them; of a frame, mean, where goals move.
+        programs: what closed its quadratic programs, and how many; empty for methods without, and where goals move.
         goal_error, goal_angle: left, as judged [m], [rad]; 95 % of the frames where goals move.
         penetration, clearance_violation, limit_violation, constraint_violation: as judged [m, rad]; the worst frame.
         measure, optimality: as judged; of the last frame.
@@ -51,6 +52,7 @@ class Record:
     cpu_seconds: float = inf
     setup_seconds: float = 0.0
     iterations: float = 0.0
+    programs: str = ""
     goal_error: float = inf
     goal_angle: float = inf
     penetration: float = inf

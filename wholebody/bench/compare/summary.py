@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import inf, nan
 from typing import NamedTuple
 
+from wholebody.bench.closed import summed
 from wholebody.bench.compare.record import COARSE, FAILED, FINE, OVERTIME, REFUSED
 from wholebody.bench.compare.results import Results, effort_excess, middle
 from wholebody.bench.compare.settings import Settings
@@ -29,6 +30,7 @@ class Summary:
         false_claims: answers called solved that are off by more than 1 mm.
         median_ms, p95_ms, cpu_median_ms: of a call (of a frame where goals move), over all answers.
         setup_ms, iterations: medians; the first to build a model of its own.
+        programs: what closed its quadratic programs, of all problems together.
         worst_median: median of the worst error [m or rad].
         deepest_mm: deepest overlap of all answers.
         effort: above the best known, median over the successes, as a share.
@@ -51,6 +53,7 @@ class Summary:
     cpu_median_ms: float
     setup_ms: float
     iterations: float
+    programs: str
     worst_median: float
     deepest_mm: float
     effort: float
@@ -104,6 +107,7 @@ def _summary(results: Results, family: str, adapter: str) -> Summary:
         cpu_median_ms=1e3 * middle([record.cpu_seconds for record in answered]),
         setup_ms=1e3 * middle([record.setup_seconds for record in answered]),
         iterations=middle([record.iterations for record in answered]),
+        programs=summed(record.programs for record in answered),
         worst_median=middle([record.worst for record in answered]),
         deepest_mm=1e3 * max((record.penetration for record in answered), default=nan),
         effort=middle(efforts),

@@ -16,7 +16,9 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     )
     parser.add_argument("--count", type=int, default=200, metavar="N", help="how many (default: 200)")
     parser.add_argument("--first", type=int, default=0, metavar="SEED", help="seed of the first one (default: 0)")
-    parser.add_argument("--solver", nargs="+", default=["osqp"], metavar="NAME", help="QP solvers (default: osqp)")
+    parser.add_argument(
+        "--methods", nargs="+", default=["qp"], metavar="NAME", help="such as qp, qp/osqp, newton (default: qp)"
+    )
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default: 1, for steady times)")
     parser.set_defaults(run=run)
     add_common(parser)
@@ -24,23 +26,22 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure random reaches."""
+    from wholebody.bench.adapters import adapters
     from wholebody.bench.machine import machine
     from wholebody.bench.reaches import reach_times, reaches_report, run
     from wholebody.bench.tables import write_rows
-    from wholebody.methods.qp.solvers.registry import make_solver
 
     count = 10 if arguments.quick else arguments.count
     check_count(count, "--count")
     check_count(arguments.jobs, "--jobs")
-    for solver in arguments.solver:
-        make_solver(solver)
+    methods = [adapter.name for adapter in adapters(arguments.methods)]
     facts = machine() | {"processes": str(arguments.jobs)}
     rows = []
-    for solver in arguments.solver:
-        for row in run(range(arguments.first, arguments.first + count), solver, arguments.jobs):
+    for method in methods:
+        for row in run(range(arguments.first, arguments.first + count), method, arguments.jobs):
             rows.append(row)
             if row.status != "solved":
-                print(f"seed {row.seed}, {solver}: {row.status}; {row.how}")
+                print(f"seed {row.seed}, {method}: {row.status}; {row.how}")
     report = reaches_report(rows, facts, arguments.jobs)
     write_rows(arguments.out / "reaches.csv", facts, rows)
     drawn = {"reaches": reach_times(rows, arguments.out / "reaches")}

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from wholebody.cli.bench.publishing import add_common, check_count, publish
 
-SOLVERS = ("osqp", "daqp")
+METHODS = ("qp", "qp/osqp")
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -19,7 +19,9 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     )
     parser.add_argument("--task", type=Path, metavar="TASK.toml", help="another task (default: the shelf)")
     parser.add_argument("--count", type=int, default=30, metavar="N", help="solves of each kind (default: 30)")
-    parser.add_argument("--solver", nargs="+", default=list(SOLVERS), metavar="NAME", help="QP solvers (default: both)")
+    parser.add_argument(
+        "--methods", nargs="+", default=list(METHODS), metavar="NAME", help="such as qp, qp/osqp (default: these two)"
+    )
     parser.set_defaults(run=run)
     add_common(parser)
 
@@ -27,6 +29,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 def run(arguments: argparse.Namespace) -> int:
     """Measure whole solves."""
     from wholebody.bench import solve
+    from wholebody.bench.adapters import adapters
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_rows
     from wholebody.cli.demo import packaged_tasks
@@ -35,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     count = 3 if arguments.quick else arguments.count
     check_count(count, "--count")
     facts = machine()
-    rows = solve.both(task, tuple(arguments.solver), count, print)
+    rows = solve.measured(task, adapters(arguments.methods), count, print)
     peak = solve.memory(task)
     write_rows(arguments.out / "solve.csv", facts, rows)
     write_rows(arguments.out / "memory.csv", facts, [peak])

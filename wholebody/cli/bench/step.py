@@ -40,8 +40,8 @@ def run(arguments: argparse.Namespace) -> int:
         measured, timed = measure(course, tools, repeats, print)
         rows += measured
         times += timed
-        if "wholebody/osqp" in tools:
-            shares[name] = linearise_us(course, "osqp")
+        if "wholebody" in tools:
+            shares[name] = linearise_us(course)
     report = step_report(rows, facts, {name: differences(name) for name in tools}, shares)
     write_rows(arguments.out / "step.csv", facts, rows)
     write_rows(arguments.out / "step-times.csv", facts, times)

@@ -24,7 +24,11 @@ class QP:
     These are settings alone: one object serves any number of problems and threads at the same time.
 
     Attributes:
-        solver: "osqp", "daqp" or any name that qpsolvers lists on this machine; see `wholebody doctor`.
+        solver: "osqp", "active_set" (our own), "daqp" or any name that qpsolvers lists on this machine; see `wholebody
+            doctor`.
+        hot_start: whether programs after the first of a solve begin with the active set of the one before, corrected,
+            and the solver is asked only where that does not settle. Otherwise every program is the solver's. The
+            answers are the same to rounding; `Solution.programs` says how many programs each closed.
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most programs for one descent.
         budget: most programs that continuation and restarts may add when the first descent does not reach the goals;
@@ -38,6 +42,7 @@ class QP:
     """
 
     solver: str = "osqp"
+    hot_start: bool = True
     tolerance: float = 1e-5
     iterations: int = 150
     budget: int = 1000
@@ -54,14 +59,21 @@ class QP:
             UnknownNameError: no such QP solver.
         """
         check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, budget=BUDGET, restarts=RESTARTS, seed=SEED)
+        flag(self.hot_start, "hot_start")
         flag(self.measures, "measures")
         check_time_limit(self.time_limit)
         make_solver(self.solver)
 
     @property
     def name(self) -> str:
-        """Name for tables."""
-        return f"qp/{self.solver}"
+        """Name for tables: "qp" as it comes; else what stands behind the slash is asked for every program.
+
+        "qp/active_set" begins with the active set of the program before. "+hot_start" says that so do others, and that
+        their solver is asked for the first program and where that set does not settle.
+        """
+        if self.hot_start:
+            return {"osqp": "qp", "active_set": "qp/active_set"}.get(self.solver, f"qp/{self.solver}+hot_start")
+        return f"qp/{self.solver}" if self.solver != "active_set" else "qp/active_set, each anew"
 
     def accepts(self, problem: Problem) -> str | None:
         """None: every term that says its values and derivatives can be taken."""
@@ -88,13 +100,14 @@ class QP:
             search = Search(problem, workspace, self._qp_solver(), settings, control)
             best = search.run()
         ending = Ending(
-            best.q, best.converged, search.spent, tuple(search.trace), search.how, contradictions=search.contradictions
-        )
+            best.q, best.converged, search.spent, tuple(search.trace), search.how,
+            contradictions=search.contradictions, programs=search.solver.counted(),
+        )  # fmt: skip
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def _qp_solver(self) -> QPSolver:
         """A QP solver of the name in the settings, for one run."""
-        return make_solver(self.solver)
+        return make_solver(self.solver, self.hot_start)
 
     def tracker(self, problem: Problem, dt: float) -> QPTracker:
         """What follows the goals of a problem that move from call to call: one program a step of `dt` seconds.

@@ -127,9 +127,9 @@ class QPSolution(NamedTuple):
         x: (n,) the minimiser.
         active: the active set it was found with.
         exact: whether the optimality conditions hold to rounding; otherwise x is the best found.
-        iterations: iterations of the solver that was used; 0 where the last active set was right at once.
-        by: what closed the program: "first active set" or "last active set", the solver's name, or
-            "semismooth newton" where its answer did not lead to an exact one.
+        iterations: iterations of the solver that was used; 0 where none was.
+        by: what closed the program: "active set" where one that was known led to the answer, the solver's name,
+            "semismooth newton" where the solver's answer did not lead to an exact one, or "not exact".
     """
 
     x: Array

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -52,7 +52,8 @@ class QPStep(NamedTuple):
         rows: how many contact rows.
         exact: whether the program was solved to rounding.
         iterations: iterations of the QP solver.
-        by: what closed the program, see `QPSolution`.
+        by: what closed the last program, see `QPSolution`.
+        programs: how many programs each closed: one a step, and more where it was looked at twice.
         share: how much of the program's displacement was gone: less than 1 where it was longer than what was looked at.
     """
 
@@ -64,6 +65,7 @@ class QPStep(NamedTuple):
     exact: bool
     iterations: int
     by: str
+    programs: Mapping[str, int]
     share: float
 
 
@@ -213,7 +215,7 @@ class QPTracker:
         self._before = _Before(following.copy(), rows.soft_error + gone, float(np.sqrt(left @ left)))
         return QPStep(
             following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
-            answer.iterations, answer.by, share,
+            answer.iterations, answer.by, self._working_set.solver.counted(), share,
         )  # fmt: skip
 
     def _solved(self, q: Array, measures: bool) -> tuple[Linearisation, Rows, QuadraticProgram, QPSolution]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from wholebody.arrays import Array, Mask
 from wholebody.methods.qp.active_set import BOUND_TOLERANCE, FULL_CORRECTIONS, ROW_TOLERANCE, compiled_kernel
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import WARM_CORRECTIONS, QPSolver
+from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
 
 NEAR = 0.03  # m: rows lacking less than this at x = 0 are in from the beginning
 ROUNDS = 8  # most times that rows are added before all of them are
@@ -38,7 +38,7 @@ class WorkingSet:
             program: the full program.
             key: (k,) names of its elastic rows.
         """
-        if self._lower is not None and self._upper is not None:
+        if self.solver.hot_start and self._lower is not None and self._upper is not None:
             answer = self._from_the_last(program, key, self._lower, self._upper)
             if answer is not None:
                 return answer
@@ -71,19 +71,23 @@ class WorkingSet:
         if rounds < 0:
             return None
         self._remember(active, key)
-        return QPSolution(x, active, True, 0, "last active set")
+        return QPSolution(x, active, True, 0, self.solver.count([ACTIVE_SET]))
 
     def _round_by_round(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
         """The answer where nothing is known, or the solver has to be asked."""
         pushing: Mask = np.isin(key, self._pushing)
         chosen = (program.least > -NEAR) | pushing
         lower, upper = self._lower, self._upper
+        closed: list[str] = []
+        iterations = 0
         for attempt in range(ROUNDS + 1):
             if attempt == ROUNDS:
                 chosen[:] = True
             smaller = program.with_elastic(chosen)
             guess = None if lower is None or upper is None else ActiveSet(lower, upper, pushing[chosen])
             answer = self.solver.solve(smaller, guess)
+            closed.append(answer.by)
+            iterations += answer.iterations
             missed = (program.elastic @ answer.x < program.least - 1e-9) & ~chosen
             lower, upper = answer.active.lower, answer.active.upper
             pushing = np.zeros(len(key), dtype=bool)
@@ -93,7 +97,7 @@ class WorkingSet:
             chosen |= missed
         active = ActiveSet(answer.active.lower, answer.active.upper, pushing)
         self._remember(active, key)
-        return answer._replace(active=active)
+        return answer._replace(active=active, iterations=iterations, by=self.solver.count(closed))
 
     def _remember(self, active: ActiveSet, key: NDArray[np.intp]) -> None:
         self._lower, self._upper = active.lower, active.upper

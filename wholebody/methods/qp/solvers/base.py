@@ -1,49 +1,90 @@
-"""What a QP solver has to do."""
+"""What a QP solver has to do, and which programs of a run it is given."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.methods.qp.active_set import lacking, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.fallback import last_resort
+from wholebody.methods.qp.solvers.fallback import NOT_EXACT, SEMISMOOTH, last_resort
+
+ACTIVE_SET = "active set"
+"""What `QPSolution.by` says of answers that the hot start found: an active set that was known, corrected."""
 
 WARM_CORRECTIONS = 120
 """Corrections of the last active set before the solver is asked."""
 
+_NEED = {ACTIVE_SET: 0, SEMISMOOTH: 2, NOT_EXACT: 3}  # a solver is between them
+
 LARGEST = 400
-"""Rows of a program above which no solver is asked: setting one up takes longer than the answer by other means."""
+"""Rows of a program above which a hot start that does not settle asks no solver: setting one up takes longer."""
 
 
 class QPSolver(ABC):
-    """Solves programs one after the other; keeps what helps the next one."""
+    """Solves the programs of one run, one after the other; keeps what helps the next one, and counts what closed them.
+
+    Attributes:
+        name: of the solver.
+        hot_start: whether programs after the first begin with an active set that is known, corrected; the solver is
+            then asked only where that does not settle. Otherwise every program is the solver's.
+    """
 
     name: str
 
+    def __init__(self, hot_start: bool = True) -> None:
+        """Begin with no program solved."""
+        self.hot_start = hot_start
+        self._begun = False
+        self._programs: dict[str, int] = {}
+
     def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
-        """Minimise: from the last active set, which most steps of a drag do not change, else by the solver.
+        """Minimise.
 
         Args:
             program: what to solve.
-            guess: active set of a program like this one; None for what lacks at x = 0, from which nineteen in twenty
-                first programs settle at a tenth of what setting up a solver costs.
+            guess: active set of a program like this one; None where none is known. With a hot start it is corrected,
+                and None stands for the rows that lack at x = 0; but the first program of all is the solver's.
 
         Returns:
             The answer; `exact` is False where only an approximation was found. Never NaN, always inside the box.
         """
+        if not (self.hot_start and self._begun):
+            self._begun = True
+            return self.solve_cold(program)
         solution = solve_from(program, lacking(program) if guess is None else guess, WARM_CORRECTIONS)
         if solution is not None:
-            return solution._replace(by="first active set" if guess is None else "last active set")
+            return solution._replace(by=ACTIVE_SET)
         if len(program.target) + len(program.least) > LARGEST:
-            return last_resort(program, np.zeros(program.size), 0, self.name)
+            return last_resort(program, np.zeros(program.size), 0)
         return self.solve_cold(program)
 
+    def count(self, closed: Sequence[str]) -> str:
+        """Count one program, of whose rounds this closed them; what it needed most of all.
+
+        A program is the hot start's where that was enough in every round, and semismooth Newton's where one round
+        needed it.
+        """
+        by = max(closed, key=lambda name: _NEED.get(name, 1))
+        self._programs[by] = self._programs.get(by, 0) + 1
+        return by
+
+    def counted(self) -> dict[str, int]:
+        """How many programs each closed since this was last asked."""
+        programs, self._programs = self._programs, {}
+        return programs
+
+    def own(self) -> Array | None:
+        """(n,) the solver's own answer to the last program that it was given, before the active set was corrected."""
+        return None
+
     def load(self) -> None:
-        """Import what `solve_cold` needs, for those who cannot wait for it later: most programs are closed without."""
+        """Import what `solve_cold` needs, for those who cannot wait for it later."""
         return
 
     @abstractmethod
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
-        """Minimise without a guess; what `solve` falls back on."""
+        """Minimise by the solver, from the solver's own last answer where it takes one."""

@@ -7,50 +7,34 @@ from ctypes import c_int
 import daqp
 import numpy as np
 
-from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.solvers.fallback import finish, last_resort
-from wholebody.methods.qp.solvers.split_form import split
+from wholebody.methods.qp.solvers.native_solver import Native, NativeSolver
+from wholebody.methods.qp.solvers.split_form import SplitForm
 
 FAR = 1e30  # DAQP's infinity
-HEAVIEST = (
-    1e5,
-    1e10,
-)  # weights are cut to this: milder programs are faster, and mostly enough for `finish`
 LIMIT = 500  # iterations
-TOLERANCE = 1e-9  # of rows, m
+TOLERANCE = 1e-9  # of rows
 EQUALITY = 5  # DAQP's mark for a row that is always active
 
 
-class DAQPSolver(QPSolver):
-    """DAQP on the split form; its active set is then finished with the true weights."""
+class DAQPSolver(NativeSolver):
+    """DAQP with a model that lives on, and begins with the active set of its last answer."""
 
     name = "daqp"
 
-    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
-        """Minimise with mild weights, and where that does not lead to the exact answer, with the true ones."""
-        n, m, k = program.size, len(program.target), len(program.least)
-        iterations = 0
-        x = np.zeros(n)
-        for heaviest in HEAVIEST:
-            form = split(program, heaviest)
-            upper = np.concatenate([program.upper, np.minimum(form.upper, FAR)])
-            lower = np.concatenate([program.lower, form.lower])
-            sense = np.zeros(n + m + k, dtype=c_int)
+    def minimise(self, form: SplitForm, n: int, m: int) -> Native:
+        """See `NativeSolver.minimise`."""
+        hessian = np.diag(form.diagonal)
+        upper = np.concatenate([form.box_upper[:n], np.minimum(form.upper, FAR)])
+        lower = np.concatenate([form.box_lower[:n], form.lower])
+        if self._workspace is not None:
+            flag = self._workspace.update(H=hessian, f=form.linear, A=form.matrix, bupper=upper, blower=lower)
+            self._workspace = self._workspace if flag >= 0 else None
+        if self._workspace is None:
+            sense = np.zeros(len(upper), dtype=c_int)
             sense[n : n + m] = EQUALITY
-            x, _, _, info = daqp.solve(
-                np.diag(form.diagonal),
-                form.linear,
-                form.matrix,
-                upper,
-                lower,
-                sense,
-                primal_tol=TOLERANCE,
-                iter_limit=LIMIT,
-            )
-            x = np.where(np.isfinite(x[:n]), x[:n], 0.0)
-            iterations += int(info["iterations"])
-            solution = finish(program, x, iterations, self.name)
-            if solution is not None:
-                return solution
-        return last_resort(program, x, iterations, self.name)
+            self._workspace = daqp.Model()
+            self._workspace.setup(hessian, form.linear, form.matrix, upper, lower, sense)
+            self._workspace.settings = {"primal_tol": TOLERANCE, "iter_limit": LIMIT}
+        z, _, _, info = self._workspace.solve()
+        multiplier = np.asarray(info["lam"])
+        return Native(np.asarray(z), multiplier[:n], -multiplier[n + m :], int(info["iterations"]))

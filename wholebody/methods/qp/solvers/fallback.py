@@ -10,6 +10,9 @@ from wholebody.methods.qp.semismooth_newton import minimise
 SEMISMOOTH = "semismooth newton"
 """What `QPSolution.by` says of answers that `last_resort` found."""
 
+NOT_EXACT = "not exact"
+"""What it says of programs that nothing closed: the answer is the best that was found."""
+
 EXACT = 1e-10
 """Optimality up to which an answer counts as exact although no active set settles at it [rad, m]."""
 
@@ -36,18 +39,17 @@ def finish(program: QuadraticProgram, x: Array, iterations: int, by: str) -> QPS
     return None if solution is None else solution._replace(iterations=iterations, by=by)
 
 
-def last_resort(program: QuadraticProgram, x: Array, iterations: int, by: str) -> QPSolution:
+def last_resort(program: QuadraticProgram, x: Array, iterations: int) -> QPSolution:
     """Exact answer by semismooth Newton steps where an approximate one x, shape (n,), does not lead to it.
 
     Args:
         program: what is solved.
         x: (n,) where to begin.
         iterations: what it took so far.
-        by: name of the solver that was asked.
     """
     x, active, used = minimise(program, x, LAST_ITERATIONS)
     solution = solve_from(program, active, CORRECTIONS)
     if solution is not None:
         return solution._replace(iterations=iterations + used, by=SEMISMOOTH)
     exact = program.optimality(x) <= EXACT
-    return QPSolution(x, active, exact, iterations + used, SEMISMOOTH if exact else by)
+    return QPSolution(x, active, exact, iterations + used, SEMISMOOTH if exact else NOT_EXACT)

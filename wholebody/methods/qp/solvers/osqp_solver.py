@@ -1,94 +1,99 @@
-"""OSQP with a workspace that lives on: set up once for a sparsity, warm from step to step, finished exactly."""
+"""OSQP with a workspace that lives on: set up once for a sparsity, warm from program to program, finished exactly."""
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
-from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
+from wholebody.methods.qp.active_set import solve_from
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.solvers.fallback import finish, last_resort
+from wholebody.methods.qp.solvers.fallback import CORRECTIONS, last_resort
+from wholebody.methods.qp.solvers.split_form import HEAVIEST, IDLE, SCALE, read_active, slots_for
 
-HEAVIEST = 1e5  # weights are cut to this: OSQP needs many times the iterations for larger ones
-SLOTS = 8  # elastic rows come in multiples of this, so that the sparsity seldom changes; more slots = slower iterations
-SCALE = 100.0  # x is in hundredths of a radian inside OSQP: its absolute tolerance then means 1e-7 rad
-ROUNDS = ((50, 1e-3), (100, 1e-5))  # iterations and tolerance, tried until `finish` succeeds
+RHO = 0.1  # OSQP's step length at the beginning; it adapts
+ROUNDS = (25, 50, 100, 200, 400)  # iterations, until an active set read off the multipliers settles
 FAR = 1e30  # OSQP's infinity
 
 
 class OSQPSolver(QPSolver):
     """OSQP (Stellato et al. 2020) on the split form.
 
-    OSQP iterates until an active set read off its answer settles. It is a first-order method, and where many bounds and
-    contacts bind at once thousands of its iterations may not tell the set; such programs, a few in a hundred, are
-    finished by semismooth Newton steps.
+    OSQP is a first-order method: its answer is near, and its multipliers tell exactly which bounds and rows are active.
+    It iterates until the active set read off them, corrected, settles.
     """
 
     name = "osqp"
 
-    def __init__(self) -> None:
+    def __init__(self, hot_start: bool = True) -> None:
         """Begin without a workspace."""
-        self._workspace: _Workspace | None = None
+        super().__init__(hot_start)
+        self._workspace: Workspace | None = None
 
     def load(self) -> None:
-        """Import OSQP."""
-        import osqp  # noqa: F401
+        """Import OSQP and make its loops ready."""
+        extension()
+        compiled_kernel()
+
+    def own(self) -> Array | None:
+        """See `QPSolver.own`."""
+        return None if self._workspace is None else self._workspace.x()
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise; see `QPSolver.solve_cold`."""
-        if self._workspace is None or not self._workspace.fits(program):
-            self._workspace = _Workspace(program, self._workspace)
-        self._workspace.load(program)
+        workspace = self.workspace(program)
         iterations = 0
-        for limit, tolerance in ROUNDS:
-            x, used = self._workspace.run(limit, tolerance)
-            iterations += used
-            solution = finish(program, x, iterations, self.name)
+        for limit in ROUNDS:
+            iterations += workspace.run(limit)
+            solution = solve_from(program, workspace.active(), CORRECTIONS)
             if solution is not None:
-                return solution
-        return last_resort(program, x, iterations, self.name)
+                return solution._replace(iterations=iterations, by=self.name)
+        return last_resort(program, workspace.x(), iterations)
+
+    def workspace(self, program: QuadraticProgram) -> Workspace:
+        """The workspace with a program in it, set up anew where its pattern does not fit."""
+        if self._workspace is None or not self._workspace.fits(program):
+            self._workspace = Workspace(program, self._workspace)
+        self._workspace.load(program)
+        return self._workspace
 
 
-class _Workspace:
-    """One OSQP workspace: a fixed pattern of soft rows and a fixed number of dense slots for elastic rows."""
+class Workspace:
+    """One OSQP workspace: a fixed pattern of soft rows and a fixed number of dense slots for elastic rows.
 
-    def __init__(self, program: QuadraticProgram, before: _Workspace | None) -> None:
-        import osqp
-        from scipy import sparse
+    The soft rows are scaled by the roots of their weights as far as `HEAVIEST`; the rest of a weight is in the
+    coefficient of the residual. The program is the true one, and its heaviest rows are nearly hard.
+    """
 
+    def __init__(self, program: QuadraticProgram, before: Workspace | None) -> None:
+        """Set up for programs of one size; the pattern includes that of the workspace before, of the same size."""
         n, m = program.size, len(program.target)
-        self.n, self.m = n, m
-        self.slots = SLOTS * -(-max(len(program.least), 1) // SLOTS)
+        self.n, self.m, self.k = n, m, 0
+        self.slots = slots_for(program, 0)
         self.pattern: NDArray[np.bool_] = program.rows != 0.0
         if before is not None and before.pattern.shape == self.pattern.shape:
             self.pattern = self.pattern | before.pattern
             self.slots = max(self.slots, before.slots)
-        k = self.slots
-        size = n + m + k
-        block = np.zeros((n + m + k, size), dtype=bool)
-        block[:n, :n] = np.eye(n, dtype=bool)
-        block[n : n + m, :n] = self.pattern
-        block[n + m :, :n] = True
-        block[n:, n:] = np.eye(m + k, dtype=bool)
-        column, self._row = np.nonzero(block.T)
-        self._column = column
-        indptr = np.concatenate([[0], np.cumsum(block.sum(axis=0))])
-        # placeholder values that keep OSQP from dropping entries; load() overwrites all of them
-        matrix = sparse.csc_matrix((np.ones(len(column)), self._row, indptr), shape=(n + m + k, size))
-        objective = sparse.csc_matrix(sparse.diags(np.ones(size)))
-        self._values = np.zeros((n + m + k, size))
-        self._values[:n, :n] = np.eye(n)
-        self._values[n : n + m, n : n + m] = -np.eye(m)
-        self._values[n + m :, n + m :] = np.eye(k)
-        bound = np.zeros(n + m + k)
-        self._solver: Any = osqp.OSQP()
-        self._solver.setup(
-            objective, np.zeros(size), matrix, bound, bound, verbose=False, scaling=0, rho=0.1, eps_rel=0.0,
-            eps_abs=1e-3, adaptive_rho=1, check_termination=10, max_iter=50, warm_starting=True, polishing=False,
-        )  # fmt: skip
+        size = n + m + self.slots
+        objective, matrix, self._starts, self._places = _structure(n, m, self.slots, self.pattern.tobytes())
+        self._pattern = matrix
+        self.hessian, self.gradient = np.ones(size), np.zeros(size)
+        self._values, self.low, self.high = np.ones(matrix.nnz), np.full(size, IDLE), np.full(size, FAR)
+        self.low[n : n + m] = self.high[n : n + m] = 0.0  # OSQP factorises anew where other rows become equalities
+        self._kernel = compiled_kernel()
+        osqp = extension()
+        settings = self._settings = osqp.OSQPSettings()
+        osqp.osqp_set_default_settings(settings)
+        settings.verbose, settings.scaling, settings.polishing = False, 0, False
+        settings.warm_starting, settings.rho, settings.adaptive_rho = True, RHO, 1
+        settings.check_termination, settings.max_iter = 0, ROUNDS[0]
+        self._solver: Any = osqp.OSQPSolver(
+            osqp.CSC(objective), self.gradient, osqp.CSC(matrix), self.low, self.high, size, size, settings
+        )
 
     def fits(self, program: QuadraticProgram) -> bool:
         """Whether the program has this workspace's size and pattern."""
@@ -96,34 +101,84 @@ class _Workspace:
             program.size == self.n
             and len(program.target) == self.m
             and len(program.least) <= self.slots
-            and not (program.rows[~self.pattern] != 0.0).any()
+            and bool(self._kernel.within(np.ascontiguousarray(program.rows), self.pattern))
         )
 
     def load(self, program: QuadraticProgram) -> None:
-        """Put the program's numbers in; x is scaled, and so are r and s by the root of their weights."""
-        n, m, k = self.n, self.m, len(program.least)
-        root = np.sqrt(np.minimum(program.weight, HEAVIEST))
-        elastic_root = np.sqrt(np.minimum(program.elastic_weight, HEAVIEST))
-        values = self._values
-        values[n : n + m, :n] = program.rows * (root / SCALE)[:, None]
-        values[n + m :, :n] = 0.0
-        values[n + m : n + m + k, :n] = program.elastic * (elastic_root / SCALE)[:, None]
-        lower = np.full(n + m + self.slots, -FAR)
-        upper = np.full(n + m + self.slots, FAR)
-        lower[:n], upper[:n] = program.lower * SCALE, program.upper * SCALE
-        lower[n : n + m] = upper[n : n + m] = program.target * root
-        lower[n + m : n + m + k] = program.least * elastic_root
-        self._solver.update(
-            q=np.concatenate([program.linear / SCALE, np.zeros(m + self.slots)]),
-            l=lower,
-            u=upper,
-            Px=np.concatenate([program.diagonal / SCALE**2, np.ones(m + self.slots)]),
-            Ax=values[self._row, self._column],
-        )
+        """Put the program's numbers in."""
+        self.k = len(program.least)
+        parts = (
+            program.diagonal, program.linear, program.rows, program.target, program.weight, program.elastic,
+            program.least, program.elastic_weight, program.lower, program.upper,
+        )  # fmt: skip
+        self._kernel.fill(
+            *map(np.ascontiguousarray, parts), self._starts, self._places, self.slots, SCALE, HEAVIEST, IDLE, FAR,
+            self.hessian, self.gradient, self._values, self.low, self.high,
+        )  # fmt: skip
+        self._solver.update_data_vec(q=self.gradient, l=self.low, u=self.high)
+        self._solver.update_data_mat(P_x=self.hessian, P_i=None, A_x=self._values, A_i=None)
 
-    def run(self, limit: int, tolerance: float) -> tuple[Array, int]:
-        """TraceEntry on from where the last run ended; x and the iterations used."""
-        self._solver.update_settings(max_iter=limit, eps_abs=tolerance)
-        result = self._solver.solve(raise_error=False)
-        x = np.asarray(result.x[: self.n]) / SCALE
-        return np.where(np.isfinite(x), x, 0.0), int(result.info.iter)
+    def run(self, limit: int) -> int:
+        """Iterate on from where the last run ended; how many iterations."""
+        if self._settings.max_iter != limit:
+            self._settings.max_iter = limit
+            self._solver.update_settings(self._settings)
+        self._solver.solve()
+        return int(self._solver.info.iter)
+
+    def matrix(self) -> Any:
+        """A as it is now, a matrix of scipy."""
+        matrix = self._pattern.copy()
+        matrix.data[:] = self._values
+        return matrix
+
+    def x(self) -> Array:
+        """(n,) where OSQP is."""
+        x = np.asarray(self._solver.solution.x)[: self.n] / SCALE
+        return np.where(np.isfinite(x), x, 0.0)
+
+    def active(self) -> ActiveSet:
+        """The active set read off the multipliers, which are exactly zero for what is not active."""
+        y, first = self._solver.solution.y, self.n + self.m
+        return read_active(y[: self.n], -y[first : first + self.k])
+
+
+@lru_cache(maxsize=64)
+def _structure(n: int, m: int, slots: int, pattern: bytes) -> tuple[Any, Any, NDArray[np.int64], NDArray[np.int64]]:
+    """P and A with ones for entries, where the soft rows' pattern (m, n) begins in each column, and its rows."""
+    from scipy import sparse
+
+    soft = np.frombuffer(pattern, dtype=bool).reshape(m, n)
+    size = n + m + slots
+    block = np.zeros((size, size), dtype=bool)
+    block[n : n + m, :n] = soft
+    block[n + m :, :n] = True
+    block.flat[:: size + 1] = True
+    row = np.nonzero(block.T)[1]
+    indptr = np.concatenate([[0], np.cumsum(block.sum(axis=0))])
+    matrix = sparse.csc_matrix((np.ones(len(row)), row, indptr), shape=(size, size))
+    objective = sparse.csc_matrix((np.ones(size), np.arange(size), np.arange(size + 1)), shape=(size, size))
+    starts = np.concatenate([[0], np.cumsum(soft.sum(axis=0))]).astype(np.int64)
+    return objective, matrix, starts, np.nonzero(soft.T)[1].astype(np.int64)
+
+
+@lru_cache(maxsize=1)
+def extension() -> Any:
+    """OSQP's compiled module: its Python class around it takes five times as long as 25 iterations."""
+    import osqp
+
+    return osqp.OSQP().ext
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody.methods.qp.solvers import osqp_kernel
+
+    none, one, places = np.zeros(0), np.ones(1), np.zeros(0, np.int64)
+    osqp_kernel.within(np.zeros((0, 1)), np.zeros((0, 1), dtype=bool))
+    osqp_kernel.fill(
+        one, one, np.zeros((0, 1)), none, none, np.zeros((0, 1)), none, none, one, one, np.zeros(2, np.int64), places,
+        1, 1.0, 1.0, 1.0, 1.0, np.ones(2), np.ones(2), np.ones(3), np.ones(2), np.ones(2),
+    )  # fmt: skip
+    return osqp_kernel

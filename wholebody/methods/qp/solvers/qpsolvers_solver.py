@@ -6,23 +6,28 @@ import warnings
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.fallback import finish, last_resort
 from wholebody.methods.qp.solvers.split_form import split
 
-HEAVIEST = 1e5  # weights are cut to this: solvers find the active set of a milder program more reliably
-
 
 class QpsolversSolver(QPSolver):
     """A solver of qpsolvers on the split form; rebuilt at every call, since qpsolvers keeps no workspace."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, hot_start: bool = True) -> None:
         """Take a name that `qpsolvers.available_solvers` lists."""
+        super().__init__(hot_start)
         from qpsolvers import sparse_solvers
 
         self.name = name
         self._sparse = name in sparse_solvers
+        self._own: Array | None = None
+
+    def own(self) -> Array | None:
+        """See `QPSolver.own`."""
+        return self._own
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise; see `QPSolver.solve_cold`."""
@@ -30,7 +35,7 @@ class QpsolversSolver(QPSolver):
         from scipy import sparse
 
         n, m = program.size, len(program.target)
-        form = split(program, HEAVIEST)
+        form = split(program)
         hessian, matrix = np.diag(form.diagonal), form.matrix
         if self._sparse:
             hessian, matrix = sparse.csc_matrix(hessian), sparse.csc_matrix(matrix)
@@ -44,4 +49,5 @@ class QpsolversSolver(QPSolver):
                 solver=self.name,
             )  # fmt: skip
         x = np.zeros(n) if answer.x is None else np.where(np.isfinite(answer.x[:n]), answer.x[:n], 0.0)
-        return finish(program, x, 1, self.name) or last_resort(program, x, 1, self.name)
+        self._own = x
+        return finish(program, x, 1, self.name) or last_resort(program, x, 1)

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from importlib import import_module
 from importlib.util import find_spec
+from types import MappingProxyType
 
 from wholebody.checks import shown
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.methods.qp.active_set import compiled_kernel
 from wholebody.methods.qp.solvers.base import QPSolver
 
+NATIVE: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "daqp": ("daqp", "DAQPSolver"),
+        "quadprog": ("quadprog", "QuadprogSolver"),
+        "proxqp": ("proxsuite", "ProxQPSolver"),
+        "piqp": ("piqp", "PIQPSolver"),
+    }
+)
+"""Solvers that are asked by their own interfaces: name -> module that it needs, class of ours."""
+
 
 def solver_names() -> tuple[str, ...]:
-    """Names that `make_solver` takes on this machine: "osqp", "daqp" and what qpsolvers finds installed."""
-    names = ["osqp"]
-    if find_spec("daqp") is not None:
-        names.append("daqp")
+    """Names that `make_solver` takes on this machine: "osqp", "active_set" and what is installed beside."""
+    names = ["osqp", "active_set"]
+    names += [name for name, (module, _) in NATIVE.items() if find_spec(module) is not None]
     if find_spec("qpsolvers") is not None:
         from qpsolvers import available_solvers
 
@@ -22,8 +34,12 @@ def solver_names() -> tuple[str, ...]:
     return tuple(names)
 
 
-def make_solver(name: str) -> QPSolver:
-    """A QP solver by name.
+def make_solver(name: str, hot_start: bool = True) -> QPSolver:
+    """A QP solver by name, for the programs of one run.
+
+    Args:
+        name: one of `solver_names`.
+        hot_start: see `QPSolver`.
 
     Raises:
         InputError: not a text.
@@ -36,15 +52,19 @@ def make_solver(name: str) -> QPSolver:
     if name == "osqp":
         from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
 
-        return OSQPSolver()
-    if name == "daqp":
-        if find_spec("daqp") is None:
-            raise MissingPackageError("the QP solver daqp is not installed; install it with: pip install daqp")
-        from wholebody.methods.qp.solvers.daqp_solver import DAQPSolver
+        return OSQPSolver(hot_start)
+    if name == "active_set":
+        from wholebody.methods.qp.solvers.active_set_solver import ActiveSetSolver
 
-        return DAQPSolver()
+        return ActiveSetSolver(hot_start)
+    if name in NATIVE:
+        module, kind = NATIVE[name]
+        if find_spec(module) is None:
+            raise MissingPackageError(f"the QP solver {name} is not installed; install it with: pip install {module}")
+        solver: QPSolver = getattr(import_module(f"{__package__}.{name}_solver"), kind)(hot_start)
+        return solver
     if name not in solver_names():
         raise UnknownNameError("QP solver", name, solver_names())
     from wholebody.methods.qp.solvers.qpsolvers_solver import QpsolversSolver
 
-    return QpsolversSolver(name)
+    return QpsolversSolver(name, hot_start)

@@ -1,0 +1,150 @@
+"""What `solver` and `hot_start` mean: which solver is asked for which program, and what the answer tells of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.bench.closed import said, summed
+from wholebody.methods.qp.solvers import registry
+from wholebody.methods.qp.solvers.registry import make_solver, solver_names
+
+NAMED = [name for name in solver_names() if name != "active_set"]
+
+
+@pytest.fixture(scope="module")
+def over_a_table(spatial_arm) -> wb.Problem:
+    scene = wb.Scene(spatial_arm()).add(wb.Box((0.5, 0.8, 0.1)), name="table", at=(0.55, 0.0, 0.35))
+    start = np.array([-0.9, 0.5, 0.9, 0.0, 0.5, 0.0])
+    return wb.Problem(scene, start, goals=[wb.Point("tip", (0.55, 0.35, 0.45))])
+
+
+@pytest.fixture(scope="module")
+def spatial_arm():
+    from wholebody.bench.stability.bodies import spatial_arm
+
+    return spatial_arm
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Answers of all solvers that are asked, in order."""
+    answers = []
+    make = registry.make_solver
+
+    def watched(name, hot_start=True):
+        solver = make(name, hot_start)
+        inner = solver.solve_cold
+
+        def solve_cold(program):
+            answers.append(inner(program))
+            return answers[-1]
+
+        solver.solve_cold = solve_cold
+        return solver
+
+    monkeypatch.setattr("wholebody.methods.qp.method.make_solver", watched)
+    return answers
+
+
+def test_as_it_comes_only_the_first_program_is_osqps(over_a_table, asked):
+    solution = wb.QP().solve(over_a_table)
+    assert solution.method == "qp"
+    assert solution.programs["osqp"] >= 1
+    assert solution.programs["active set"] > solution.programs["osqp"]
+    assert asked[0].iterations > 0
+    assert len(asked) <= sum(count for by, count in solution.programs.items() if by != "active set")
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_without_a_hot_start_every_program_is_the_named_solvers(over_a_table, asked, name):
+    solution = wb.QP(solver=name, hot_start=False).solve(over_a_table)
+    assert solution.solved
+    assert solution.method == f"qp/{name}"
+    assert set(solution.programs) <= {name, "semismooth newton"}
+    assert len(asked) >= sum(solution.programs.values())  # a program with a row that was missed is solved again
+    assert all(answer.iterations > 0 for answer in asked), "the solver's own iterations"
+
+
+@pytest.mark.parametrize("solver", ["osqp", "active_set"])
+@pytest.mark.parametrize("hot_start", [True, False])
+def test_counts_add_up_to_the_programs(over_a_table, solver, hot_start):
+    for measures in (True, False):
+        solution = wb.QP(solver=solver, hot_start=hot_start, measures=measures).solve(over_a_table)
+        assert sum(solution.programs.values()) == solution.iterations
+
+
+def test_active_sets_throughout(over_a_table):
+    method = wb.QP(solver="active_set")
+    solution = method.solve(over_a_table)
+    assert solution.method == "qp/active_set"
+    assert max(solution.programs, key=solution.programs.__getitem__) == "active set"
+    assert set(solution.programs) <= {"active set", "osqp", "semismooth newton"}
+
+
+def test_other_methods_have_no_programs(over_a_table):
+    assert wb.CCD().solve(over_a_table).programs == {}
+
+
+@pytest.mark.parametrize("method", [wb.QP(), wb.QP(hot_start=False), wb.QP(solver="active_set")])
+def test_a_tracker_tells_of_every_step(over_a_table, method):
+    tracker, q = method.tracker(over_a_table, 0.01), over_a_table.start
+    steps = []
+    for _ in range(8):
+        steps.append(tracker.step(q))
+        q = steps[-1].q
+    assert all(sum(step.programs.values()) >= 1 for step in steps)
+    if method.name == "qp":
+        assert list(steps[0].programs) == ["osqp"]
+        assert all(list(step.programs) == ["active set"] for step in steps[1:])
+    elif method.name == "qp/osqp":
+        assert all(list(step.programs) == ["osqp"] and step.iterations > 0 for step in steps)
+    else:
+        assert all("osqp" not in step.programs for step in steps)
+
+
+@pytest.mark.parametrize(
+    "method", [wb.QP(), wb.QP(hot_start=False), wb.QP(solver="active_set"), wb.QP(solver="daqp", hot_start=False)]
+)
+def test_the_same_call_has_the_same_answer(over_a_table, method):
+    once, again = method.solve(over_a_table), method.solve(over_a_table)
+    assert np.array_equal(once.q, again.q)
+    assert once.programs == again.programs
+
+
+@pytest.mark.parametrize("name", solver_names())
+def test_every_way_comes_to_the_same_posture(over_a_table, name):
+    expected = wb.QP(tolerance=1e-7).solve(over_a_table).q
+    for hot_start in (True, False):
+        q = wb.QP(solver=name, hot_start=hot_start, tolerance=1e-7).solve(over_a_table).q
+        assert q == pytest.approx(expected, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("settings", "name"),
+    [
+        ({}, "qp"),
+        ({"hot_start": False}, "qp/osqp"),
+        ({"solver": "active_set"}, "qp/active_set"),
+        ({"solver": "daqp"}, "qp/daqp+hot_start"),
+        ({"solver": "daqp", "hot_start": False}, "qp/daqp"),
+    ],
+)
+def test_the_name_says_what_runs(settings, name):
+    assert wb.QP(**settings).name == name
+
+
+def test_a_program_counts_once_and_as_what_it_needed():
+    solver = make_solver("osqp")
+    assert solver.count(["osqp", "active set"]) == "osqp"
+    assert solver.count(["active set", "active set"]) == "active set"
+    assert solver.count(["active set", "semismooth newton", "osqp"]) == "semismooth newton"
+    assert solver.counted() == {"osqp": 1, "active set": 1, "semismooth newton": 1}
+    assert solver.counted() == {}
+
+
+def test_counts_as_a_table_says_them():
+    assert said({"osqp": 1, "active set": 7}) == "active set 7, osqp 1"
+    assert summed(["active set 7, osqp 1", "", "osqp 2"]) == "active set 7, osqp 3"
+    assert summed([]) == ""

@@ -1,0 +1,222 @@
+"""Recorded programs by every solver alone: no hot start, one solver after the other for each case, in turning order."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.bench.qp_programs.recording import Recorded
+from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
+from wholebody.methods.qp.solvers.active_set_solver import ActiveSetSolver
+from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
+from wholebody.methods.qp.solvers.registry import make_solver
+
+RESAMPLES = 1000  # bootstrap: medians of as many draws with replacement
+MARGIN = 0.025  # share of them outside an interval on each side
+
+
+class Residuals(NamedTuple):
+    """How well an answer satisfies the optimality conditions of the split form, as qpsolvers defines them.
+
+    Attributes:
+        primal: largest violation of the box and of the rows [m, rad].
+        dual: largest entry of the Lagrangian's gradient over the curvature there: the Newton step left [rad, m].
+        gap: difference of the primal and the dual objective, as a share of the primal one.
+    """
+
+    primal: float
+    dual: float
+    gap: float
+
+
+@dataclass(frozen=True)
+class QPRow:
+    """One program by one solver.
+
+    Attributes:
+        set, name: of the program.
+        solver: which was asked.
+        variables, soft, elastic: sizes of the program.
+        wall_us, cpu_us: wall and processor's time of a solve, the correcting of the active set included [us].
+        by: what closed the program.
+        exact: whether the answer is exact.
+        iterations: of the solver.
+        own_error: how far the solver's own answer is from the exact one [rad, m]; nan where it has none.
+        primal, dual, gap: see `Residuals`; of the final answer.
+    """
+
+    set: str
+    name: str
+    solver: str
+    variables: int
+    soft: int
+    elastic: int
+    wall_us: float
+    cpu_us: float
+    by: str
+    exact: bool
+    iterations: int
+    own_error: float
+    primal: float
+    dual: float
+    gap: float
+
+
+@dataclass(frozen=True)
+class QPSummary:
+    """All programs by one solver; times in microseconds, with 95 % intervals by the bootstrap.
+
+    Attributes:
+        closed: programs that the solver closed itself, its active set corrected.
+        low, high: 95 % interval of the share of them (Wilson).
+        handed_on: programs that semismooth Newton steps closed, or another solver.
+        failed: programs without an exact answer.
+    """
+
+    solver: str
+    programs: int
+    closed: int
+    low: float
+    high: float
+    handed_on: int
+    failed: int
+    median_us: float
+    median_low: float
+    median_high: float
+    p95_us: float
+    p95_low: float
+    p95_high: float
+    cpu_median_us: float
+    cpu_p95_us: float
+    iterations: float
+    own_error: float
+    own_worst: float
+    primal: float
+    dual: float
+    gap: float
+
+
+def measure(
+    programs: Sequence[Recorded], solvers: Sequence[str], say: Callable[[str], None] = lambda text: None
+) -> list[QPRow]:
+    """Give every program to every solver.
+
+    A case's programs are solved in the order in which they were posed, by a solver that is made for the case and keeps
+    its workspace, as in a solve. It is set up, and that is not counted, by the last program of the case.
+    """
+    rows: list[QPRow] = []
+    done = ""
+    for turn, mine in enumerate(_cases(programs)):
+        shift = turn % len(solvers)
+        for name in [*solvers[shift:], *solvers[:shift]]:
+            solver = make_solver(name, hot_start=False)
+            solver.load()
+            solver.solve(mine[-1].program, None)
+            rows += [_row(one, name, solver) for one in mine]
+        if mine[0].set != done:
+            done = mine[0].set
+            say(f"{done}: {', '.join(solvers)}")
+    return rows
+
+
+def _cases(programs: Sequence[Recorded]) -> Iterator[list[Recorded]]:
+    for _, mine in groupby(programs, key=lambda one: (one.set, one.case)):
+        yield list(mine)
+
+
+def _row(one: Recorded, name: str, solver: QPSolver) -> QPRow:
+    program = one.program
+    gc.disable()
+    worked, clock = time.thread_time_ns(), time.perf_counter_ns()
+    answer = solver.solve(program, None)
+    wall, cpu = time.perf_counter_ns() - clock, time.thread_time_ns() - worked
+    gc.enable()
+    own = solver.own()
+    found = residuals(program, answer)
+    return QPRow(
+        one.set, one.name, name, program.size, len(program.target), len(program.least), wall / 1e3, cpu / 1e3,
+        answer.by, answer.exact, answer.iterations,
+        float("nan") if own is None else float(np.abs(own - answer.x).max(initial=0.0)), *found,
+    )  # fmt: skip
+
+
+def residuals(program: QuadraticProgram, answer: QPSolution) -> Residuals:
+    """Optimality conditions of the split form at z = [x, T x - e, max(0, l - C x)].
+
+    The multipliers of the rows follow from their residuals, w r and v s. Those of the box are what is left of the
+    gradient at bounds that x is on, of the right sign.
+    """
+    x = answer.x
+    r = program.rows @ x - program.target
+    s = np.maximum(program.least - program.elastic @ x, 0.0)
+    y, push = program.weight * r, program.elastic_weight * s
+    pull = program.diagonal * x + program.linear + y @ program.rows - push @ program.elastic
+    box = np.where(x >= program.upper, np.maximum(-pull, 0.0), 0.0) + np.where(
+        x <= program.lower, np.minimum(-pull, 0.0), 0.0
+    )
+    outside = np.maximum(program.lower - x, x - program.upper)
+    primal = 0.5 * (program.diagonal * x) @ x + program.linear @ x + 0.5 * y @ r + 0.5 * push @ s
+    dual = (
+        -0.5 * (program.diagonal * x) @ x - 0.5 * y @ r - 0.5 * push @ s - y @ program.target + push @ program.least
+        - np.maximum(box, 0.0) @ program.upper - np.minimum(box, 0.0) @ program.lower
+    )  # fmt: skip
+    return Residuals(
+        max(float(outside.max(initial=0.0)), 0.0),
+        program.optimality(x),
+        abs(float(primal - dual)) / max(abs(float(primal)), 1.0),
+    )
+
+
+def summaries(rows: Sequence[QPRow], solvers: Sequence[str], seed: int) -> list[QPSummary]:
+    """One row a solver; the seed is the bootstrap's."""
+    return [_summary(name, [row for row in rows if row.solver == name], seed) for name in solvers]
+
+
+def _summary(solver: str, mine: Sequence[QPRow], seed: int) -> QPSummary:
+    itself = ACTIVE_SET if solver == ActiveSetSolver.name else solver
+    closed = sum(row.by == itself for row in mine)
+    failed = sum(not row.exact for row in mine)
+    wall = np.array([row.wall_us for row in mine])
+    cpu = np.array([row.cpu_us for row in mine])
+    own = np.array([row.own_error for row in mine])
+    own = own[np.isfinite(own)]
+    drawn = np.random.default_rng(seed).choice(wall, (RESAMPLES, len(wall)))
+    intervals = [np.quantile(np.quantile(drawn, share, axis=1), (MARGIN, 1.0 - MARGIN)) for share in (0.5, 0.95)]
+    (median_low, median_high), (p95_low, p95_high) = intervals
+    from scipy.stats import binomtest
+
+    share = binomtest(closed, len(mine)).proportion_ci(method="wilson")
+    return QPSummary(
+        solver=solver,
+        programs=len(mine),
+        closed=closed,
+        low=float(share.low),
+        high=float(share.high),
+        handed_on=len(mine) - closed - failed,
+        failed=failed,
+        median_us=float(np.median(wall)),
+        median_low=float(median_low),
+        median_high=float(median_high),
+        p95_us=float(np.quantile(wall, 0.95)),
+        p95_low=float(p95_low),
+        p95_high=float(p95_high),
+        cpu_median_us=float(np.median(cpu)),
+        cpu_p95_us=float(np.quantile(cpu, 0.95)),
+        iterations=float(np.median([row.iterations for row in mine])),
+        own_error=_quantile(own, 0.5),
+        own_worst=_quantile(own, 1.0),
+        primal=max(row.primal for row in mine),
+        dual=max(row.dual for row in mine),
+        gap=max(row.gap for row in mine),
+    )
+
+
+def _quantile(values: Array, share: float) -> float:
+    return float(np.quantile(values, share)) if len(values) else float("nan")

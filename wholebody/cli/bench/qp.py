@@ -1,0 +1,58 @@
+"""`wholebody bench qp`: the quadratic programs of all problem sets by every solver alone."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from wholebody.cli.bench.publishing import add_common, check_count, publish
+
+QUICK = 45  # programs
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "qp",
+        help="the quadratic programs of all problem sets by every solver alone",
+        description="Record the programs that the QP method poses on the problem sets, keep them as files that "
+        "qpsolvers reads, and give them to every QP solver alone.",
+    )
+    parser.add_argument("--count", type=int, default=2000, metavar="N", help="programs (default: 2000)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the problem sets (default: 0)")
+    parser.add_argument("--solvers", nargs="+", metavar="NAME", help="QP solvers (default: all that are installed)")
+    parser.add_argument("--sets", nargs="+", metavar="NAME", help="problem sets (default: all)")
+    parser.add_argument("--programs", type=Path, metavar="DIR", help="files of an earlier run, instead of recording")
+    parser.set_defaults(run=run)
+    add_common(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure solvers of quadratic programs."""
+    from wholebody.bench.machine import machine
+    from wholebody.bench.problem_sets.registry import SETS, problem_set
+    from wholebody.bench.qp_programs import files
+    from wholebody.bench.qp_programs.measuring import measure, summaries
+    from wholebody.bench.qp_programs.recording import record
+    from wholebody.bench.qp_programs.report import qp_report
+    from wholebody.bench.tables import write_rows
+    from wholebody.methods.qp.solvers.registry import make_solver, solver_names
+
+    sets = [problem_set(name).name for name in arguments.sets or SETS]
+    solvers = tuple(arguments.solvers or solver_names())
+    for name in solvers:
+        make_solver(name)
+    count = QUICK if arguments.quick else arguments.count
+    check_count(count, "--count")
+    if arguments.programs is None:
+        programs = record(sets, count, arguments.seed, print)
+        files.save(programs, arguments.out / "qp-programs")
+    else:
+        programs = [one for one in files.load(arguments.programs) if one.set in sets]
+    facts = machine() | {"seed": str(arguments.seed)}
+    rows = measure(programs, solvers, print)
+    totals = summaries(rows, solvers, arguments.seed)
+    write_rows(arguments.out / "qp-programs.csv", facts, rows)
+    write_rows(arguments.out / "qp.csv", facts, totals)
+    publish("qp", qp_report(rows, totals, facts), {}, {}, arguments)
+    return 0

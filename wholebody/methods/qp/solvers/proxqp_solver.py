@@ -1,0 +1,41 @@
+"""ProxQP (Bambade, El-Kazdadi, Taylor and Carpentier 2022): a proximal augmented Lagrangian method."""
+
+from __future__ import annotations
+
+import numpy as np
+from proxsuite import proxqp
+
+from wholebody.methods.qp.solvers.native_solver import Native, NativeSolver
+from wholebody.methods.qp.solvers.split_form import SplitForm
+
+FAR = 1e20  # ProxQP's infinity
+TOLERANCE = 1e-6  # of the optimality conditions; the active set is then corrected
+LIMIT = 200  # outer iterations
+
+
+class ProxQPSolver(NativeSolver):
+    """ProxQP with a workspace that lives on, and begins with its last answer."""
+
+    name = "proxqp"
+
+    def minimise(self, form: SplitForm, n: int, m: int) -> Native:
+        """See `NativeSolver.minimise`."""
+        size, slots = len(form.linear), len(form.lower) - m
+        data = (
+            np.diag(form.diagonal), form.linear, form.matrix[:m], form.lower[:m], form.matrix[m:], form.lower[m:],
+            np.full(slots, FAR), np.maximum(form.box_lower, -FAR), np.minimum(form.box_upper, FAR),
+        )  # fmt: skip
+        if self._workspace is None:
+            solver = proxqp.dense.QP(size, m, slots, True, proxqp.dense.HessianType.Diagonal)
+            solver.settings.eps_abs, solver.settings.eps_rel = TOLERANCE, 0.0
+            solver.settings.max_iter = LIMIT
+            solver.settings.initial_guess = proxqp.InitialGuess.NO_INITIAL_GUESS
+            solver.init(*data)
+        else:
+            solver = self._workspace
+            solver.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
+            solver.update(*data)
+        solver.solve()
+        self._workspace, found = solver, solver.results
+        z = np.asarray(found.z)
+        return Native(np.array(found.x), z[slots : slots + n].copy(), -z[:slots], max(int(found.info.iter), 1))
