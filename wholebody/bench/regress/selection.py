@@ -23,6 +23,7 @@ from wholebody.bench.stability.case import Posed
 from wholebody.bench.stability.catalogue import cases
 from wholebody.bench.track import track
 from wholebody.methods.base import Method
+from wholebody.methods.qp.solvers.base import ACTIVE_SET
 from wholebody.problem import Problem
 
 Counted = dict[str, int | str]
@@ -122,7 +123,7 @@ def _solve(method: Method, problem: Problem) -> Counted:
 def _reach(name: str) -> Counted:
     """The reach of `wholebody bench step`, its beginning; memory at its end, where all buffers have been made."""
     course = track(name, STEPS)
-    tool = WholebodyTool(course, "osqp")
+    tool = WholebodyTool(course)
     tool.reset(course.start)
     with counting() as counts:
         for target in course.targets[:-MEASURED]:
@@ -132,7 +133,7 @@ def _reach(name: str) -> Counted:
     return {
         "rows": round(STEPS * told["rows"]),
         "inexact": round(STEPS * (1.0 - told["exact"])),
-        "asked": round(STEPS * (1.0 - told["at_once"])),
+        "asked": sum(count for by, count in tool.programs().items() if by != ACTIVE_SET),
         "passes": counts.passes,
         "pairs": counts.pairs,
         "bytes": int(np.median(taken)),
