@@ -36,7 +36,7 @@ class ReachRow:
         seed: what it was made from.
         solver: of the QP method.
         status: as the method said.
-        how: "directly", "by homotopy", "from another start", or the message of what was not solved.
+        how: "directly", "by feasibility first", "from another start", or the message of what was not solved.
         milliseconds: of the solve.
         iterations: of the method.
         goal_error: distance left, as judged independently [m].
