@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import copy
+import pickle
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.first_order import AllPairs
+from wholebody import all_pairs
+from wholebody.all_pairs import AllPairs, NearPairs
 from wholebody.geometry.proximity import Proximity
 
 LENGTHS = (0.5, 0.4)
+
+
+@pytest.fixture(scope="module")
+def human():
+    return wb.load("human")
 
 
 def test_depth_and_lack_of_clearance(free_bodies):
@@ -152,13 +160,11 @@ def test_gradients_of_the_gaps_against_finite_differences(free_bodies):
     for body, place in ((0, (0.0, 0.0, 0.0)), (1, (-0.03, 0.0, 0.17))):
         q[7 * body : 7 * body + 3] = place
         q[7 * body + 3 : 7 * body + 7] = pin.Quaternion(pin.exp3(np.array([0.3, -0.5, 0.7]))).coeffs()
-    problem = wb.Problem(scene, q)
     pairs = AllPairs(scene.built)
     pairs.move(q)
     touching = np.flatnonzero(pairs.distance < 0.01)
     assert len(touching) == 3
-    problem.clearances = np.full(len(pairs.distance), 0.01)
-    rows, _ = pairs.gradients(problem, pairs.state)
+    rows, _ = pairs.nearer(np.full(len(pairs.distance), 0.01)).gradients(pairs.state)
     differences = np.zeros((len(touching), scene.model.nv))
     for k in range(scene.model.nv):
         for sign in (1.0, -1.0):
@@ -212,3 +218,86 @@ def test_a_moved_thing_is_judged_where_it_is(free_bodies):
     for x in (0.15, 0.3, 0.12):
         scene.move("ball", at=(x, 0.0, 0.0))
         assert wb.assess(problem, problem.start).least_distance == pytest.approx(x - 0.2, abs=1e-9)
+
+
+def cluttered(human, seed=0):
+    """A person among boxes, some of which it is inside of, and postures about the start."""
+    random, scene = np.random.default_rng(seed), wb.Scene(human)
+    for number in range(12):
+        at = random.uniform((-0.6, -0.6, 0.2), (0.6, 0.6, 1.6))
+        scene.add(wb.Box(random.uniform(0.05, 0.3, 3)), name=f"box{number}", at=at)
+    problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.4, -0.3, 1.0))], clearance=0.005)
+    moved = [0.2 * random.standard_normal(human.model.nv) for _ in range(4)]
+    return problem, [human.clamp(pin.integrate(human.model, problem.start, way)) for way in moved]
+
+
+def test_all_distances_are_those_of_coal_pair_by_pair(human):
+    problem, postures = cluttered(human)
+    geometry, pairs = problem.scene.geometry, AllPairs(problem.scene.built)
+    data, placed = human.model.createData(), pin.GeometryData(geometry)
+    for q in postures:
+        pairs.move(q)
+        pin.forwardKinematics(human.model, data, q)
+        pin.updateGeometryPlacements(human.model, data, geometry, placed)
+        for number, pair in enumerate(geometry.collisionPairs):
+            sides = [
+                part
+                for k in (pair.first, pair.second)
+                for part in (
+                    geometry.geometryObjects[k].geometry,
+                    coal.Transform3s(placed.oMg[k].rotation, placed.oMg[k].translation),
+                )
+            ]
+            found = coal.distance(*sides, coal.DistanceRequest(), coal.DistanceResult())
+            assert pairs.distance[number] == pytest.approx(found, abs=2e-6)
+        assert pairs.least == pairs.distance.min()
+
+
+def test_a_judgement_does_not_depend_on_those_before_it(human):
+    problem, postures = cluttered(human)
+    alone = [wb.assess(cluttered(human)[0], q) for q in postures]
+    for q, expected in reversed(list(zip(postures, alone, strict=True))):
+        found = wb.assess(problem, q)
+        assert found == expected
+        assert found.optimality == expected.optimality
+        assert found.blockers == expected.blockers
+
+
+def test_it_says_the_same_where_results_cannot_be_viewed(human, monkeypatch):
+    problem, postures = cluttered(human)
+    expected = [wb.assess(problem, q) for q in postures]
+    monkeypatch.setattr(all_pairs, "distance_view", lambda results: None)
+    monkeypatch.setattr(all_pairs, "placement_view", lambda placements: None)
+    other = cluttered(human)[0]
+    for q, one in zip(postures, expected, strict=True):
+        found = wb.assess(other, q)
+        assert found == one
+        assert found.optimality == one.optimality
+        assert found.blockers == one.blockers
+
+
+def test_what_pushes_is_not_asked_for_until_somebody_wants_it(human, monkeypatch):
+    problem, postures = cluttered(human)
+    monkeypatch.setattr(NearPairs, "gradients", lambda *_: pytest.fail("gradients of contacts were computed"))
+    for q in postures:
+        assert wb.assess(problem, q).clearance_violation > 0.0
+
+
+def test_optimality_and_blockers_are_of_the_moment_of_the_judgement(human):
+    """Whatever moves or is changed before they are asked for; a pickled judgement has them too."""
+    problem, postures = cluttered(human)
+    q = postures[0]
+    now, later = wb.assess(problem, q), wb.assess(problem, q)
+    expected = now.optimality, now.blockers
+    assert expected[1]
+    wb.assess(problem, postures[1])
+    for number in range(12):
+        problem.scene.move(f"box{number}", at=(5.0, 5.0, 5.0))
+    problem.clearances += 0.1
+    problem.retarget([wb.Point("left_index_tip", (0.0, 0.0, 0.0))])
+    assert (later.optimality, later.blockers) == expected
+    restored = pickle.loads(pickle.dumps(now))
+    assert restored == now
+    assert (restored.optimality, restored.blockers) == expected
+    assert restored.summary() == now.summary()
+    assert now.summary()["blockers"][0]["names"] == expected[1][0].names

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
 import wholebody as wb
+from wholebody.first_order import nonnegative_least_squares
 from wholebody.view.composition import Composition
 
 LENGTHS = (0.5, 0.4)
@@ -65,6 +67,25 @@ def test_a_hold_that_the_goal_pulls_against_is_named_with_its_frame(planar_arm):
     hold = wb.Hold("tip", at=(0.9, 0.0, 0.0), orientation=False)
     problem = wb.Problem(scene, goals=[wb.Point("link1", (0.3, 0.3, 0.0))], constraints=[hold])
     assert "constraints[0], Hold('tip')" in named(problem, np.zeros(2))
+
+
+@pytest.mark.parametrize("kind", ["any", "in few dimensions", "repeated and opposite", "along axes"])
+def test_nonnegative_least_squares_are_those_of_scipy(kind):
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        m, n = rng.integers(1, 40, size=2)
+        rows, right = rng.normal(size=(m, n)), rng.normal(size=n)
+        if kind == "in few dimensions":
+            rows = rng.normal(size=(m, 3)) @ rng.normal(size=(3, n))
+        elif kind == "repeated and opposite":
+            rows = np.vstack([rows, rows, -3.0 * rows[m // 2 :], np.zeros((2, n))])
+        elif kind == "along axes":
+            rows = np.eye(n)[rng.integers(0, n, size=m)] * rng.choice([-1.0, 1.0], size=(m, 1))
+        share, left = nonnegative_least_squares(rows, right, np.linalg.norm(rows, axis=1))
+        reference, _ = nnls(rows.T, right)
+        assert (share >= 0.0).all()
+        np.testing.assert_allclose(left, right - share @ rows, atol=1e-11)
+        np.testing.assert_allclose(left, right - reference @ rows, atol=1e-8)  # what is left is unique, shares are not
 
 
 def test_an_answer_says_it_in_words_and_in_the_picture(planar_arm):

@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.reference.linearisation import ReferenceLineariser
 from wholebody.tasks.base import Goal
 
 
@@ -145,3 +146,126 @@ def test_what_was_told_is_not_overwritten_by_the_next_posture(problem):
     lineariser.at(posture(problem, 5), 0.1)
     for name, copy in copies.items():
         assert np.array_equal(getattr(at.contacts if name == "distance" else at, name), copy)
+
+
+def reference(problem, workspace, dt=None):
+    return ReferenceLineariser(
+        workspace, problem.scene.figure.tangent_bounds, problem.goals, problem.constraints, problem.bounds,
+        problem.measures, problem.clearances, dt,
+    )  # fmt: skip
+
+
+def assert_same(found, wanted):
+    """Entry by entry; to rounding but for rotation vectors, which Pinocchio knows to 1e-8 near half a turn."""
+    assert np.array_equal(found.contacts.number, wanted.contacts.number)
+    assert np.array_equal(found.gap_contact, wanted.gap_contact)
+    for name in ("q", "lower", "upper", "clearance"):
+        assert np.array_equal(getattr(found, name), getattr(wanted, name)), name
+    for name in ("goal_error", "value", "gap", "measure", "gradient", "curvature"):
+        np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), rtol=1e-10, atol=2e-8, err_msg=name)
+    for name in ("goal_jacobian", "value_jacobian", "gap_jacobian"):
+        np.testing.assert_allclose(getattr(found, name), getattr(wanted, name), rtol=1e-9, atol=2e-7, err_msg=name)
+
+
+def random_term(rng, scene):
+    """A goal or constraint of any class, about any frame of a person."""
+    frames = ("right_index_tip", "left_palm", "head", "right_foot", "pelvis", "left_elbow")
+    one, other = rng.choice(frames, 2, replace=False)
+    place = tuple(rng.uniform(-1.0, 1.5, 3))
+    turn = pin.Quaternion(pin.exp3(rng.choice([1e-9, 0.1, 2.0, 3.1]) * np.array(pin.SE3.Random().rotation[0]))).coeffs()
+    axis = tuple(rng.normal(size=3))
+    makers = (
+        lambda: wb.Point(one, place, offset=tuple(rng.normal(size=3))),
+        lambda: wb.Frame(one, (*place, *turn)),
+        lambda: wb.Orientation(one, turn),
+        lambda: wb.Axis(one, axis, direction=tuple(rng.normal(size=3))),
+        lambda: wb.Axis(one, axis, toward=place),
+        lambda: wb.Relative(one, other, (*place, *turn)),
+        lambda: wb.Relative(one, other, place, orientation=False),
+        lambda: wb.CenterOfMass(place, axes=str(rng.choice(["xy", "xyz"]))),
+        lambda: wb.Posture("sitting", joints=["left_arm", "spine"]),
+        lambda: wb.Posture("standing"),
+        lambda: wb.Hold(one, orientation=bool(rng.integers(2))),
+        lambda: wb.Hold(one, relative_to=other),
+        lambda: wb.Plane(one, axis, side=str(rng.choice(["on", "above"]))),
+        lambda: wb.Balance(),
+        lambda: wb.ReachCones(),
+    )
+    return makers[int(rng.integers(len(makers)))]()
+
+
+def test_the_compiled_pass_is_the_plain_one_entry_by_entry(problem):
+    """Random terms at random postures: 60 problems, 20 postures each, with and without a time step."""
+    rng, rows = np.random.default_rng(3), 0
+    pin.seed(3)
+    scene = problem.scene
+    for number in range(60):
+        terms = [random_term(rng, scene) for _ in range(int(rng.integers(1, 7)))]
+        asked = wb.Problem(
+            scene,
+            goals=[term for term in terms if isinstance(term, Goal)],
+            constraints=[term for term in terms if not isinstance(term, Goal)]
+            + [wb.Freeze("neck"), wb.StepLimit(1.0, root_velocity=0.5)][: int(rng.integers(3))],
+            measures=[wb.Effort(2.0), wb.Displacement(), wb.PotentialEnergy(0.01), wb.Discomfort(0.1)][: number % 5],
+            clearance=float(rng.choice([0.0, 0.01])),
+        )
+        dt = None if number % 2 else 0.02
+        one, other = asked.workspace(), asked.workspace()
+        lineariser, plain = asked.lineariser(one, dt), reference(asked, other, dt)
+        for k in range(20):
+            q = posture(asked, 20 * number + k)
+            found = lineariser.at(q, 0.08)
+            assert_same(found, plain.at(q, 0.08))
+            rows += len(found.gap) + len(found.goal_error) + len(found.value)
+    assert rows > 30000
+
+
+def test_goals_that_move_keep_the_plan_and_other_goals_renew_it(problem):
+    """Targets alone are written anew; another class, frame or number of goals is another plan."""
+    q = posture(problem, 5)
+    asked = wb.Problem(problem.scene, goals=[wb.Point("left_palm", (0.4, 0.2, 1.0)), Squared()])
+    lineariser = asked.lineariser(asked.workspace())
+    lineariser.at(q, 0.05)
+    for goals in (
+        [wb.Point("left_palm", (0.5, 0.2, 1.1)), Squared()],
+        [wb.Point("right_palm", (0.5, 0.2, 1.1)), Squared()],
+        [Squared(), wb.Point("right_palm", (0.5, 0.2, 1.1))],
+        [wb.Frame("right_palm", (0.5, 0.2, 1.1))],
+        [wb.CenterOfMass((0.1, 0.2, 0.9)), wb.Posture("sitting", joints=["left_arm"])],
+    ):
+        asked.retarget(goals)
+        lineariser.take(asked.goals, asked.clearances)
+        assert_same(lineariser.at(q, 0.05), reference(asked, asked.workspace()).at(q, 0.05))
+
+
+def test_joints_that_follow_others_and_round_joints(tmp_path):
+    """Mimic joints, continuous joints and a floating base of a robot: the compiled pass is the plain one."""
+    robot = tmp_path / "robot.urdf"
+    links = "".join(
+        f'<link name="l{k}"><inertial><mass value="{k + 1}"/><origin xyz="0.1 0 0.2"/><inertia ixx="1" iyy="1" izz="1" '
+        'ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><sphere radius="0.05"/></geometry></collision></link>'
+        for k in range(5)
+    )
+    kinds = ("continuous", "revolute", "revolute", "prismatic")
+    joints = "".join(
+        f'<joint name="j{k}" type="{kind}"><parent link="l{k}"/><child link="l{k + 1}"/><origin xyz="0 0.1 0.3"/>'
+        f'<axis xyz="{k % 2} 1 0"/><limit lower="-2" upper="2" velocity="1" effort="1"/>'
+        + ('<mimic joint="j1" multiplier="0.5" offset="0.1"/>' if k == 2 else "")
+        + "</joint>"
+        for k, kind in enumerate(kinds)
+    )
+    robot.write_text(f'<robot name="r">{links}{joints}</robot>')
+    for root in ("fixed", "free"):
+        figure = wb.load(robot, root=root)
+        scene = wb.Scene(figure)
+        scene.add(wb.Sphere(0.1), name="ball", at=(0.1, 0.3, 0.9))
+        asked = wb.Problem(
+            scene,
+            goals=[wb.Frame("l4", (0.1, 0.2, 0.8)), wb.CenterOfMass((0.1, 0.0, 0.4))],
+            measures=[wb.Effort(), wb.Displacement(), wb.Discomfort()],
+        )
+        lineariser, plain = asked.lineariser(asked.workspace()), reference(asked, asked.workspace())
+        rng = np.random.default_rng(1)
+        for _ in range(50):
+            q = figure.clamp(pin.integrate(figure.model, figure.neutral, rng.normal(size=figure.model.nv)))
+            assert_same(lineariser.at(q, 0.5), plain.at(q, 0.5))

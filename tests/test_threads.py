@@ -74,9 +74,9 @@ def same(one: wb.Solution, other: wb.Solution) -> bool:
 
 
 METHODS = {
-    "qp/osqp": (wb.QP(budget=40, restarts=2, time_limit=None), 4),
-    "qp/daqp": (wb.QP(solver="daqp", budget=40, restarts=2, time_limit=None), 4),
-    "dls": (wb.DampedLeastSquares(iterations=40, time_limit=None), 6),
+    "qp/osqp": (wb.QP(budget=20, restarts=1, time_limit=None), 2),
+    "qp/daqp": (wb.QP(solver="daqp", budget=20, restarts=1, time_limit=None), 2),
+    "dls": (wb.DampedLeastSquares(iterations=40, time_limit=None), 3),
     "newton": (wb.Newton(restarts=0, iterations=12, time_limit=None), 1),
     "placo": (wb.Placo(iterations=20, time_limit=None), 1),
     "ccd": (wb.CCD(restarts=0, iterations=40, time_limit=None), 2),

@@ -1,6 +1,6 @@
-"""Pose whole bodies among things: people, avatars, hands and robots, in contact and never inside.
+"""Pose people, avatars, hands and robots among objects, in contact and without penetration.
 
-The public names are loaded when they are first used, so that ``import wholebody`` stays light::
+The public names are loaded when they are first used, so that ``import wholebody`` is fast::
 
     import wholebody as wb
 

@@ -1,4 +1,4 @@
-"""The kinds of arrays: their shapes stand where they are used."""
+"""Array types. Docstrings of functions give the shapes."""
 
 from __future__ import annotations
 

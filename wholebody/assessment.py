@@ -1,26 +1,29 @@
-"""What any method's answer is judged by, computed from the posture alone.
+"""The assessment of any method's answer, computed from the posture alone.
 
-Independent of every method: it looks at all pairs without culling, reads Pinocchio's and coal's results through their
-official getters, and takes contact normals' derivatives from Pinocchio's own joint Jacobians.
+Independent of every method: it looks at all pairs without culling and without memory of earlier postures, and takes
+contact normals' derivatives from Pinocchio's own joint Jacobians. Optimality and what stands in the way are computed
+when they are asked for.
 """
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from math import inf
+from typing import Any
 
 import numpy as np
 
+from wholebody.all_pairs import AllPairs
 from wholebody.arrays import Array
 from wholebody.checks import a, number, posture
 from wholebody.errors import InputError
 from wholebody.figures.state import State
-from wholebody.first_order import MET, AllPairs, Blocker, blockers, optimality
+from wholebody.first_order import MET, Blocker, FirstOrder
 from wholebody.problem import Problem
 
 STILL = 1e-2  # rad, m: optimality below which a posture counts as the nearest to goals that it does not meet
-NAMED = 4  # blockers that a message names at the most
+NAMED = 4  # most blockers that a message names
 
 
 @dataclass(frozen=True)
@@ -28,19 +31,16 @@ class Assessment:
     """How good a posture is for a problem.
 
     Attributes:
-        goal_error: largest distance left to a goal, metres.
-        goal_angle: largest angle left to a goal, radians.
-        penetration: depth of the deepest overlap of any pair, metres; 0 where nothing overlaps.
+        goal_error: largest remaining distance of a goal, metres.
+        goal_angle: largest remaining angle of a goal, radians.
+        penetration: depth of the deepest overlap of any pair, metres; 0 if nothing overlaps.
         least_distance: least signed distance of any pair, metres; inf without pairs.
-        clearance_violation: by how much the worst pair misses the distance asked of it, metres.
-        limit_violation: how far the worst joint is out of its limits, radians or metres.
-        constraint_violation: how far the worst constraint is from holding, metres or radians.
+        clearance_violation: largest shortfall of a pair from its required distance, metres.
+        limit_violation: largest violation of a joint limit, radians or metres.
+        constraint_violation: largest violation of a constraint, metres or radians.
         measure: weighted sum of the measures.
-        optimality: first-order optimality, radians or metres, 0 at a perfect one: what no goal, limit, constraint or
-            contact balances of the objective's gradient, divided by the objective's curvature; largest entry. The
-            objective is the measures where the goals are met, else the squared goal errors.
         goal_errors: (goals,) norm of each goal's error, metres or radians (whichever is larger).
-        blockers: what stands in the way, the hardest first, where goals are not met or something does not hold.
+        first_order: optimality and blockers, computed when they are asked for.
         seconds: wall time that the judgement itself took; a method's own time is its solution's less this.
     """
 
@@ -52,10 +52,28 @@ class Assessment:
     limit_violation: float
     constraint_violation: float
     measure: float
-    optimality: float
     goal_errors: tuple[float, ...]
-    blockers: tuple[Blocker, ...] = ()
+    first_order: FirstOrder = field(compare=False, repr=False)
     seconds: float = field(default=0.0, compare=False, repr=False)
+
+    @property
+    def optimality(self) -> float:
+        """First-order optimality, radians or metres, 0 at a perfect posture.
+
+        What no goal, limit, constraint or contact balances of the objective's gradient, divided by the objective's
+        curvature; largest entry. The objective is the measures where the goals are met, else the squared goal errors.
+        """
+        return self.first_order.optimality
+
+    @property
+    def blockers(self) -> tuple[Blocker, ...]:
+        """What stands in the way, the hardest first; none where goals are met and everything holds."""
+        return self.first_order.blockers
+
+    def summary(self) -> dict[str, Any]:
+        """All of it as plain numbers, texts, lists and dictionaries."""
+        numbers = {part.name: getattr(self, part.name) for part in fields(self) if part.name != "first_order"}
+        return {**numbers, "optimality": self.optimality, "blockers": [asdict(blocker) for blocker in self.blockers]}
 
     def holds(self, tolerance: float) -> bool:
         """Whether limits, constraints and clearances hold to a tolerance, metres and radians."""
@@ -69,7 +87,7 @@ class Assessment:
 
     @property
     def in_the_way(self) -> str:
-        """The hardest blockers in words, to be added to a sentence; empty where goals are met and everything holds."""
+        """The strongest blockers in words, to append to a sentence; empty if goals are met and everything holds."""
         if not self.blockers:
             stretched = not self.met(MET) and self.optimality <= STILL
             return "; nothing pushes back: the limbs do not reach" if stretched else ""
@@ -82,7 +100,7 @@ def assess(problem: Problem, q: Array) -> Assessment:
     """Judge a posture.
 
     Args:
-        problem: what was asked.
+        problem: the problem.
         q: (nq,) the posture.
 
     Raises:
@@ -117,9 +135,8 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
         limit_violation=_limit_violation(problem, q),
         constraint_violation=missed,
         measure=sum(term.weight * term.value(state) for term in problem.measures),
-        optimality=optimality(problem, state, pairs),
         goal_errors=each,
-        blockers=() if fits else blockers(problem, state, pairs),
+        first_order=FirstOrder(problem, pairs, fits),
         seconds=time.perf_counter() - began,
     )
 

@@ -1,6 +1,6 @@
-"""Checks of what people give: each returns the value as it is used, or raises one sentence with the argument's name.
+"""Checks of arguments: each returns the value in the form in which it is used, or raises one sentence with its name.
 
-`what` is what the sentence calls the value: the argument's name, with the callable in front where that is not plain.
+`what` is the name of the value in the sentence: the argument's name, with the callable in front if that is not obvious.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NUMERIC = "fiu"
 """Kinds of numpy arrays that hold real numbers: floating, signed and unsigned."""
 
 TIME_STEP = (1e-6, 1e6)
-"""Least and greatest step, seconds: beyond them velocities have no digits left."""
+"""Least and greatest time step, seconds: beyond them velocities have no significant digits."""
 
 LONGEST = 200
 """Characters of a name or a title."""
@@ -34,12 +34,12 @@ _SHORT.maxstring = _SHORT.maxother = 60
 
 
 def shown(value: object) -> str:
-    """What a sentence says of a value: its representation in one line, shortened, or its type where it has none."""
+    """A value as messages quote it: its representation in one line, shortened, or its type if it has none."""
     if isinstance(value, np.generic):
         value = value.item()
     try:
         return " ".join(_SHORT.repr(value).split())
-    except Exception:  # a representation may be anybody's code; that of an int beyond 4300 digits is refused by Python
+    except Exception:  # a user's __repr__ may raise anything; Python refuses that of an int beyond 4300 digits
         return f"a {type(value).__name__} that cannot be shown"
 
 
@@ -53,10 +53,10 @@ def instance(value: object, kind: type[_T] | tuple[type[_T], ...], what: str, me
     """A value of a type, or of one of several.
 
     Args:
-        value: what was given.
+        value: the argument.
         kind: the type.
-        what: what the sentence calls it.
-        mend: what to give, such as "load one with wb.load('human')".
+        what: its name in the message.
+        mend: the correction, such as "load one with wb.load('human')".
 
     Raises:
         InputError: it is of another type.
@@ -144,17 +144,17 @@ def choice(value: object, options: Collection[str], what: str) -> str:
 def known(
     value: object, names: Collection[str], kind: str, where: str = "", offered: Collection[str] | None = None
 ) -> str:
-    """A name among those that there are.
+    """A known name.
 
     Args:
-        value: what was given.
-        names: every name that would be right.
-        kind: what is named, singular: "frame", "posture".
-        where: the place, for the sentence.
-        offered: the names that the sentence may offer, where not all of them.
+        value: the argument.
+        names: all known names.
+        kind: the kind of object, singular: "frame", "posture".
+        where: the place, for the message.
+        offered: the names that the message may suggest, if not all.
 
     Raises:
-        UnknownNameError: there is none of this name.
+        UnknownNameError: the name is unknown.
         InputError: it is not a text.
     """
     if not isinstance(value, str):
@@ -168,7 +168,7 @@ def listed(value: object, what: str, example: str) -> list[Any]:
     """The entries of a list, a tuple or another iterable that is no text.
 
     Raises:
-        InputError: it cannot be gone through.
+        InputError: it is not iterable.
     """
     if isinstance(value, Iterable) and not isinstance(value, (str, bytes)):
         try:
@@ -202,15 +202,15 @@ def path(value: object, what: str) -> Path:
 
 
 def array(value: object, what: str, wanted: str) -> Array:
-    """Real numbers as an array of any shape; not a copy where it is one already.
+    """Real numbers as an array of any shape; an array of floats is returned without a copy.
 
     Args:
-        value: what was given.
-        what: what the sentence calls it.
-        wanted: what it takes, such as "corners, shape (k, 3), metres".
+        value: the argument.
+        what: its name in the message.
+        wanted: the accepted values, such as "corners, shape (k, 3), metres".
 
     Raises:
-        InputError: it is not made of real numbers; they may still be infinite or NaN.
+        InputError: it does not consist of real numbers. Infinite values and NaN are accepted.
     """
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
@@ -241,7 +241,7 @@ def numbers(value: object, shape: tuple[int, ...], what: str) -> Array:
 
 
 def posture(value: object, size: int, what: str = "a posture") -> Array:
-    """A posture (size,) of finite numbers; not a copy where it is an array of floats already.
+    """A posture (size,) of finite numbers; an array of floats is returned without a copy.
 
     Raises:
         InputError: it has another shape, or a value that is not finite.
@@ -249,14 +249,14 @@ def posture(value: object, size: int, what: str = "a posture") -> Array:
     found = array(value, what, f"{size} numbers; start from figure.posture(...)")
     if found.shape != (size,):
         raise InputError(f"{what} has shape ({size},), not {found.shape}; start from figure.posture(...)")
-    if np.count_nonzero(np.isfinite(found)) != size:  # asked at every step: a third of the time of all()
+    if np.count_nonzero(np.isfinite(found)) != size:  # called at every step: a third of the time of all()
         wrong = int(np.flatnonzero(~np.isfinite(found))[0])
         raise InputError(f"{what} entry {wrong} is not finite; give finite numbers")
     return found
 
 
 def color(value: object, what: str) -> tuple[float, float, float, float]:
-    """Red, green, blue and alpha, each from 0 to 1; alpha is 1 where three are given.
+    """Red, green, blue and alpha, each from 0 to 1; alpha is 1 if it is missing.
 
     Raises:
         InputError: it is neither three nor four such numbers.
@@ -270,7 +270,7 @@ def color(value: object, what: str) -> tuple[float, float, float, float]:
 
 
 def _real(value: object) -> float | None:
-    """A finite number as a float; None for anything else: True, texts, and arrays of one number too."""
+    """A finite number as a float; None for anything else, also for booleans, texts, and arrays of one number."""
     if isinstance(value, (bool, np.bool_, str, bytes, bytearray)) or getattr(value, "shape", ()) != ():
         return None
     try:

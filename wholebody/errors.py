@@ -1,4 +1,4 @@
-"""Errors that people see: each is one sentence that says what is wrong, where, and how to mend it."""
+"""Errors that users see: each is one sentence that says what is wrong, where, and how to correct it."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 
 SHOWN = 80
-"""Characters of a name that a sentence repeats at most."""
+"""Largest number of characters of a name in a message."""
 
 
 def one_line(text: str, most: int = SHOWN) -> str:
-    """A text as sentences repeat it: without line ends and what cannot be printed, and no longer than `most`."""
+    """A text as messages quote it: without line ends and unprintable characters, and no longer than `most`."""
     plain = text if text.isprintable() else text.encode("unicode_escape", "backslashreplace").decode()
     return plain if len(plain) <= most else f"{plain[: most - 3]}..."
 
 
 class WholebodyError(Exception):
-    """Base of every error that wholebody raises on purpose."""
+    """Base of every error that wholebody raises deliberately."""
 
 
 class InputError(WholebodyError, ValueError):
@@ -24,15 +24,15 @@ class InputError(WholebodyError, ValueError):
 
 
 class UnknownNameError(WholebodyError, KeyError):
-    """A name that does not exist, with the nearest names that do."""
+    """An unknown name; the message lists the nearest known names."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str], where: str = "") -> None:
         """Build the sentence.
 
         Args:
-            kind: what was looked for, singular: "frame", "joint", "object".
-            name: the name that was given.
-            known: every name that would have been right.
+            kind: the kind of object, singular: "frame", "joint", "object".
+            name: the unknown name.
+            known: all known names.
             where: the place, such as "goal 2" or "task.toml, key goals[1].frame".
         """
         known = sorted(known)

@@ -1,7 +1,7 @@
-"""Files of people: read with bounds, written whole or not at all, and scratch folders that do not outlive a crash.
+"""Files: read with bounds, written whole or not at all, and scratch folders that are removed after a crash.
 
-Everything that reads a file somebody else wrote begins here, so that devices, pipes, folders, huge files and other
-encodings are one sentence each. Everything that writes one ends here.
+All code that reads users' files uses this module, so that devices, pipes, folders, huge files and wrong encodings give
+one sentence each. All code that writes files uses it too.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ LARGEST = 1_000_000_000
 """Bytes of any other file, such as a mesh or a recorded track."""
 
 LONGEST_NAME = 200
-"""Characters of a path that a sentence repeats."""
+"""Largest number of characters of a path in a message."""
 
 PREFIX = "wholebody-scratch-"
-"""What the names of our scratch folders begin with."""
+"""Beginning of the names of our scratch folders."""
 
 LOCK = "in-use"
-"""A file in each scratch folder that its process keeps locked: the system gives the lock back however it ends."""
+"""A file in each scratch folder that its process keeps locked; the system releases the lock when the process ends."""
 
 UNLOCKED = 60.0
-"""Seconds for which a scratch folder may be without its lock file: the time to make it, with a lot to spare."""
+"""Seconds for which a scratch folder may be without its lock file; making the file takes far less."""
 
 
 def read_bytes(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST) -> bytes:
@@ -43,27 +43,30 @@ def read_bytes(path: str | PathLike[str], kind: str = "file", largest: int = LAR
 
     Args:
         path: the file.
-        kind: what the sentence calls it: "task file", "mesh".
-        largest: bytes beyond which it is refused.
+        kind: its name in messages: "task file", "mesh".
+        largest: largest size, bytes.
 
     Raises:
-        FileFormatError: there is no such file, it is no regular file (a folder, a device, a pipe), it is larger than
-            that, or it cannot be read.
+        FileFormatError: there is no such file, it is no regular file (a folder, a device, a pipe), it is too large, or
+            it cannot be read.
     """
     with _opened(path, kind, largest) as descriptor, open(descriptor, "rb", closefd=False) as file:
         try:
             data = file.read(largest + 1)
         except OSError as error:
             raise FileFormatError(f"{kind} {_named(path)}: cannot be read ({error.strerror})") from None
-    if len(data) > largest:  # one that says it is empty, as those of /proc do
+    if len(data) > largest:  # a file whose size is reported as 0, such as those of /proc
         raise _too_large(path, kind, largest)
     return data
 
 
 def read_text(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST_TEXT) -> str:
-    """Read a text file in UTF-8, with or without a byte order mark; raises like `read_bytes`, and for other encodings.
+    """Read a text file in UTF-8, with or without a byte order mark.
 
     Line ends are kept as they are.
+
+    Raises:
+        FileFormatError: as for `read_bytes`, or the text is not in UTF-8.
     """
     data = read_bytes(path, kind, largest)
     try:
@@ -74,13 +77,13 @@ def read_text(path: str | PathLike[str], kind: str = "file", largest: int = LARG
 
 
 def check_file(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST) -> None:
-    """See that a library can be given a path: raises like `read_bytes`, without reading."""
+    """Check a path before a library reads it: raises like `read_bytes`, without reading."""
     with _opened(path, kind, largest):
         pass
 
 
 def is_file(path: str | PathLike[str]) -> bool:
-    """Whether there is a regular file; false, and no error, for a path that no file system takes."""
+    """Whether there is a regular file; false, and no error, for a path that no file system accepts."""
     try:
         return stat.S_ISREG(os.stat(path).st_mode)
     except (OSError, ValueError):
@@ -88,7 +91,7 @@ def is_file(path: str | PathLike[str]) -> bool:
 
 
 def is_folder(path: str | PathLike[str]) -> bool:
-    """Whether there is a folder; false, and no error, for a path that no file system takes."""
+    """Whether there is a folder; false, and no error, for a path that no file system accepts."""
     try:
         return stat.S_ISDIR(os.stat(path).st_mode)
     except (OSError, ValueError):
@@ -121,7 +124,7 @@ def _too_large(path: str | PathLike[str], kind: str, largest: int) -> FileFormat
 
 
 def _named(path: str | PathLike[str]) -> str:
-    """The path as sentences have it: in one line, and the end of it where it is long."""
+    """A path as messages quote it: in one line; of a long path its end."""
     text = str(path)
     return one_line(text if len(text) <= LONGEST_NAME else f"...{text[-LONGEST_NAME:]}", 2 * LONGEST_NAME)
 
@@ -132,7 +135,8 @@ def _named(path: str | PathLike[str]) -> str:
 def write(path: str | PathLike[str], content: str | bytes) -> Path:
     """Write a file whole or not at all; text as UTF-8.
 
-    What a process that was killed in between has left in the folder is removed by the next one that writes there.
+    A process that is killed during the call may leave a temporary file; the next process that writes to the folder
+    removes it.
 
     Returns:
         The path.
@@ -149,7 +153,7 @@ def write(path: str | PathLike[str], content: str | bytes) -> Path:
         raise _unwritable(path, error) from None
     try:
         with open(descriptor, "wb") as file:
-            with suppress(OSError):  # a network's file system may have no locks
+            with suppress(OSError):  # a network file system may have no locks
                 fcntl.flock(file, fcntl.LOCK_EX)  # held until the file has its own name
             file.write(data)
             file.flush()
@@ -167,10 +171,10 @@ def write(path: str | PathLike[str], content: str | bytes) -> Path:
 
 
 def check_writable(path: Path) -> Path:
-    """The path of a file whose folder can be written, to be asked before long work.
+    """The path of a file whose folder is writable; call it before long work.
 
     Raises:
-        InputError: it cannot.
+        InputError: the folder is missing or not writable.
     """
     if not is_folder(path.parent):
         raise _unwritable(path, FileNotFoundError())
@@ -180,7 +184,7 @@ def check_writable(path: Path) -> Path:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder and those above it, where they are not there already.
+    """Make a folder and those above it, if they do not exist.
 
     Raises:
         InputError: it cannot be made.
@@ -200,7 +204,7 @@ def _unwritable(path: str | PathLike[str], error: Exception) -> InputError:
 
 
 def _remove_left_behind(folder: Path) -> None:
-    """Remove half-written files of ours in a folder whose writers are gone."""
+    """Remove our temporary files in a folder whose processes have ended."""
     for left in folder.glob(f".{PREFIX}*.part"):
         with suppress(OSError), left.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -212,21 +216,21 @@ def _remove_left_behind(folder: Path) -> None:
 
 
 class Scratch:
-    """A folder of our own for temporary files; it goes with `close`, or with the next one that anybody makes.
+    """A folder for temporary files. `close` removes it; after a crash, the next `Scratch` of any process does.
 
     Attributes:
         path: the folder.
     """
 
     def __init__(self) -> None:
-        """Make the folder, and remove those of processes that are gone."""
+        """Make the folder, and remove those of processes that have ended."""
         _remove_abandoned()
         self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
         self._lock = (self.path / LOCK).open("wb")
         fcntl.flock(self._lock, fcntl.LOCK_EX)
 
     def close(self) -> None:
-        """Remove the folder. Doing it again does nothing."""
+        """Remove the folder. Calling it again does nothing."""
         shutil.rmtree(self.path, ignore_errors=True)
         self._lock.close()
 
@@ -240,7 +244,7 @@ class Scratch:
 
 
 def _remove_abandoned() -> None:
-    """Remove our scratch folders that nobody holds: their processes ended without a chance to."""
+    """Remove our scratch folders whose lock is free: their processes ended without removing them."""
     for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
         with suppress(OSError):
             if folder.is_symlink() or folder.stat().st_uid != os.getuid():

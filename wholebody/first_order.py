@@ -1,42 +1,45 @@
-"""First-order optimality of a posture, and what stands in its way: which limits, constraints and contacts push back.
+"""First-order optimality of a posture, and its blockers: the limits, constraints and contacts with large multipliers.
 
-At an optimum the objective's gradient is a combination of the gradients of everything at work, with signs where it
-works to one side only (Karush, Kuhn and Tucker). The combination is found by nonnegative least squares; what it leaves
-says how far from an optimum the posture is, and its largest parts say what is in the way.
+At an optimum the objective's gradient is a combination of the gradients of all active constraints, with nonnegative
+multipliers for inequalities (Karush, Kuhn and Tucker). Nonnegative least squares finds the combination. Its residual
+measures the distance from an optimum, and its largest parts are the blockers.
 """
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Literal
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
 
-import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.all_pairs import AllPairs, Label, NearPairs
+from wholebody.arrays import Array, Mask
 from wholebody.figures.state import State, Wrench
-from wholebody.geometry.guesses import Guesses
 from wholebody.problem import Problem
-from wholebody.scene_geometry import SceneGeometry
 
-ACTIVE = 1e-4  # m, rad: nearer to its bound than this a constraint may push back
+ACTIVE = 1e-4  # m, rad: a constraint nearer to its bound than this counts as active
 FLAT = 1e-2  # share of the largest curvature below which a degree of freedom counts as having that much
 MET = 1e-4  # m, rad: goals nearer than this count as met, and what must hold as holding
+INDEPENDENT = 1e-9  # share of its length that a direction must have of its own to count as independent of others
+MOST_CHANGES = 20  # times the number of rows: changes of the set that pushes, at the most
 WORTH = 0.05  # share of the largest push from which on something counts as being in the way
 
 
 @dataclass(frozen=True)
 class Blocker:
-    """Something that keeps a posture from a better one.
+    """A limit, constraint or contact that blocks a better posture.
 
     Attributes:
         kind: "contact" between two owners, "limit" of a joint, "bound" on a joint (as by `Freeze`), or "constraint".
         names: the two segments or objects; the joint; or the constraint as in "constraints[0], Hold".
-        share: how hard it pushes back, from 0 to 1 for the hardest.
-        violated: whether it does not hold here.
-        frame: of a constraint on one frame, its name.
+        share: its part of the gradient, relative to the strongest blocker, from 0 to 1.
+        violated: whether it is violated at the posture.
+        frame: name of the frame of a constraint on one frame.
     """
 
     kind: Literal["contact", "limit", "bound", "constraint"]
@@ -46,17 +49,14 @@ class Blocker:
     frame: str | None = None
 
     def __str__(self) -> str:
-        """Say it in words."""
+        """Describe it in words."""
         if self.kind == "contact":
             return f"{self.names[0]} against {self.names[1]}"
         return {"limit": "the limit of ", "bound": "the bound on ", "constraint": ""}[self.kind] + self.names[0]
 
 
-Label = tuple[Literal["contact", "limit", "bound", "constraint"], tuple[str, ...]]
-
-
 class _Rows:
-    """Gradients of what is at work, with what each belongs to."""
+    """Gradients of active constraints, with their labels."""
 
     def __init__(self, nv: int) -> None:
         self.rows, self.labels = [np.zeros((0, nv))], list[Label]()
@@ -66,99 +66,55 @@ class _Rows:
         self.labels += labels
 
 
-class AllPairs:
-    """All pairs of a scene, at one posture after the other; on data of its own, lent to one judgement at a time."""
+class FirstOrder:
+    """Optimality and blockers of a judged posture: each is computed when it is first asked for, as things were then.
 
-    def __init__(self, built: SceneGeometry) -> None:
-        """Allocate."""
-        self.model, self.geometry, self._lock = built.model, built.geometry, built.lock
-        self.state = State(self.model)
-        self.results = pin.GeometryData(self.geometry)
-        self._guesses = Guesses(self.results)
-        self._owners = built.owners
-        moves = [piece.parentJoint for piece in self.geometry.geometryObjects]
-        sides = [(moves[pair.first], moves[pair.second]) for pair in self.geometry.collisionPairs]
-        self._joints = np.array(sides, dtype=np.intp).reshape(-1, 2)  # that move the pieces of each pair; 0: none
+    Attributes:
+        fits: whether goals are met and everything holds, so that nothing is in the way.
+    """
 
-    def move(self, q: Array) -> None:
-        """Measure all pairs at the posture q."""
-        self.state.update(q)
-        with self._lock:  # not while a thing is moved, one piece after the other
-            pin.updateGeometryPlacements(self.model, self.state.data, self.geometry, self.results)
-        self._guesses.forget()  # the judgement of a posture does not depend on the one before
-        pin.computeDistances(self.geometry, self.results)
-        self.distance = np.array([result.min_distance for result in self.results.distanceResults])
-        if np.isnan(self.distance).any():
-            raise InputError("a distance is not a number; an object's placement or shape is broken")
-        self.least = float(self.distance.min()) if len(self.distance) else float("inf")
+    def __init__(self, problem: Problem, pairs: AllPairs, fits: bool) -> None:
+        """Keep what was asked, the posture where `pairs` are, and the pairs that push there."""
+        self.fits = fits
+        self._problem, self._built, self._q = copy.copy(problem), problem.scene.built, pairs.state.q.copy()
+        self._near = pairs.nearer(problem.clearances + ACTIVE)
+        self._clearances = problem.clearances[self._near.number]
 
-    def gradients(self, problem: Problem, state: State) -> tuple[Array, list[int]]:
-        """Derivatives (k, nv) of the gaps of all pairs that push, at the corners of their patches; the pairs (k,)."""
-        corners = [
-            (pair, normal, point)
-            for pair in np.flatnonzero(self.distance < problem.clearances + ACTIVE).tolist()
-            for normal, point in self._patch(pair)
-        ]
-        rows = np.zeros((len(corners), state.model.nv))
-        numbers = [corner[0] for corner in corners]
-        if not corners:
-            return rows, numbers
-        normals, points = np.array([corner[1] for corner in corners]), np.array([corner[2] for corner in corners])
-        wrenches = np.hstack([normals, np.cross(points, normals)])
-        joints = self._joints[numbers]
-        for side, sign in ((1, 1.0), (0, -1.0)):
-            for joint in set(joints[:, side].tolist()) - {0}:
-                moved = joints[:, side] == joint
-                jacobian = pin.getJointJacobian(state.model, state.data, joint, pin.WORLD)
-                rows[moved] += sign * wrenches[moved] @ jacobian.reshape(6, -1)  # of one degree of freedom it is (6,)
-        return rows, numbers
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the answers: a copy in another process has nothing to compute them from."""
+        return {"fits": self.fits, "optimality": self.optimality, "blockers": self.blockers}
 
-    def label(self, pair: int) -> Label:
-        """What a collision pair is called."""
-        index = self.geometry.collisionPairs[pair]
-        return "contact", (self._owners[index.first], self._owners[index.second])
+    @cached_property
+    def optimality(self) -> float:
+        """See `wholebody.assessment.Assessment`."""
+        with self._lent() as state:
+            return _optimality(self._problem, state, _active(self._problem, state, self._near))
 
-    def _patch(self, pair: int) -> list[tuple[Array, Array]]:
-        """Normal and place of the witness point and of the corners of the contact patch."""
-        result = self.results.distanceResults[pair]
-        normal = np.array(result.normal)
-        if np.linalg.norm(normal) < 0.5:
-            return []
-        places = [np.array(result.getNearestPoint1())]
-        first, second, placed_first, placed_second = self._placed(pair)
-        request, contact = coal.CollisionRequest(), coal.CollisionResult()
-        request.security_margin = float(self.distance[pair]) + ACTIVE
-        coal.collide(first, placed_first, second, placed_second, request, contact)
-        if contact.isCollision():
-            patch = coal.ContactPatchResult()
-            try:
-                coal.computeContactPatch(
-                    first, placed_first, second, placed_second, contact, coal.ContactPatchRequest(), patch
-                )
-                for number in range(patch.numContactPatches()):
-                    polygon = patch.getContactPatch(number)
-                    places += [np.array(polygon.getPoint(i)) for i in range(polygon.size())]
-            except (RuntimeError, ValueError):
-                pass  # coal has no patch for this pair of shapes; the witness point stands alone
-        return [(normal, place) for place in places]
+    @cached_property
+    def blockers(self) -> tuple[Blocker, ...]:
+        """See `wholebody.assessment.Assessment`."""
+        if self.fits:
+            return ()
+        with self._lent() as state:
+            return _blockers(self._problem, state, self._near, self._clearances)
 
-    def _placed(self, pair: int) -> tuple[Any, Any, Any, Any]:
-        index = self.geometry.collisionPairs[pair]
-        pieces = [self.geometry.geometryObjects[i].geometry for i in (index.first, index.second)]
-        places = [self.results.oMg[i] for i in (index.first, index.second)]
-        return (*pieces, *(coal.Transform3s(place.rotation, place.translation) for place in places))
+    @contextmanager
+    def _lent(self) -> Iterator[State]:
+        """A state at the posture."""
+        with self._built.pool(AllPairs, lambda: AllPairs(self._built)).lend() as pairs:
+            yield pairs.state.update(self._q)
 
 
 def _dense(part: Wrench | Array, state: State) -> Array:
     return state.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part)
 
 
-def optimality(problem: Problem, state: State, pairs: AllPairs) -> float:
-    """What is left of the objective's gradient after the best combination of all active gradients; see `Assessment`."""
+def _optimality(problem: Problem, state: State, active: _Active) -> float:
+    """What is left of the objective's gradient after the best combination of all active gradients."""
     nv = state.model.nv
     goals = [(np.atleast_1d(goal.error(state)), _dense(goal.jacobian(state), state), goal) for goal in problem.goals]
     met = all(np.abs(error).max(initial=0.0) <= MET for error, _, _ in goals)
-    signed, one_sided = _active(problem, state, pairs)
+    signed, one_sided = active.signed, active.one_sided
     if met:
         objective = sum((term.weight * term.gradient(state) for term in problem.measures), np.zeros(nv))
         curvature = sum((term.weight * term.curvature(state) for term in problem.measures), np.zeros(nv))
@@ -173,17 +129,18 @@ def optimality(problem: Problem, state: State, pairs: AllPairs) -> float:
     return float((np.abs(left) / scale).max())
 
 
-def blockers(problem: Problem, state: State, pairs: AllPairs) -> tuple[Blocker, ...]:
+def _blockers(problem: Problem, state: State, near: NearPairs, clearances: Array) -> tuple[Blocker, ...]:
     """What keeps a posture from meeting the goals, or from holding what must hold; the hardest first.
 
-    Where something does not hold, the violated things come first, by how much, then what pushes against mending them.
+    If something is violated, the violated constraints come first, ordered by violation, then those that block repair.
     """
     nv = state.model.nv
-    signed, one_sided = _active(problem, state, pairs)
+    signed, one_sided, rows, numbers = _active(problem, state, near)
     pull = np.zeros(nv)
     violated: dict[Label, float] = {}
-    for number in np.flatnonzero(pairs.distance < problem.clearances - MET).tolist():
-        violated[pairs.label(number)] = float(problem.clearances[number] - pairs.distance[number])
+    lack = clearances - near.found[:, 0]
+    for row in np.flatnonzero(lack > MET).tolist():
+        violated[near.label(row)] = float(lack[row])
     for number, constraint in enumerate(problem.constraints):
         value = np.atleast_1d(constraint.value(state))
         missed = np.minimum(value - constraint.lower, 0.0) + np.maximum(value - constraint.upper, 0.0)
@@ -191,9 +148,8 @@ def blockers(problem: Problem, state: State, pairs: AllPairs) -> tuple[Blocker, 
             violated[_constraint(number, constraint)] = float(np.abs(missed).max())
             pull += missed @ _dense(constraint.jacobian(state), state)
     if violated:
-        rows, numbers = pairs.gradients(problem, state)
         for row, number in zip(rows, numbers, strict=True):
-            pull -= violated.get(pairs.label(number), 0.0) * row
+            pull -= violated.get(near.label(number), 0.0) * row
         signed, one_sided = _without(signed, violated), _without(one_sided, violated)
     else:
         for goal in problem.goals:
@@ -223,12 +179,27 @@ def _constraint(number: int, constraint: Any) -> Label:
     return "constraint", (f"constraints[{number}], {type(constraint).__name__}" + (f"({name!r})" if name else ""),)
 
 
-def _active(problem: Problem, state: State, pairs: AllPairs) -> tuple[_Rows, _Rows]:
-    """Gradients of everything at work: of what works to both sides, and of what only pushes one way."""
+class _Active(NamedTuple):
+    """Gradients of everything at work.
+
+    Attributes:
+        signed: of what works to both sides.
+        one_sided: of what only pushes one way.
+        gaps: (n, nv) those of contacts among them.
+        contacts: (n,) the pair that each of these is of.
+    """
+
+    signed: _Rows
+    one_sided: _Rows
+    gaps: Array
+    contacts: list[int]
+
+
+def _active(problem: Problem, state: State, near: NearPairs) -> _Active:
     nv = state.model.nv
     signed, one_sided = _Rows(nv), _Rows(nv)
-    rows, numbers = pairs.gradients(problem, state)
-    one_sided.add(rows, [pairs.label(number) for number in numbers])
+    gaps, contacts = near.gradients(state)
+    one_sided.add(gaps, [near.label(number) for number in contacts])
     for number, constraint in enumerate(problem.constraints):
         value = np.atleast_1d(constraint.value(state))
         jacobian = _dense(constraint.jacobian(state), state)
@@ -246,7 +217,7 @@ def _active(problem: Problem, state: State, pairs: AllPairs) -> tuple[_Rows, _Ro
     for at_work, sign, limited in ((lower >= -ACTIVE, 1.0, limited_low), (upper <= ACTIVE, -1.0, limited_high)):
         columns = np.flatnonzero(at_work)
         one_sided.add(sign * identity[columns], [_of_joint(state.model, int(k), bool(limited[k])) for k in columns])
-    return signed, one_sided
+    return _Active(signed, one_sided, gaps, contacts)
 
 
 def _of_joint(model: pin.Model, column: int, limited: bool) -> Label:
@@ -256,14 +227,73 @@ def _of_joint(model: pin.Model, column: int, limited: bool) -> Label:
 
 def _balanced(objective: Array, signed: _Rows, one_sided: _Rows) -> tuple[Array, Array]:
     """How hard each labelled row pushes against the objective's gradient (nv,), and what is left of it (nv,)."""
-    from scipy.optimize import nnls
-
     equal, pushing = np.vstack(signed.rows), np.vstack(one_sided.rows)
-    rows = np.vstack([equal, -equal, pushing])
-    if not rows.size:
-        return np.zeros(len(signed.labels) + len(pushing)), objective
-    push, _ = nnls(rows.T, objective, maxiter=20 * (len(rows) + len(objective)))
-    left = objective - push @ rows
-    size = push * np.sqrt((rows**2).sum(axis=1))
-    count, named = len(equal), len(signed.labels)
-    return np.concatenate([(size[:count] + size[count : 2 * count])[:named], size[2 * count :]]), left
+    basis = _row_space(equal)
+    room = objective - objective @ basis.T @ basis
+    push, left = nonnegative_least_squares(pushing - pushing @ basis.T @ basis, room, np.linalg.norm(pushing, axis=1))
+    turned = np.linalg.lstsq(equal.T, objective - push @ pushing, rcond=None)[0] if len(equal) else np.zeros(0)
+    sizes = [np.abs(turned) * np.linalg.norm(equal, axis=1), push * np.linalg.norm(pushing, axis=1)]
+    return np.concatenate([sizes[0][: len(signed.labels)], sizes[1]]), left
+
+
+def _row_space(rows: Array) -> Array:
+    """Orthonormal rows (r, n) that span the same as the rows (m, n)."""
+    if not len(rows):
+        return rows
+    _, values, basis = np.linalg.svd(rows, full_matrices=False)
+    return np.asarray(basis[values > INDEPENDENT * values[0]])
+
+
+def nonnegative_least_squares(rows: Array, right: Array, lengths: Array) -> tuple[Array, Array]:
+    """The nonnegative combination of rows (m, n) that is nearest to a right side (n,), and what it leaves (n,).
+
+    Lawson and Hanson 1974, "Solving least squares problems", chapter 23: the row that agrees most with what is left
+    joins those that push, and rows leave whose share would turn negative. scipy's does the same, but loading
+    scipy.optimize takes longer than a whole solve.
+
+    Args:
+        rows: (m, n).
+        right: (n,).
+        lengths: (m,) what is long for each row; one that is shorter than `INDEPENDENT` of it counts as zero.
+
+    Returns:
+        The shares (m,), nonnegative, and right - shares @ rows.
+    """
+    norms = np.linalg.norm(rows, axis=1)
+    counts = norms > INDEPENDENT * lengths
+    scale = np.where(counts, norms, 1.0)
+    units = np.where(counts[:, None], rows / scale[:, None], 0.0)
+    products = units @ units.T
+    share, pushing, barred = np.zeros(len(rows)), np.zeros(len(rows), dtype=bool), ~counts
+    left, enough = right, INDEPENDENT * float(np.linalg.norm(right))
+    for _ in range(MOST_CHANGES * len(rows)):
+        agrees = np.where(pushing | barred, -np.inf, units @ left)
+        new = int(agrees.argmax())
+        if agrees[new] <= enough:
+            break
+        pushing[new] = True
+        trial = _shares(units, products, right, pushing)
+        if trial is None or trial[new] <= 0.0:  # to rounding it is a combination of those that push
+            pushing[new], barred[new] = False, True
+            continue
+        while trial is not None and (falling := pushing & (trial <= 0.0)).any():
+            part = np.full(len(rows), np.inf)
+            part[falling] = share[falling] / (share[falling] - trial[falling])
+            share += part.min() * (trial - share)
+            pushing[part <= part.min()] = False
+            share[~pushing] = 0.0
+            trial = _shares(units, products, right, pushing)
+        share = share if trial is None else trial
+        left, barred = right - share @ units, ~counts
+    return share / scale, left
+
+
+def _shares(units: Array, products: Array, right: Array, pushing: Mask) -> Array | None:
+    """Shares (m,) of the rows that push in the combination nearest to a right side, any sign; None: they depend."""
+    share, rows, square = np.zeros(len(units)), units[pushing], products[np.ix_(pushing, pushing)]
+    try:
+        first = np.linalg.solve(square, rows @ right)
+        share[pushing] = first + np.linalg.solve(square, rows @ (right - first @ rows))  # mends the squared condition
+    except np.linalg.LinAlgError:
+        return None
+    return share

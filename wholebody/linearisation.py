@@ -1,27 +1,31 @@
 """The one thing a method asks of a problem at a posture: everything that counts, to first order.
 
-One pass of Pinocchio, one cull, coal for the pairs that survive, and one matrix product for every row that is a wrench
-(goals, holds and contacts alike).
+One pass of Pinocchio, one cull, coal for the pairs that survive, and one compiled pass over all built-in terms and
+contacts. Terms of other classes join through their own methods, and cost only themselves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError
+from wholebody.figures.description import Limits
 from wholebody.figures.state import State, Wrench
+from wholebody.geometry.contact_rows import MOST_ENDS
 from wholebody.geometry.proximity import Contacts
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+from wholebody.term_plan import OtherTerm, TermPlan, checked_rows, make_plan
 from wholebody.workspace import Workspace
 
 
-@dataclass(frozen=True)
-class Linearisation:
+class Linearisation(NamedTuple):
     """A problem at one posture, to first order in the tangent displacement dq of shape (nv,).
 
     Attributes:
@@ -63,13 +67,13 @@ class Lineariser:
 
     Attributes:
         workspace: moves from posture to posture, and sees things where they were when the run began.
-        goals: what is linearised; may be replaced.
+        goals: what is linearised; see `take`.
     """
 
     def __init__(
         self,
         workspace: Workspace,
-        limits: Callable[[Array], tuple[Array, Array]],
+        limits: Any,
         goals: Sequence[Goal],
         constraints: Sequence[Constraint],
         bounds: Sequence[Bound],
@@ -81,7 +85,7 @@ class Lineariser:
 
         Args:
             workspace: of this run alone.
-            limits: bounds that the joints' limits put on the displacement of a posture; see `Figure.tangent_bounds`.
+            limits: of the figure's joints; see `Figure.limits`.
             goals: resolved goals.
             constraints: resolved constraints.
             bounds: resolved bounds on the displacement.
@@ -91,6 +95,10 @@ class Lineariser:
         """
         self.workspace, self.state, self._limits = workspace, workspace.state, limits
         self.constraints, self.bounds, self.measures, self.dt = constraints, bounds, measures, dt
+        self._kernel = compiled_kernel()
+        self.goals: Sequence[Goal] = goals
+        self._plan = self._planned(goals)
+        self._grow(64)
         self.take(goals, clearances)
 
     def take(self, goals: Sequence[Goal], clearances: Array) -> None:
@@ -102,6 +110,9 @@ class Lineariser:
         if clearances.shape != (len(self.workspace.table.pairs),):
             count = len(self.workspace.table.pairs)
             raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
+        if goals is not self.goals:
+            again = self._plan.with_goals(goals, self.state.model)
+            self._plan = self._planned(goals) if again is None else again
         self.goals, self.clearances = goals, clearances
         self._largest_clearance = float(clearances.max()) if len(clearances) else 0.0
 
@@ -112,98 +123,81 @@ class Lineariser:
         return other
 
     def at(self, q: Array, within: float) -> Linearisation:
-        """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance."""
-        state, workspace = self.state, self.workspace
-        contacts = workspace.near(q, within + self._largest_clearance)
-        clearance = self.clearances[contacts.number]
-        rows = workspace.rows.rows(contacts, clearance)
-
-        errors = [np.atleast_1d(goal.error(state)) for goal in self.goals]
-        values = [np.atleast_1d(constraint.value(state)) for constraint in self.constraints]
-        sizes = [len(part) for part in (*errors, *values)]
-        jacobian = self._jacobians(state, sizes, rows.wrench, rows.second, rows.first)
-        goal_rows = sum(len(error) for error in errors)
-        value_rows = sum(len(value) for value in values)
-        lower, upper = self._box(state)
-        measure, gradient, curvature = self._measure(state)
-        return Linearisation(
-            q=np.array(q, dtype=float),
-            goal_error=_joined(errors),
-            goal_jacobian=jacobian[:goal_rows],
-            value=_joined(values),
-            value_jacobian=jacobian[goal_rows : goal_rows + value_rows],
-            contacts=contacts,
-            gap=rows.gap,
-            gap_jacobian=jacobian[goal_rows + value_rows :],
-            gap_contact=rows.contact,
-            clearance=clearance[rows.contact],
-            measure=measure,
-            gradient=gradient,
-            curvature=curvature,
-            lower=lower,
-            upper=upper,
-        )
-
-    def _jacobians(
-        self, state: State, sizes: Sequence[int], gap_wrench: Array, second: Indices, first: Indices
-    ) -> Array:
-        """Rows of all goals, constraints and contacts, in this order; the wrenches among them in one product.
+        """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance.
 
         Raises:
-            InputError: a term has other numbers of values (`sizes`) and rows.
+            InputError: q is no posture, or a term of one's own has another number of rows than at the start.
         """
-        wrenches: list[Array] = []
-        joint: list[int] = []
-        against: list[int] = []
-        dense: list[tuple[int, Array]] = []
-        row = 0
-        terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
-        for term, values in zip(terms, sizes, strict=True):
-            part = term.jacobian(state)
-            if isinstance(part, Wrench):
-                size = len(part.rows)
-                wrenches.append(part.rows)
-                joint += [part.joint] * size
-                against += [part.against] * size
-            else:
-                size = len(part)
-                dense.append((row, part))
-                wrenches.append(np.zeros((size, 6)))
-                joint += [0] * size
-                against += [0] * size
-            if size != values:
-                raise InputError(
-                    f"{type(term).__name__} has {values} values and {size} rows at a posture; give as many"
-                )
-            row += size
-        stacked = np.vstack([*wrenches, gap_wrench])
-        result = state.rows(
-            stacked,
-            np.concatenate([np.array(joint, dtype=np.intp), second]),
-            np.concatenate([np.array(against, dtype=np.intp), first]),
-        )
-        for start, part in dense:
-            result[start : start + len(part)] = part
-        return result
+        state, workspace, plan = self.state, self.workspace, self._plan
+        contacts = workspace.near(q, within + self._largest_clearance)
+        clearance = self.clearances[contacts.number]
+        if len(clearance) * (1 + MOST_ENDS) > len(self._gap):
+            self._grow(2 * len(clearance))
+        count = workspace.rows.write(contacts, clearance, self._wrench, self._gap, self._contact, self._joints)
+        nv, rows = state.model.nv, plan.goal_rows + plan.value_rows
+        value, jacobian = np.empty(rows), np.empty((rows + count, nv))
+        box, measure = np.empty((2, nv)), np.empty((2, nv + 1))
+        self._kernel.linearise(
+            state.joints, state.jacobian.T, plan.support, state.q, plan.floats, plan.integers, plan.layout,
+            self._wrench, self._joints, count, np.empty((rows, 6)), value, jacobian, box, measure,
+        )  # fmt: skip
+        if plan.others:
+            self._evaluate(plan.others, value, jacobian)
+        if plan.other_bounds:
+            self._bound(plan.other_bounds, box)
+        if plan.other_measures:
+            self._measure(plan.other_measures, measure)
+        goals, contact = plan.goal_rows, self._contact[:count].copy()
+        return Linearisation(
+            state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts,
+            self._gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
+            measure[0, :nv], measure[1, :nv], box[0], box[1],
+        )  # fmt: skip
 
-    def _box(self, state: State) -> tuple[Array, Array]:
-        lower, upper = self._limits(state.q)
-        for bound in self.bounds:
+    def _planned(self, goals: Sequence[Goal]) -> TermPlan:
+        return make_plan(self._limits, goals, self.constraints, self.bounds, self.measures, self.dt, self.state)
+
+    def _grow(self, contacts: int) -> None:
+        """Make room for the rows of so many contacts."""
+        rows = contacts * (1 + MOST_ENDS)
+        self._wrench, self._gap = np.zeros((rows, 6)), np.zeros(rows)
+        self._contact, self._joints = np.zeros(rows, dtype=np.intp), np.zeros((rows, 2), dtype=np.intp)
+
+    def _evaluate(self, others: Sequence[OtherTerm], value: Array, jacobian: Array) -> None:
+        """Write values and rows of terms of other classes."""
+        state = self.state
+        for term, evaluate, row, rows in others:
+            part, derivative = np.atleast_1d(evaluate(state)), term.jacobian(state)
+            checked_rows(term, part, derivative, rows)
+            value[row : row + rows] = part
+            dense = state.wrench_jacobian(derivative) if isinstance(derivative, Wrench) else derivative
+            jacobian[row : row + rows] = dense
+
+    def _bound(self, bounds: Sequence[Bound], box: Array) -> None:
+        for bound in bounds:
             # a joint out of its limits comes back no faster than the bound lets it
-            low, high = bound.bounds(state, self.dt)
-            lower, upper = np.clip(lower, low, high), np.clip(upper, low, high)
-        return lower, upper
+            low, high = bound.bounds(self.state, self.dt)
+            np.clip(box, low, high, out=box)
 
-    def _measure(self, state: State) -> tuple[float, Array, Array]:
-        value = 0.0
-        gradient = np.zeros(state.model.nv)
-        curvature = np.zeros(state.model.nv)
-        for term in self.measures:
-            value += term.weight * term.value(state)
-            gradient += term.weight * term.gradient(state)
-            curvature += term.weight * term.curvature(state)
-        return value, gradient, curvature
+    def _measure(self, measures: Sequence[Measure], measure: Array) -> None:
+        state = self.state
+        for term in measures:
+            measure[0, -1] += term.weight * term.value(state)
+            measure[0, :-1] += term.weight * term.gradient(state)
+            measure[1, :-1] += term.weight * term.curvature(state)
 
 
-def _joined(parts: list[Array]) -> Array:
-    return np.concatenate(parts) if parts else np.zeros(0)
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody import term_kernel
+
+    state = State(pin.buildSampleModelManipulator())
+    plan = make_plan(Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0))), (), (), (), (), None, state)
+    nv = state.model.nv
+    term_kernel.linearise(
+        state.joints, state.jacobian.T, plan.support, state.q, plan.floats, plan.integers, plan.layout,
+        np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp), 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
+        np.zeros((2, nv)), np.zeros((2, nv + 1)),
+    )  # fmt: skip
+    return term_kernel

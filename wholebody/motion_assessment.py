@@ -1,8 +1,8 @@
-"""What a motion, postures one after the other, is judged by, computed from the postures alone.
+"""The assessment of a motion, a sequence of postures, computed from the postures alone.
 
-All pairs are asked at every posture, without culling, as `wholebody.assess` does for one; the ways between postures are
-swept. Nothing of a method is used. Whoever judges motions judges them with this: frame loops, drags, streams of hard
-cases, and the steps of tools that are compared.
+The distances of all pairs are computed at every posture, without culling, as `wholebody.assess` does for one posture.
+The motions between postures are swept. No code of a method is used. Frame loops, drags, streams of hard cases, and the
+steps of compared tools are all judged by this module.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.all_pairs import AllPairs
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
-from wholebody.first_order import AllPairs
 from wholebody.geometry.continuous.sweep import Sweep
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
 
 Counts = NDArray[np.intp]
 
-OVERLAPS = 1e-5  # m: deeper than this a pair overlaps
-PARTS = 41  # places on a way where its depth is measured
+OVERLAPS = 1e-5  # m: a pair overlaps if it is deeper than this
+PARTS = 41  # postures of a motion at which its depth is measured
 
 DEPTHS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
-"""Depths, metres, that are tried in turn as a bound on what a way goes in by."""
+"""Depths, metres, that are tried in turn as a bound on the depth of a motion between two postures."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,9 +37,9 @@ class MotionAssessment:
     """How good a motion is.
 
     Attributes:
-        depth: (n,) deepest overlap of any pair at each posture, metres; 0 where there is none.
-        overlapping: (n,) pairs that overlap by more than 0.01 mm.
-        limit_violation: how far the worst joint of any posture is out of its limits, radians or metres.
+        depth: (n,) deepest overlap of any pair at each posture, metres; 0 if there is none.
+        overlapping: (n,) number of pairs that overlap by more than 0.01 mm.
+        limit_violation: largest violation of a joint limit at any posture, radians or metres.
         velocity: (n - 1, nv) from posture to posture, radians and metres a second.
         jerk: (n - 3,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
     """
@@ -52,7 +52,7 @@ class MotionAssessment:
 
 
 def assess_motion(scene: Scene, q: Array, dt: float) -> MotionAssessment:
-    """Judge postures (n, nq) of a scene in which nothing else moves, `dt` seconds apart."""
+    """Assess postures (n, nq), `dt` seconds apart, in a scene whose things do not move."""
     depth, overlapping = np.zeros(len(q)), np.zeros(len(q), dtype=np.intp)
     for frame, pairs in enumerate(pairs_along(scene, q)):
         depth[frame] = max(0.0, -pairs.least)
@@ -63,7 +63,7 @@ def assess_motion(scene: Scene, q: Array, dt: float) -> MotionAssessment:
 
 
 def pairs_along(scene: Scene, q: Array) -> Iterator[AllPairs]:
-    """All pairs at each of the postures (n, nq), with the kinematic state there; good until the next is asked for."""
+    """All pairs at each of the postures (n, nq), with the kinematic state; each is valid until the next one."""
     built = scene.built
     with built.pool(AllPairs, lambda: AllPairs(built)).lend() as pairs:
         for posture in q:
@@ -72,14 +72,14 @@ def pairs_along(scene: Scene, q: Array) -> Iterator[AllPairs]:
 
 
 def limit_violation(figure: Figure, q: Array) -> float:
-    """How far the worst joint of any posture (n, nq) is out of its limits, radians or metres."""
+    """Largest violation of a joint limit at any posture (n, nq), radians or metres."""
     limits = figure.limits
     values = np.atleast_2d(q)[:, limits.idx_q]
     return float(np.maximum(limits.lower - values, values - limits.upper).max(initial=0.0))
 
 
 def cone_violation(scene: Scene, q: Array) -> float:
-    """How far the worst limb of any posture (n, nq) is out of its reach cone, radians."""
+    """Largest angle of a limb outside its reach cone at any posture (n, nq), radians."""
     if not scene.figure.cones:
         return 0.0
     cones, state = ReachCones().resolve(scene, q[0]), State(scene.model)
@@ -103,20 +103,20 @@ def third_differences(model: pin.Model, q: Array, dt: float) -> Array:
 
 
 def root_mean_square(values: Array) -> Array:
-    """Of each row of (n, k)."""
+    """(n,) root mean square of each row of (n, k)."""
     return np.asarray(np.sqrt((values**2).mean(axis=1)))
 
 
 def passed(scene: Scene, q: Array, depth: float) -> tuple[int, ...]:
-    """Postures of (n, nq) on the way to which, from the one before, some pair goes deeper than `depth` metres."""
+    """Indices of postures of (n, nq): some pair gets deeper than `depth` metres between the previous one and it."""
     sweep, ways = Sweep(scene.model, scene.geometry), enumerate(pairwise(q), start=1)
     return tuple(frame for frame, way in ways if sweep.first_contact(*way, tolerance=depth) is not None)
 
 
 def deepened(scene: Scene, q: Array) -> Array:
-    """(n - 1,) how much deeper any pair gets on the way to the next of the postures (n, nq) than at its ends, metres.
+    """(n - 1,) bound on how much deeper any pair gets between two of the postures (n, nq) than at both, metres.
 
-    The least of `DEPTHS` by which nothing gets deeper on the way, from either end; inf where it is by all of them.
+    It is the least of `DEPTHS` that no pair exceeds in a sweep from either end; inf if some pair exceeds all of them.
     """
     sweep = Sweep(scene.model, scene.geometry)
     return np.array([_deepened(sweep, *way) for way in pairwise(q)])
@@ -132,9 +132,10 @@ def _deepened(sweep: Sweep, before: Array, after: Array) -> float:
 
 
 def dip(scene: Scene, before: Array, after: Array, depth: float) -> tuple[float, str]:
-    """How deep the way between two postures (nq,) goes into something, metres, and into what; things stay in place.
+    """Depth of the motion between two postures (nq,), metres, and the names of the pair; things stay in place.
 
-    The sweep sees whether it goes deeper than `depth`, however thin the thing; how deep is measured at parts of it.
+    The sweep tests whether the motion gets deeper than `depth`, however thin the thing; the depth is measured at
+    postures along the motion.
     """
     contact = scene.sweep(before, after, depth)
     if contact is None or not contact.certain:

@@ -1,4 +1,4 @@
-"""What one run uses at a time: objects that are lent and given back, and calls that a second thread may not enter."""
+"""A pool of objects of which each run borrows one, and a guard against calls from a second thread."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ T = TypeVar("T")
 
 
 class Pool(Generic[T]):
-    """A free list that any number of threads may use; no two ever hold the same object."""
+    """A thread-safe free list; no two threads hold the same object at a time."""
 
     def __init__(self, make: Callable[[], T]) -> None:
-        """Begin empty.
+        """Make an empty pool.
 
         Args:
-            make: makes an object where none is free.
+            make: makes an object if none is free.
         """
         self._make = make
         self._free: list[T] = []
 
     @contextmanager
     def lend(self) -> Iterator[T]:
-        """An object for as long as the context lasts; one whose run broke off by an exception is not used again."""
+        """Borrow an object while the context lasts. After an exception in the context, the object is discarded."""
         try:
             item = self._free.pop()  # this and append are atomic
         except IndexError:
@@ -36,21 +36,21 @@ class Pool(Generic[T]):
 
 
 class OneAtATime:
-    """Refuses a call while another one is under way, where what calls change cannot be shared."""
+    """Guard of an object that serves one call at a time: it refuses a call while another one runs."""
 
     def __init__(self, what: str) -> None:
-        """Name the object whose calls these are, such as "tracker"."""
+        """Name the object for the error message, such as "tracker"."""
         self._what, self._lock = what, Lock()
 
     def __enter__(self) -> None:
         """Enter a call.
 
         Raises:
-            InputError: another one is under way.
+            InputError: another call runs.
         """
         if not self._lock.acquire(blocking=False):
             raise InputError(f"this {self._what} is within another call; make one {self._what} for each thread")
 
     def __exit__(self, *_: object) -> None:
-        """Leave it."""
+        """Leave the call."""
         self._lock.release()

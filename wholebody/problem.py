@@ -1,4 +1,4 @@
-"""A problem: what is asked, stated once and checked."""
+"""A problem: scene, start, goals, constraints and measures, stated once and checked."""
 
 from __future__ import annotations
 
@@ -22,26 +22,27 @@ from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
 from wholebody.workspace import Workspace
 
-UNIT_TOLERANCE = 1e-3  # how far a start's quaternion may be from unit length before it is taken for a mistake
-LARGEST_CLEARANCE = 0.5  # m: more is taken for a slip of units
+UNIT_TOLERANCE = 1e-3  # largest deviation of a start's quaternion from unit length; more is refused as a mistake
+LARGEST_CLEARANCE = 0.5  # m: more is refused as a wrong unit
 
 
 class Problem:
-    """Scene, start, goals, constraints and measures: stated once, for every method.
+    """Scene, start, goals, constraints and measures, in the same form for every method.
 
-    Joint limits and non-penetration are always part of it. A pair that begins nearer than the clearance but not inside
-    (soles on a floor, a hand on a table) is asked to keep what it has; one that begins inside is asked for all of it.
+    Joint limits and non-penetration are part of every problem. A pair that is nearer than the clearance at the start,
+    but does not penetrate (soles on a floor, a hand on a table), must keep its distance. A pair that penetrates at the
+    start must reach the full clearance.
 
     Attributes:
         scene: figure and things.
-        start: (nq,) the posture it begins from.
+        start: (nq,) the start posture.
         goals, constraints, bounds, measures: the terms, resolved on this scene and start.
-        measures_given: whether measures were asked for; false where `Effort()` stands in for none.
-        clearance: distance asked of every pair, metres.
-        clearances: (pairs,) distance asked of each collision pair of the scene; may be changed between runs.
+        measures_given: whether the caller gave measures; false if `Effort()` is the default.
+        clearance: least distance of every pair, metres.
+        clearances: (pairs,) least distance of each collision pair of the scene; may be changed between runs.
 
-    Threads may solve and assess one problem at the same time; changing it is for one thread alone. It can be pickled;
-    a copy shares the scene, a deep copy has its own.
+    Threads may solve and assess one problem at the same time; only one thread may change it. It can be pickled; a copy
+    shares the scene, a deep copy has its own.
     """
 
     def __init__(
@@ -59,12 +60,12 @@ class Problem:
 
         Args:
             scene: figure and things.
-            start: (nq,) posture, or the name of one of the figure's; its first posture where None.
-            goals: what to reach.
-            constraints: what must hold; bounds on the displacement are given here too.
-            measures: what to minimise; `Effort()` where None.
+            start: (nq,) posture, or the name of one of the figure's; None for the figure's first posture.
+            goals: equalities that are met if possible.
+            constraints: what must always hold; bounds on the displacement are given here too.
+            measures: costs to minimise; None for `Effort()`.
             clearance: least distance between pieces, metres.
-            touching: pairs of segment or object names that may touch (clearance zero) although the others may not.
+            touching: pairs of segment or object names whose clearance is zero.
 
         Raises:
             InputError: a value of the wrong kind, shape or range.
@@ -100,7 +101,7 @@ class Problem:
     def retarget(self, goals: Iterable[Goal]) -> None:
         """Replace the goals, for a goal that moves from frame to frame; everything else stays.
 
-        The new goals are checked as the first ones were; where one is refused, the goals stay as they were.
+        The new goals are checked like the first ones. If one is refused, the old goals stay.
 
         Raises:
             InputError: not a list of goals, or a goal with a value of the wrong kind, shape or range.
@@ -115,7 +116,7 @@ class Problem:
         self.goals = resolved
 
     def with_start(self, q: Array) -> Problem:
-        """Copy that begins at another posture; what was resolved at the start stays.
+        """Copy with another start; terms that were resolved at the old start stay.
 
         Args:
             q: (nq,) the posture.
@@ -129,35 +130,35 @@ class Problem:
 
     @contextmanager
     def lend(self) -> Iterator[Workspace]:
-        """Room for one run on this problem's scene; see `Scene.lend`.
+        """Borrow a workspace on this problem's scene for one run; see `Scene.lend`.
 
         Raises:
-            InputError: objects came to or left the scene after the problem was stated.
+            InputError: objects were added to or removed from the scene after the problem was made.
         """
         with self.scene.lend() as workspace:
-            self.check_fresh()  # after it was lent: what comes later does not change it
+            self.check_fresh()  # after borrowing: later changes of the scene do not change the workspace
             yield workspace
 
     def workspace(self) -> Workspace:
-        """Room for something that lives on; see `Scene.workspace`.
+        """A new workspace for a long-lived object; see `Scene.workspace`.
 
         Raises:
-            InputError: objects came to or left the scene after the problem was stated.
+            InputError: objects were added to or removed from the scene after the problem was made.
         """
         workspace = self.scene.workspace()
         self.check_fresh()
         return workspace
 
     def lineariser(self, workspace: Workspace, dt: float | None = None) -> Lineariser:
-        """What linearises this problem at postures, with its terms and clearances as they are now.
+        """A lineariser of this problem, with its present terms and clearances.
 
         Args:
-            workspace: of this problem's `lend` or `workspace`.
-            dt: step in seconds for bounds that need one.
+            workspace: from this problem's `lend` or `workspace`.
+            dt: time step in seconds, for bounds that need one.
         """
         return Lineariser(
             workspace,
-            self.scene.figure.tangent_bounds,
+            self.scene.figure.limits,
             self.goals,
             self.constraints,
             self.bounds,
@@ -167,12 +168,12 @@ class Problem:
         )
 
     def check_fresh(self) -> None:
-        """Raise InputError if objects came to or left the scene after the problem was stated (moving them is fine)."""
+        """Raise InputError if objects were added or removed after the problem was made; moving them is allowed."""
         if self.scene.revision != self._revision:
             raise InputError("objects came to or left the scene after the problem was stated; state the problem anew")
 
     def _check_frozen(self, state: State) -> None:
-        """Raise InputError if a bound keeps a joint where its limits do not let it be."""
+        """Raise InputError if a bound keeps a joint out of its limits."""
         figure = self.scene.figure
         least, most = figure.tangent_bounds(self.start)
         for bound in self.bounds:
@@ -186,7 +187,7 @@ class Problem:
                 )
 
     def _check_terms(self, state: State) -> None:
-        """Evaluate every term once at the start, so that one written wrongly is named before anything is computed."""
+        """Evaluate every term once at the start, so that a wrong term is named before anything is computed."""
         for number, constraint in enumerate(self.constraints):
             check_rows(f"constraints[{number}]", constraint, constraint.value(state), constraint.jacobian(state), state)
         for number, measure in enumerate(self.measures):
@@ -214,7 +215,7 @@ def _check_goals(goals: Mapping[int, Goal] | Sequence[Goal], state: State) -> No
 
 @cache
 def built_in_goals() -> frozenset[type]:
-    """Goals whose constructors leave nothing for an evaluation to find."""
+    """The built-in goals: their constructors find every mistake, so they need no trial evaluation."""
     from wholebody import tasks
 
     return frozenset(kind for name in tasks.__all__ if issubclass(kind := getattr(tasks, name), Goal))

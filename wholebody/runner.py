@@ -1,8 +1,8 @@
-"""Jobs in processes of their own: what crashes, hangs or fills the memory ends its process, and nothing else.
+"""Jobs in child processes: a job that crashes, hangs or fills the memory ends only its own process.
 
-A job is a function with arguments and a deadline. An alarm of the system, which no compiled code can hold up, ends the
+A job is a function with arguments and a deadline. An alarm of the system, which compiled code cannot block, ends the
 process at the deadline. The job may move its deadline (`allow`) and send notes before its answer (`tell`). A process
-serves one job after the other and is replaced when it ended. It ends by itself when its parent is gone.
+serves one job after the other and is replaced after it ended. It ends by itself when its parent has ended.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 """Environment of a process whose libraries compute on one core."""
 
 FULL = 2e9  # bytes: a process that holds more should be replaced; placo never frees a robot (some 6 MB)
-LONGEST_WORDS = 200  # letters of what a process wrote last that are kept
+LONGEST_WORDS = 200  # most characters kept of the last line that a process wrote
 
 _START = (
     "import sys; sys.path[:] = [{root!r}, *filter(None, sys.path)]; from wholebody.runner import serve; "
     "sys.path.remove({root!r}); sys.path.append({root!r}); serve({descriptor})"
 )
-"""What a new interpreter runs. The package is found first, and hides no other one afterwards."""
+"""The code of a new interpreter. It imports our package first, and then restores the order of the search path."""
 
-_parent: Connection | None = None  # in a process that serves jobs: the way to whoever asked
+_parent: Connection | None = None  # in a process that serves jobs: the connection to the parent
 
 
 class EndedError(WholebodyError):
@@ -44,11 +44,11 @@ class EndedError(WholebodyError):
     Attributes:
         overtime: whether the deadline ended it.
         code: its exit code; the negative number of the signal that ended it.
-        said: the last line that it wrote; "" where it wrote none, or was forked.
+        said: the last line that it wrote; "" if it wrote none, or was forked.
     """
 
     def __init__(self, code: int, said: str = "") -> None:
-        """Say how the process ended."""
+        """Build the message from the exit code and the last line."""
         self.overtime, self.code, self.said = code == -signal.SIGALRM, code, said
         message = "it took too long" if self.overtime else f"the process ended with {self.how}"
         super().__init__(message + (f": {said}" if said and not self.overtime else ""))
@@ -60,13 +60,13 @@ class EndedError(WholebodyError):
 
 
 class Job(NamedTuple):
-    """What a process is to do.
+    """A job for a child process.
 
     Attributes:
-        name: what the job is to whoever asks; it stays with them.
+        name: any value by which the caller identifies the job; it is not sent to the process.
         function: called in the process.
         arguments: of the function.
-        seconds: until the process is ended, unless the job moves its deadline.
+        seconds: time to the deadline, unless the job moves it.
     """
 
     name: Any
@@ -76,13 +76,13 @@ class Job(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What came of a job.
+    """The outcome of a job.
 
     Attributes:
-        job: which.
-        notes: what it told before its answer.
-        answer: what the function returned; None where the process ended.
-        error: how the process ended; None where there is an answer.
+        job: the job.
+        notes: the notes that it sent before its answer.
+        answer: the return value of the function; None if the process ended.
+        error: how the process ended; None if there is an answer.
     """
 
     job: Job
@@ -92,15 +92,15 @@ class Outcome(NamedTuple):
 
 
 class Child:
-    """A process that does one job at a time; a new one takes its place when it has ended."""
+    """A child process that does one job at a time; a new one replaces it when it has ended."""
 
     def __init__(self, environment: Mapping[str, str] | None = None, forked: bool = False) -> None:
-        """Start nothing yet.
+        """Prepare; the first job starts the process.
 
         Args:
-            environment: variables of the process that differ from those here.
-            forked: whether each job has a process of its own, forked from this one. What was imported and compiled here
-                is there then, and neither functions nor arguments have to be importable.
+            environment: variables of the process that differ from those of this process.
+            forked: whether each job has a process of its own, forked from this one. Such a process has everything that
+                was imported and compiled here, and neither functions nor arguments have to be importable.
         """
         self._environment, self._forked = dict(environment or {}), forked
         self._process: subprocess.Popen[bytes] | BaseProcess | None = None
@@ -111,12 +111,12 @@ class Child:
 
     @property
     def process(self) -> int | None:
-        """Number of the process; None where none runs."""
+        """Id of the process; None if none runs."""
         return None if self._process is None else self._process.pid
 
     @property
     def ear(self) -> Connection:
-        """What can be read once a job told something; see `multiprocessing.connection.wait`."""
+        """The connection that becomes readable when a job sent something; see `multiprocessing.connection.wait`."""
         assert self._ear is not None
         return self._ear
 
@@ -124,7 +124,7 @@ class Child:
         """Do a job, and wait for its answer.
 
         Raises:
-            EndedError: the process has ended over it; the next call starts another.
+            EndedError: the process ended during the job; the next call starts another process.
         """
         self.begin(Job(None, function, arguments, seconds))
         while (outcome := self.listen()) is None:
@@ -134,7 +134,7 @@ class Child:
         return outcome.answer
 
     def begin(self, job: Job) -> None:
-        """Send a job; `listen` has what comes of it."""
+        """Send a job; `listen` returns its outcome."""
         self._job, self._notes = job, []
         if self._forked:
             self._fork(job)
@@ -144,10 +144,10 @@ class Child:
         try:
             self.ear.send((job.seconds, _dumps((job.function, job.arguments))))
         except (BrokenPipeError, ConnectionResetError):
-            return  # it ended since its last job: `listen` says so
+            return  # the process ended after its last job: `listen` reports it
 
     def listen(self) -> Outcome | None:
-        """Wait for the next word of a job: the job's end, or None after a note."""
+        """Wait for the next message of a job: its outcome, or None after a note."""
         assert self._job is not None
         try:
             last, value = self.ear.recv()
@@ -161,12 +161,12 @@ class Child:
         return Outcome(self._job, tuple(self._notes), value, None)
 
     def close_if_full(self) -> None:
-        """End a process that has done its job and holds more memory than `FULL`; the next job starts another."""
+        """End an idle process that holds more memory than `FULL`; the next job starts another."""
         if self._process is not None and _memory(self._process.pid) > FULL:
             self.close()
 
     def close(self) -> None:
-        """End the process, whatever it does."""
+        """Kill the process."""
         if self._process is not None:
             self._process.kill()
             _wait_for(self._process)
@@ -194,7 +194,7 @@ class Child:
         self._ear = Connection(ours.detach())
 
     def _fork(self, job: Job) -> None:
-        """Fork a process that has the job already."""
+        """Fork a process for the job."""
         context = multiprocessing.get_context("fork")
         self._ear, theirs = context.Pipe()
         self._process = context.Process(target=_serve_one, args=(theirs, job, self._environment), daemon=True)
@@ -213,11 +213,11 @@ class Child:
 
 
 def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> Iterator[Outcome]:
-    """Do jobs beside each other, and give their outcomes as they end; the children are closed at the end.
+    """Run jobs in parallel, and yield their outcomes as they end; the children are closed at the end.
 
     Args:
-        next_job: asked for a job whenever a process is free; None where there is none (now, or any more).
-        children: as many jobs are done at a time.
+        next_job: called for a job whenever a process is free; returns None if there is none (now, or any more).
+        children: the processes, each of which does one job at a time.
     """
     free, busy = list(children), list[Child]()
     try:
@@ -240,19 +240,19 @@ def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> I
 
 
 def allow(seconds: float) -> None:
-    """Give the job that this is called in so many seconds from now; nothing where no job runs here."""
+    """Move the deadline of the running job to so many seconds from now; does nothing outside a job."""
     if _parent is not None:
         signal.setitimer(signal.ITIMER_REAL, seconds)
 
 
 def tell(note: Any) -> None:
-    """Send a note to whoever asked for the job that this is called in; nothing where no job runs here."""
+    """Send a note from the running job to its parent; does nothing outside a job."""
     if _parent is not None:
         _parent.send((False, note))
 
 
 def serve(descriptor: int) -> None:
-    """Do jobs until the parent is gone; this is what a process of `Child` runs."""
+    """Do jobs until the parent has ended; the main loop of a process of `Child`."""
     global _parent
     _parent = Connection(descriptor)
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
@@ -276,7 +276,7 @@ def _serve_one(parent: Connection, job: Job, environment: Mapping[str, str]) -> 
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     allow(job.seconds)
     parent.send((True, job.function(*job.arguments)))
-    os._exit(0)  # nothing of the parent's is to be closed twice
+    os._exit(0)  # the process must not close resources of the parent
 
 
 def _wait_for(process: subprocess.Popen[bytes] | BaseProcess) -> int:
@@ -288,7 +288,7 @@ def _wait_for(process: subprocess.Popen[bytes] | BaseProcess) -> int:
 
 
 def _memory(process: int | None) -> float:
-    """Return the bytes of memory that a process holds; 0 where the system does not say."""
+    """Return the bytes of memory that a process holds; 0 if the system does not report it."""
     try:
         pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
     except OSError:
@@ -297,7 +297,7 @@ def _memory(process: int | None) -> float:
 
 
 def _dumps(value: Any) -> bytes:
-    """Pickle; what is not importable by its code, unless cloudpickle is missing, which the doctor has to survive."""
+    """Pickle by cloudpickle, which includes code that is not importable; by pickle if cloudpickle is missing."""
     try:
         import cloudpickle
     except ImportError:

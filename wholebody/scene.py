@@ -1,4 +1,4 @@
-"""A scene: one figure, what it carries, what stands around it, and which pairs can touch."""
+"""A scene: one figure, the things that it carries, the things around it, and the pairs that can touch."""
 
 from __future__ import annotations
 
@@ -31,16 +31,17 @@ if TYPE_CHECKING:
 class Scene:
     """A figure among things.
 
-    The geometry model is built when it is first needed and again after objects come or go. Moving an object keeps it.
+    The geometry model is built when it is first needed, and again after objects were added or removed. Moving an object
+    keeps it.
 
-    Threads may share a scene: every question and every solve works on room of its own, and sees things where they were
-    when it began. A solve during which objects come or go ends with an `InputError`.
+    Threads may share a scene: every query and every solve has a workspace of its own, and uses the placements that the
+    things had when it began. A solve during which objects are added or removed ends with an `InputError`.
 
     A scene can be pickled. A copy of it, `copy.copy` or `copy.deepcopy`, has things of its own.
     """
 
     def __init__(self, figure: Figure) -> None:
-        """Begin with the figure alone.
+        """Make a scene with the figure alone.
 
         Raises:
             InputError: it is no figure.
@@ -51,18 +52,18 @@ class Scene:
         self._objects: dict[str, SceneObject] = {}
         self._excluded: dict[tuple[str, str], str] = {}
         self._built: SceneGeometry | None = None
-        self._lock = RLock()  # while things come, go or move, and while the geometry model is built
+        self._lock = RLock()  # while things are added, removed or moved, and while the geometry model is built
         self.revision = 0
 
     @classmethod
     def of_parts(cls, figure: Figure, objects: Iterable[SceneObject], built: SceneGeometry) -> Scene:
-        """A scene whose geometry is made already, with pairs of its own; made anew once things come or go."""
+        """A scene with a given geometry model and its own pairs; rebuilt after things were added or removed."""
         scene = cls(figure)
         scene._objects = {thing.name: thing for thing in objects}
         scene._built = built
         return scene
 
-    # ---- what is there
+    # ---- contents
 
     @property
     def model(self) -> pin.Model:
@@ -71,7 +72,7 @@ class Scene:
 
     @property
     def geometry(self) -> pin.GeometryModel:
-        """Pinocchio's geometry model: pieces of the figure, of what it carries, of what stands around; all pairs."""
+        """Pinocchio's geometry model: pieces of the figure, of carried things, of things around; all pairs."""
         return self._build().geometry
 
     @property
@@ -102,15 +103,15 @@ class Scene:
 
     @property
     def built(self) -> SceneGeometry:
-        """What is made from the things that are there now."""
+        """The geometry model of the present things, with its indices."""
         return self._build()
 
     def lend(self) -> AbstractContextManager[Workspace]:
-        """Room for one run: ``with scene.lend() as workspace``. Nothing of it may be kept when the context ends."""
+        """Borrow a workspace for one run: ``with scene.lend() as workspace``. Do not use it after the context ends."""
         return lent(self._build())
 
     def workspace(self) -> Workspace:
-        """Room for something that lives on, such as what follows goals from step to step; nobody else uses it."""
+        """A new workspace for a long-lived object, such as a tracker, which alone uses it."""
         return Workspace(self._build())
 
     def frame_id(self, name: str) -> int:
@@ -121,7 +122,7 @@ class Scene:
         """
         return int(self.figure.frame_id(name))
 
-    # ---- changing it
+    # ---- changes
 
     def add(
         self,
@@ -131,7 +132,7 @@ class Scene:
         at: Any = (0.0, 0.0, 0.0),
         color: Sequence[float] | None = None,
     ) -> Scene:
-        """Put a thing into the world.
+        """Add a thing to the world.
 
         Args:
             shape: a `wholebody.geometry.shapes.Shape`.
@@ -143,7 +144,7 @@ class Scene:
             The scene, so that calls can be chained.
 
         Raises:
-            InputError: the name is taken, or the shape, placement or color is none.
+            InputError: the name exists already, or the shape, placement or color is invalid.
         """
         return self._put(self._new_name(name), shape, at, color)
 
@@ -157,22 +158,22 @@ class Scene:
         rests_on: Iterable[str] = (),
         color: Sequence[float] | None = None,
     ) -> Scene:
-        """Give the figure a thing to carry: it moves with a segment, at `at` in the segment's frame.
+        """Attach a thing to the figure: it moves with a segment, at `at` in the segment's frame.
 
-        It is not tested against its own segment, nor against neighbours of it (segments that the figure itself does not
-        test against each other) that it leans on in the figure's first posture; `excluded_pairs` lists those. All
-        others are tested: a box in the hand does not pass through the thighs.
+        It is not tested against its own segment. It is not tested against neighbours of this segment (segments that the
+        figure itself does not test against each other) that it touches in the figure's first posture; `excluded_pairs`
+        lists those. It is tested against all others: a box in the hand does not pass through the thighs.
 
         Args:
             shape: a `wholebody.geometry.shapes.Shape`.
             to: the segment or frame that carries it.
             name: a name that nothing else in the scene has.
-            at: where, in that frame; as for `add`.
+            at: its placement in that frame; as for `add`.
             rests_on: more segments that it is not tested against.
             color: red, green, blue and, if wanted, alpha, each from 0 to 1.
 
         Raises:
-            InputError: the name is taken, or the shape, placement or color is none.
+            InputError: the name exists already, or the shape, placement or color is invalid.
             UnknownNameError: there is no such frame or segment.
         """
         self.frame_id(to)
@@ -183,7 +184,7 @@ class Scene:
         return self._put(name, shape, at, color, to, rests)
 
     def move(self, name: str, *, at: Any) -> Scene:
-        """Place a thing anew: in the world, or in its segment's frame.
+        """Move a thing to a new placement in the world, or in its segment's frame.
 
         Raises:
             UnknownNameError: there is no such object.
@@ -200,7 +201,7 @@ class Scene:
         return self
 
     def remove(self, name: str) -> Scene:
-        """Take a thing out.
+        """Remove a thing.
 
         Raises:
             UnknownNameError: there is no such object.
@@ -238,10 +239,10 @@ class Scene:
             )
         return name
 
-    # ---- asking it
+    # ---- queries
 
     def state(self, q: Array) -> State:
-        """One kinematic pass at q, shape (nq,); the caller's own, and far cheaper to move on with `State.update`.
+        """A new kinematic state at q, shape (nq,). `State.update` moves it to another posture far faster.
 
         Raises:
             InputError: q has the wrong shape or is not finite.
@@ -259,9 +260,9 @@ class Scene:
             return workspace.near(q, within).nearest_first()
 
     def penetration(self, q: Array) -> list[ObjectPenetration]:
-        """How deep owners (segments, objects) are in each other at q: PD_g and the least separating translation.
+        """Depth of overlap of owners (segments, objects) at q: PD_g and the least separating translation.
 
-        The deepest first; empty where nothing overlaps. See `wholebody.geometry.penetration`.
+        The deepest first; empty if nothing overlaps. See `wholebody.geometry.penetration`.
         """
         from wholebody.geometry.penetration import object_penetrations
 
@@ -270,14 +271,14 @@ class Scene:
             return object_penetrations(workspace.geometry, near.placements, workspace.owners, near.pair)
 
     def sweep(self, q0: Array, q1: Array, tolerance: float = 1e-4) -> FirstContact | None:
-        """First contact on the way from q0 to q1, both (nq,), along pin.interpolate; None where there is none.
+        """First contact of the motion from q0 to q1, both (nq,), along pin.interpolate; None if there is none.
 
-        Continuous: no object is too thin to be seen. See `wholebody.geometry.continuous.sweep`.
+        The test is continuous and finds objects of any thickness. See `wholebody.geometry.continuous.sweep`.
 
         Args:
-            q0: where the motion starts.
-            q1: where it ends.
-            tolerance: depth that is not yet a contact, metres.
+            q0: start of the motion.
+            q1: its end.
+            tolerance: depth up to which an overlap is no contact, metres.
 
         Raises:
             InputError: postures of the wrong shape, not finite or with a quaternion that is not of unit length; a
@@ -299,7 +300,7 @@ class Scene:
                     built = self._built = assemble(self.figure, self._objects.values(), self._excluded)
         return built
 
-    # ---- copying it
+    # ---- copies
 
     def __copy__(self) -> Scene:
         built = self._built

@@ -1,4 +1,4 @@
-"""The geometry model of a scene: pieces of a figure, of what it carries and what stands around, and their pairs."""
+"""The geometry model of a scene: pieces of a figure, of carried things and of things around, and their pairs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
 from wholebody.geometry.large_models import geometry_model
-from wholebody.geometry.proximity import PairTable, Proximity
+from wholebody.geometry.proximity import Joints, PairTable, Proximity
 from wholebody.pool import Pool
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-RESTING = 1e-3  # m: equipment nearer than this to a segment at rest is taken to lean on it
+RESTING = 1e-3  # m: a carried thing nearer than this to a segment in the first posture rests on it
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class SceneObject:
 
     Attributes:
         name: its name, unique among the objects and segments of the scene.
-        shape: what it is.
-        placement: in the world, or in the segment's frame where it is carried.
-        segment: the segment that carries it; None for a thing that stands around.
+        shape: its shape.
+        placement: in the world, or in the segment's frame for a carried thing.
+        segment: the segment that carries it; None for a thing in the world.
         color: red, green, blue, alpha from 0 to 1, or None for the viewer's choice.
         rests_on: segments that a carried thing is not tested against.
     """
@@ -48,17 +48,17 @@ class SceneObject:
 
 
 class SceneGeometry:
-    """What is made from the list of objects: the geometry model and the indices into it.
+    """The geometry model of the list of objects, with the indices into it.
 
-    All of it stays as it is but the placements of the pieces of things, which `place` changes. Any number of runs may
-    share it; what a run changes is its own, see `pool`.
+    Only the placements of the pieces of things change, by `place`. Any number of runs may share it; the data that a run
+    changes come from `pool`.
 
     Attributes:
         table: pieces and pairs as arrays.
         rows: builds contact rows.
         owners: name of the segment or object that each piece is part of.
-        pieces_of: object to its pieces: index, and place in the object.
-        lock: held while pieces are placed, and by whoever copies more than one placement.
+        pieces_of: object to its pieces: index, and placement in the object.
+        lock: held while pieces are placed, and while more than one placement is copied.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class SceneGeometry:
         self.model, self.geometry, self.owners, self.pieces_of = model, geometry, owners, pieces_of
         self.table = PairTable(model, geometry)
         self.rows = ContactRowBuilder(self.table)
-        compiled_kernel()  # of `far_moved`, not in the middle of a solve
+        compiled_kernel()  # of `far_moved`: compile now, not during a solve
         self.lock = Lock()
         self.moves = 0
         self._moved_at = np.zeros(geometry.ngeoms, dtype=np.int64)
@@ -86,7 +86,7 @@ class SceneGeometry:
                 self._moved_at[index] = self.moves
 
     def bring(self, proximity: Proximity, seen: int) -> int:
-        """Put the pieces that moved since `seen` where they are now; the `moves` that this has seen."""
+        """Update the placements of the pieces that moved since `seen`; returns the present number of moves."""
         if seen == self.moves:
             return seen
         with self.lock:
@@ -95,17 +95,17 @@ class SceneGeometry:
             return self.moves
 
     def pool(self, kind: type[T], make: Callable[[], T]) -> Pool[T]:
-        """The free list of objects of a kind, made by `make`; one run uses one of them at a time."""
+        """The pool of objects of a kind, made by `make`; one run uses one of them at a time."""
         pool: Pool[T] | None = self._pools.get(kind)
         return self._pools.setdefault(kind, Pool(make)) if pool is None else pool
 
     def copied(self) -> SceneGeometry:
-        """The same with placements of its own."""
+        """A copy with placements of its own."""
         with self.lock:
             return SceneGeometry(self.model, self.geometry.copy(), self.owners, dict(self.pieces_of))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what it is made from."""
+        """Return the arguments that it is made from."""
         return {
             "model": self.model,
             "geometry": self.geometry,
@@ -175,7 +175,9 @@ def _leaning(
     rest = figure.posture(figure.postures[0])
     data = figure.model.createData()
     pin.forwardKinematics(figure.model, data, rest)
-    touching = {(owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).near(data, RESTING).pair}
+    touching = {
+        (owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(Joints(data), RESTING).pair
+    }
 
     found: dict[tuple[str, str], str] = {}
     for name, thing in carried.items():

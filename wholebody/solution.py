@@ -1,4 +1,4 @@
-"""A solution: what a method answers, with the judgement of its posture and the way there."""
+"""A solution: the answer of a method, with the assessment of its posture and the trace of its iterations."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class TraceEntry:
     """One line of a solution's trace.
 
     Attributes:
-        goal_error: largest goal error left, metres or radians.
-        violation: largest violation of anything that must hold, metres or radians.
+        goal_error: largest remaining goal error, metres or radians.
+        violation: largest violation of a limit, constraint or clearance, metres or radians.
         measure: weighted sum of the measures.
-        step: largest entry of the displacement that led here, radians or metres.
-        note: what happened: "", "restart", "continuation", ...
+        step: largest entry of the displacement of this iteration, radians or metres.
+        note: the event of this iteration: "", "restart", "continuation", ...
     """
 
     goal_error: float
@@ -32,7 +32,7 @@ class TraceEntry:
 
 @dataclass(frozen=True)
 class Solution:
-    """What a method answers.
+    """The answer of a method.
 
     Attributes:
         q: (nq,) the posture, within limits, never NaN.
@@ -41,8 +41,8 @@ class Solution:
         iterations: iterations of the method.
         assessment: the independent judgement of q.
         trace: one entry an iteration.
-        method: name of the method and of what it used.
-        message: one sentence for a reader.
+        method: name of the method and of its solver.
+        message: one sentence that explains the status.
     """
 
     q: Array

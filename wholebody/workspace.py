@@ -71,11 +71,11 @@ class Workspace:
 
     def near(self, q: Array, within: float) -> Contacts:
         """Every pair nearer than `within` metres at the posture q, shape (nq,), in the order of the pairs."""
-        return self.proximity.near(self.state.update(q).data, within)
+        return self.proximity.query(self.state.update(q), within)
 
     def placements(self, q: Array) -> Array:
         """Where all pieces are at the posture q, shape (nq,); see `Contacts.placements`."""
-        return self.proximity.placements(self.state.update(q).data)
+        return self.proximity.placements(self.state.update(q))
 
 
 @contextmanager

@@ -78,7 +78,7 @@ def test_solve(tmp_path: Path, docs: Path) -> None:
 
 
 def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
-    from wholebody.bench import charts
+    from wholebody.bench import step as steps
 
     times = [
         StepTime(reach, tool, 1, step, 100.0 + 13.0 * step, 90.0, 20.0 - step)
@@ -86,7 +86,7 @@ def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
         for tool in ("placo", "wholebody/osqp")
         for step in range(1, 30)
     ]
-    for draw in (charts.step_times, charts.least_distances):
+    for draw in (steps.step_times, steps.least_distances):
         once, again = (draw(times, tmp_path / name) for name in ("a", "b"))
         assert [path.read_bytes() for path in once] == [path.read_bytes() for path in again]
 

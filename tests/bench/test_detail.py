@@ -13,7 +13,7 @@ import wholebody as wb
 from wholebody.bench import detail
 from wholebody.bench.chains import TIP, chain, task
 from wholebody.bench.detail import LEVELS, DetailRow
-from wholebody.bench.problem_sets import clutter
+from wholebody.bench.problem_sets.registry import SETS
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import add_to
 from wholebody.figures.state import State
@@ -49,7 +49,7 @@ def test_levels_are_judged_in_the_finest_model() -> None:
 
 
 def test_a_person_is_asked_the_same_in_another_detail() -> None:
-    given = clutter.make(0, 0).problem
+    given = SETS["clutter"].make(0, 0).problem
     figure = wb.load("human", detail="hulls")
     made = detail._with(figure, given)
     assert made.scene.figure is figure

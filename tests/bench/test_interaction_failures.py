@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.interaction import summary
-from wholebody.bench.interaction_failures import WorstFrames, failures, worst_frames
+from wholebody.bench.interaction import WorstFrames, failures, summary, worst_frames
 from wholebody.interaction import Recording, judge
 
 

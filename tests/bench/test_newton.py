@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wholebody.bench import newton, newton_solves
+from wholebody.bench import newton
 from wholebody.bench.tables import read_rows
 from wholebody.cli.main import main
 
@@ -20,7 +20,7 @@ def test_the_shapes_are_assembled() -> None:
 
 
 def test_the_papers_size_is_met() -> None:
-    row = newton_solves.paper_row(1)
+    row = newton.paper_row(1)
     assert abs(row.variables - 212) <= 5
     assert abs(row.nonzeros - 1455) <= 60
     assert row.systems == 3

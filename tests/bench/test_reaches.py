@@ -7,7 +7,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.problem_sets.bodies import CLEARANCE
-from wholebody.bench.problem_sets.clutter import THINGS
+from wholebody.bench.problem_sets.reaching import THINGS
 from wholebody.bench.problem_sets.things import KINDS
 from wholebody.bench.reaches import reach, solve_reach
 

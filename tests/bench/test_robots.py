@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.robots.reaching import examine, tip_targets
-from wholebody.bench.robots.table import descriptions, measure, page
+from wholebody.bench.robots import descriptions, examine, measure, page, tip_targets
 from wholebody.cli import main
 from wholebody.errors import InputError
 

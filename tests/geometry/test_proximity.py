@@ -70,7 +70,7 @@ def test_agrees_with_coal_asked_pair_by_pair(detail):
         expected = asked_one_by_one(scene, q)
         for k, within in enumerate((5.0, 0.02, 0.5, -0.01, 0.0, 0.1, 5.0)):
             proximity = Proximity(scene.pair_table) if k == 0 else used
-            found = proximity.near(scene.state(q).data, within)
+            found = proximity.query(scene.state(q), within)
             check(scene, found, expected, within, 1e-9 if k == 0 else 3e-6)
             seen["near"] += len(found.pair)
             seen["inside"] += int((found.distance < 0.0).sum())
@@ -243,7 +243,7 @@ def test_official_getters_stand_in_for_views(monkeypatch, lost):
         monkeypatch.setattr(module, name, lambda results: None)
     slow = Proximity(scene.pair_table)
     for (q, within), wanted in zip(queries, expected, strict=True):
-        found = slow.near(scene.state(q).data, within)
+        found = slow.query(scene.state(q), within)
         slow.forget()
         for part, want in zip(found.nearest_first(), wanted, strict=True):
             assert np.array_equal(part, want)
@@ -270,9 +270,8 @@ def test_shapes_without_exact_distance_are_refused():
         PairTable(model, geometry)
 
 
-def test_boxes_of_long_walls_hide_nothing(free_bodies, monkeypatch):
+def test_boxes_of_long_walls_hide_nothing(free_bodies):
     """Turned bodies that nearly touch walls whose spheres hold the whole room: the same pairs as coal's."""
-    monkeypatch.setattr(module, "MANY", 0)
     rng, found_any = np.random.default_rng(6), 0
     shapes = [wb.Box((0.3, 0.2, 0.1)), wb.Capsule(0.05, 0.4), wb.Ellipsoid((0.2, 0.1, 0.1)), SHAPES["hull"]]
     scene = wb.Scene(free_bodies(*shapes))
@@ -289,3 +288,33 @@ def test_boxes_of_long_walls_hide_nothing(free_bodies, monkeypatch):
             found_any += len(found)
             assert {pair for pair, row in expected.items() if row[0] < within - 5e-6} <= found
     assert found_any > 300
+
+
+@pytest.mark.parametrize("step", [3e-4, 0.02, 0.4])
+def test_pairs_that_cannot_have_come_near_are_not_asked_and_none_is_missed(step):
+    """A walk in steps of any length among things that move too: the same pairs as coal finds among all."""
+    rng = np.random.default_rng(21)
+    scene = among_things("capsules", rng)
+    workspace = scene.workspace()
+    q, asked, found_any = scene.figure.posture("standing"), [], 0
+    for k in range(25):
+        q = scene.figure.clamp(pin.integrate(scene.model, q, step * rng.normal(size=scene.model.nv)))
+        if k % 5 == 4:
+            scene.move(
+                "thing1", at=(*rng.uniform(-0.5, 0.5, 3), *pin.Quaternion(pin.exp3(rng.normal(size=3))).coeffs())
+            )
+        workspace.refresh()
+        before = workspace.proximity.asked
+        found = workspace.near(q, 0.04)
+        asked.append(workspace.proximity.asked - before)
+        wanted = {pair: row[0] for pair, row in asked_one_by_one(scene, q).items() if row[0] < 0.04}
+        assert {pair for pair, distance in wanted.items() if distance < 0.04 - 1e-5} <= {
+            *map(tuple, found.pair.tolist())
+        }
+        np.testing.assert_allclose(
+            found.distance, [wanted[pair] for pair in map(tuple, found.pair.tolist())], atol=3e-6
+        )
+        found_any += len(found.distance)
+    assert found_any > 50
+    if step == 3e-4:
+        assert np.mean(asked[1:4]) < 0.8 * asked[0]  # what is far away was not asked again

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -9,22 +10,29 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.interaction import SCENES, Recording, build_scene, follow, gallery, judge
+from wholebody.interaction import SCENES, Recording, Track, build_scene, follow, gallery, judge
+from wholebody.interaction.scenes import InteractionScene
 from wholebody.motion_assessment import assess_motion
 from wholebody.tasks import ReachCones
 
 BEFORE, AFTER = 8, 32
 
 
+@cache
+def first_contact(name: str) -> tuple[InteractionScene, Track]:
+    """A scene, and its track from just before it first goes into something; made once for both ways out."""
+    made = build_scene(name)
+    assert len(made.track) >= 600
+    coarse = np.arange(0, len(made.track), 6)
+    first = int(coarse[np.argmax(assess_motion(made.scene, made.track.q[coarse], 1.0).depth > 5e-3)])
+    return made, made.track.part(first - BEFORE, first + AFTER)
+
+
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize(("overlap", "allowed"), [("qp", 1e-5), ("ccd", 1e-3)])
 def test_the_shown_figure_stays_outside(name: str, overlap: str, allowed: float, least: Any) -> None:
-    made = build_scene(name)
-    scene, track = made.scene, made.track
-    assert len(track) >= 600
-    coarse = np.arange(0, len(track), 6)
-    first = int(coarse[np.argmax(assess_motion(scene, track.q[coarse], 1.0).depth > 5e-3)])
-    part = track.part(first - BEFORE, first + AFTER)
+    made, part = first_contact(name)
+    scene = made.scene
     recording = follow(scene, part, overlap=overlap, rigid=made.rigid)
     assert min(least(scene, q) for q in part.q) < -0.01  # the tracked one goes in
     assert min(least(scene, q) for q in recording.q) > -allowed

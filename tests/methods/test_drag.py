@@ -28,9 +28,9 @@ def _circle(angle: float) -> tuple[float, float, float]:
 def test_a_drag_follows_and_ends_exactly(scene: wb.Scene, method: str) -> None:
     problem = _problem(scene)
     drag = wb.Drag(problem, method)
-    for _ in range(40):
+    for _ in range(20):
         drag.to(_circle(0.0))
-    frames = [drag.to(_circle(0.05 * k)) for k in range(100)]
+    frames = [drag.to(_circle(0.05 * k)) for k in range(60)]
     assert max(frame.error for frame in frames) < 0.01
     last = drag.finish()
     assert last.solved
@@ -48,7 +48,7 @@ def test_a_hand_is_not_dragged_through_a_plate(method: str) -> None:
     goals, holds = [wb.Point("right_index_tip", (0.4, -0.2, 1.2))], [wb.Freeze("root", "left_leg", "right_leg")]
     problem = wb.Problem(scene, "standing", goals=goals, constraints=holds)
     drag = wb.Drag(problem, method)
-    postures = [drag.to((0.4, -0.2, 1.2)).q for _ in range(30)]
+    postures = [drag.to((0.4, -0.2, 1.2)).q for _ in range(20)]
     assert drag.to((0.4, -0.2, 1.2)).error < 2e-3
     postures += [drag.to((0.4, y, 1.2)).q for y in np.arange(-0.2, 0.2, 0.02)]
     postures.append(drag.finish().q)
@@ -65,9 +65,9 @@ def test_newton_needs_few_iterations_a_frame_and_does_not_drift(scene: wb.Scene)
     problem = _problem(scene)
     drag = wb.Drag(problem, "newton")
     drag.to(_circle(0.0))
-    frames = [drag.to(_circle(0.05 * k)) for k in range(126)]
+    frames = [drag.to(_circle(0.1 * k)) for k in range(63)]
     assert np.mean([frame.iterations for frame in frames]) < 3.0
-    for frame in frames[::25]:
+    for frame in frames[::12]:
         judged = wb.assess(problem, frame.q)
         assert judged.constraint_violation < 2e-4  # what a frame is solved to, not more from frame to frame
         assert scene.figure.within_limits(frame.q)
@@ -106,7 +106,7 @@ def test_a_frame_by_quadratic_programs_is_as_near_as_it_is_asked_for(scene: wb.S
     assert max(measures) < 1.01 * min(measures)
 
 
-@pytest.mark.parametrize("speed", [0.3, 1.5])
+@pytest.mark.parametrize("speed", [0.6, 1.5])
 @pytest.mark.parametrize("method", ["ccd", "newton", "qp"])
 def test_an_arm_gives_way_to_what_comes_into_it_and_comes_back(planar_arm, method: str, speed: float) -> None:
     """A ball is pushed 25 cm into where the forearm is, and taken away again; the goal stays where the tip was."""

@@ -7,12 +7,32 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array, Indices
 from wholebody.geometry import contact_rows as module
-from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.geometry.contact_rows import ContactRowBuilder, ContactRows
 from wholebody.geometry.proximity import Contacts
 
 
 class ReferenceRowBuilder(ContactRowBuilder):
     """The builder of rows with array code in place of its loops."""
+
+    def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
+        k = len(contacts.distance)
+        joint = self.table.joint
+        wide = np.flatnonzero(self._extended[contacts.number] & (contacts.distance < clearance + module.LEVER_DISTANCE))
+        if len(wide):
+            self._snap(contacts, wide)
+        wrench = _wrenches(contacts.normal, contacts.point_a)
+        first, second = joint[contacts.pair[:, 0]], joint[contacts.pair[:, 1]]
+        index = np.arange(k)
+        if not len(wide):
+            return ContactRows(contacts.distance, wrench, index, first, second)
+        contact, point, gap = self._patch_ends(contacts, wide)
+        return ContactRows(
+            np.concatenate([contacts.distance, gap]),
+            np.vstack([wrench, _wrenches(contacts.normal[contact], point)]),
+            np.concatenate([index, contact]),
+            np.concatenate([first, first[contact]]),
+            np.concatenate([second, second[contact]]),
+        )
 
     def _snap(self, contacts: Contacts, wide: Indices) -> None:
         placement = contacts.placements
@@ -100,7 +120,7 @@ class ReferenceRowBuilder(ContactRowBuilder):
         if len(capsule):
             axis = self._axis[other[capsule]]
             down = np.einsum("ijk,ik->ij", rotation[capsule], towards[capsule])
-            across = module._cross(axis, down)
+            across = np.cross(axis, down)
             norm = np.sqrt(np.einsum("ij,ij->i", across, across))
             radius = self._radius[other[capsule]]
             offset = np.abs(np.einsum("ij,ij->i", across, along[capsule])) / np.maximum(norm, 1e-9)
@@ -130,3 +150,7 @@ def _expand(start: Indices, count: Indices, item: Indices) -> tuple[Indices, Ind
     entry = np.repeat(np.arange(len(item)), counts)
     offset = np.arange(len(entry)) - np.repeat(np.cumsum(counts) - counts, counts)
     return entry, start[item][entry] + offset
+
+
+def _wrenches(normal: Array, point: Array) -> Array:
+    return np.hstack([normal, np.cross(point, normal)])

@@ -22,6 +22,7 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.bench.problem_sets.registry import SETS
+from wholebody.bench.report import render
 from wholebody.bench.stability.case import Posed
 from wholebody.bench.stability.catalogue import cases
 from wholebody.methods.solve import method_named
@@ -86,10 +87,9 @@ class Row:
 
 
 def constants(method: str) -> tuple[list[Constant], list[str]]:
-    """Constants of a method but those of tracking, and modules whose constants are compiled in and cannot be changed.
+    """Constants of a method, a package of `wholebody.methods`, but those of tracking.
 
-    Args:
-        method: name of a package of `wholebody.methods`.
+    Modules whose constants are compiled in and cannot be changed are the second part.
     """
     package = import_module(f"wholebody.methods.{method}")
     names = [f"{package.__name__}.{found.name}" for found in pkgutil.walk_packages(package.__path__)]
@@ -133,16 +133,10 @@ def ablation(
     mechanisms: Mapping[str, tuple[Any, str, Any]],
     tell: Callable[[str], None],
 ) -> tuple[Outcome, list[Row]]:
-    """Change one thing after the other.
+    """Change one thing after the other; return what the method does unchanged, and a row a change.
 
-    Args:
-        method: its name.
-        given: the problems.
-        mechanisms: names to what is switched off: an owner, its attribute, and what takes its place.
-        tell: told of every row.
-
-    Returns:
-        What the method does unchanged, and a row a change.
+    `mechanisms` are what is switched off by name: an owner, its attribute, and what takes its place. `tell` is told
+    of every row.
     """
     outcome(method, given[:1])  # what is compiled at first use
     whole = outcome(method, given)
@@ -227,32 +221,11 @@ def _replaced(places: Sequence[tuple[Any, str]], value: Any) -> Iterator[None]:
 
 def report(method: str, given: int, whole: Outcome, rows: Sequence[Row], compiled: Sequence[str]) -> str:
     """The counts as Markdown: mechanisms, constants that matter by what they change, and those that change nothing."""
-    lines = [
-        f"{method} on {given} problems: {whole.solved} solved, {whole.iterations} iterations, {whole.left:.4g} m and "
-        "rad left. The columns are changes of these, and how many answers differ in any digit.",
-        "",
-        "| switched off | answers that differ | solved | iterations | left [m, rad] |",
-        "| --- | ---: | ---: | ---: | ---: |",
-    ]
-    lines += [_line(row) for row in rows if row.change == "off"]
-    lines += [
-        "",
-        "| constant | answers that differ | solved | iterations | left [m, rad] |",
-        "| --- | ---: | ---: | ---: | ---: |",
-    ]
     changed = [row for row in rows if row.change != "off"]
-    lines += [_line(row) for row in changed if row.differ]
-    names = dict.fromkeys(row.what for row in changed)
-    idle = [name for name in names if not any(row.differ for row in changed if row.what == name)]
-    lines += [
-        "",
-        f"Ten times and a tenth of these changed no answer: {', '.join(f'`{name}`' for name in idle) or 'none'}.",
-    ]
-    if compiled:
-        lines += ["", f"Compiled in, and not changed: the constants of {', '.join(f'`{name}`' for name in compiled)}."]
-    return "\n".join(lines)
-
-
-def _line(row: Row) -> str:
-    what = row.what if row.change == "off" else f"`{row.what}`, {row.change}"
-    return f"| {what} | {row.differ} | {row.solved:+d} | {row.iterations:+d} | {row.left:+.3g} |"
+    matter = {row.what for row in changed if row.differ}
+    idle = dict.fromkeys(row.what for row in changed if row.what not in matter)
+    tables = {
+        "switched off": [row for row in rows if row.change == "off"],
+        "constant": [row for row in changed if row.differ],
+    }
+    return render("ablation.md", method=method, given=given, whole=whole, tables=tables, idle=idle, compiled=compiled)

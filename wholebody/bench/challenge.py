@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from wholebody.bench.drag import DragFrameRow, DragRow, drag_frames, drag_summary
 from wholebody.bench.report import render
+from wholebody.bench.tables import filled
 from wholebody.interaction.dragging import Dragged, drag_along, judge_drag, present_place
 from wholebody.interaction.paths import read_path, spread
 from wholebody.problem import Problem
@@ -52,10 +53,7 @@ def measure(
 ) -> tuple[list[ChallengeRow], dict[str, list[DragFrameRow]]]:
     """Drag by each method; a row each, and the rows of all frames by method.
 
-    Args:
-        task: sit_on_chair.toml, with its path beside it.
-        frames: of the way.
-        say: takes a line about each method.
+    The task is sit_on_chair.toml, with its path beside it; `say` takes a line about each method.
     """
     problem = read_task(task).problem
     places = spread(np.vstack([present_place(problem), read_path(task.with_suffix(".csv"))]), frames)
@@ -75,21 +73,13 @@ def report(rows: Sequence[ChallengeRow], facts: Mapping[str, str]) -> str:
 
 
 def _row(problem: Problem, dragged: Dragged, row: DragRow) -> ChallengeRow:
-    return ChallengeRow(
-        method=row.method,
-        frames=row.frames,
-        mean_ms=row.mean_ms,
-        p95_ms=row.p95_ms,
-        max_ms=row.max_ms,
-        cpu_mean_ms=row.cpu_mean_ms,
-        iterations=row.iterations,
-        depth_mm=row.depth_mm,
-        between_mm=row.between_mm,
+    return filled(
+        ChallengeRow,
+        row,
         seat_mm=1e3 * _apart(problem, dragged, "pelvis", "seat"),
         back_mm=1e3 * _apart(problem, dragged, "thorax", "backrest"),
         feet_mm=1e3 * _drift(problem, dragged),
         left_mm=row.end_error_mm,
-        status=row.status,
     )
 
 

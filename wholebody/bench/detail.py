@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench import plot_style
 from wholebody.bench.chains import TIP, chain, task
-from wholebody.bench.problem_sets import balance, clutter
+from wholebody.bench.problem_sets.registry import SETS
 from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
 from wholebody.problem import Problem
@@ -36,22 +36,18 @@ INSIDE = 1e-4  # m: deeper than this an answer is inside something
 
 @dataclass(frozen=True)
 class DetailRow:
-    """One case by one model.
+    """One case by one model; what an answer gets wrong is judged in the finest model.
 
     Attributes:
         task: "clutter", "whole body" or "arm".
-        case: its number.
         detail: "spheres", "capsules", "hulls", or "own" for a robot.
         level: what was left out.
         freedoms, pairs: of the model that was solved.
         status: of the answer, as its own model says.
-        solve_ms: the solve without its judgement, the faster of two, by the clock [ms].
-        judge_ms: the judgement, by the clock [ms].
-        prepare_ms: to leave out what is left out [ms].
-        penetration_mm: how deep the answer is inside something in the finest model [mm].
-        lack_mm: by how much the worst pair misses its clearance there [mm].
-        goal_error_mm: what is left to the goals [mm].
-        effort: of the answer.
+        solve_ms, judge_ms: the solve without its judgement, and the judgement, the faster of two, by the clock.
+        prepare_ms: to leave out what is left out.
+        lack_mm: by how much the worst pair misses its clearance.
+        goal_error_mm: what is left to the goals.
         above: effort above the finest model's own answer, as a share of it; nan where that one was not solved.
     """
 
@@ -75,13 +71,9 @@ class DetailRow:
 def rows(cases: int, seed: int) -> Iterator[DetailRow | str]:
     """Measure every case with every model; a sentence where a model cannot be asked."""
     figures = {detail: wb.load("human", detail=detail) for detail in DETAILS}
-    sets: dict[str, Callable[[int, int], Problem]] = {
-        "clutter": lambda number, seed: clutter.make(number, seed).problem,
-        "whole body": lambda number, seed: balance.make(number, seed).problem,
-    }
-    for name, make in sets.items():
+    for name, family in (("clutter", SETS["clutter"]), ("whole body", SETS["balance"])):
         for number in range(cases):
-            given, models = make(number, seed), {}
+            given, models = family.make(number, seed).problem, {}
             for detail, figure in figures.items():
                 try:
                     models[detail] = _with(figure, given)
@@ -161,10 +153,10 @@ class Summary(NamedTuple):
     task: str
     detail: str
     level: str
-    freedoms: int
-    pairs: int
     cases: int
     solved: int
+    freedoms: int
+    pairs: int
     solve_ms: float
     judge_ms: float
     prepare_ms: float
@@ -182,22 +174,25 @@ def summaries(rows: Sequence[DetailRow]) -> list[Summary]:
     for name, kind, level in dict.fromkeys((row.task, row.detail, row.level) for row in rows):
         mine = [row for row in rows if (row.task, row.detail, row.level) == (name, kind, level)]
         solved = [row for row in mine if row.status == "solved"]
-        above = [row.above for row in solved if np.isfinite(row.above)]
+        above = [row.above for row in solved if np.isfinite(row.above)] or [float("nan")]
+        sizes: dict[str, Any] = {each: int(_median(mine, each)) for each in ("freedoms", "pairs")}
+        times: dict[str, Any] = {each: _median(mine, each) for each in ("solve_ms", "judge_ms", "prepare_ms")}
+        worst: dict[str, Any] = {
+            f"worst_{each}": max((getattr(row, each) for row in solved), default=0.0)
+            for each in ("penetration_mm", "lack_mm", "goal_error_mm")
+        }
+        inside = sum(row.penetration_mm > 1e3 * INSIDE for row in solved)
         found.append(
             Summary(
-                name, kind, level, int(np.median([row.freedoms for row in mine])),
-                int(np.median([row.pairs for row in mine])), len(mine), len(solved),
-                float(np.median([row.solve_ms for row in mine])), float(np.median([row.judge_ms for row in mine])),
-                float(np.median([row.prepare_ms for row in mine])),
-                sum(row.penetration_mm > 1e3 * INSIDE for row in solved),
-                max((row.penetration_mm for row in solved), default=0.0),
-                max((row.lack_mm for row in solved), default=0.0),
-                max((row.goal_error_mm for row in solved), default=0.0),
-                float(np.median(above)) if above else float("nan"),
-                max(above, default=float("nan")),
+                name, kind, level, len(mine), len(solved), **sizes, **times, **worst, inside=inside,
+                above=float(np.median(above)), worst_above=max(above),
             )
         )  # fmt: skip
     return found
+
+
+def _median(rows: Sequence[DetailRow], name: str) -> float:
+    return float(np.median([getattr(row, name) for row in rows]))
 
 
 def chart(rows: Sequence[DetailRow], path: Path) -> tuple[Path, Path]:
@@ -223,8 +218,7 @@ def chart(rows: Sequence[DetailRow], path: Path) -> tuple[Path, Path]:
         below.set_ylim(min(-1.0, 2.0 * min(worst, default=0.0)), max(2.0, 2.0 * max(worst, default=0.0)))
         times = [one.solve_ms + one.judge_ms for one in found if one.task == name]
         for axis in (above, below):
-            axis.set_xscale("log")
-            axis.set_xlim(0.7 * min(times), 1.4 * max(times))
+            axis.set(xscale="log", xlim=(0.7 * min(times), 1.4 * max(times)))
             plot_style.plain_log(axis)
         below.axhline(0.0, color="#666666", linewidth=0.8)
         above.set_title(TITLES[name], loc="left")

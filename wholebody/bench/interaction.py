@@ -1,4 +1,4 @@
-"""Frame loops measured: a row a scene, as in table 2 of Schmidl and Lin, and a row a frame for the charts."""
+"""Frame loops measured: a row a scene, as in table 2 of Schmidl and Lin, a row a frame, and the worst frames."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ PAPER = (
 collision queries %."""
 
 GOAL_MEAN, GOAL_P99 = 8.0, 16.0  # ms
+FAR = 0.2  # rad: root mean square over the joints, from which on a frame is called far from the tracked one
 DEEPEST = {"qp": 0.1, "ccd": 1.0}  # mm
 
 
@@ -170,15 +171,13 @@ def frame_chart(rows: Sequence[FrameRow], path: Path) -> tuple[Path, Path]:
     above.plot(frame, time, color=plot_style.COLORS["wholebody/osqp"], linewidth=0.8, label="whole frame")
     queries = [row.contact_ms for row in rows]
     above.plot(frame, queries, color="#d55e00", linewidth=0.8, label="collision queries")
-    above.set_ylim(0.0, 1.25 * max(float(np.quantile(time, 0.995)), 1e-3))
-    above.set_ylabel("frame time [ms]")
+    above.set(ylim=(0.0, 1.25 * max(float(np.quantile(time, 0.995)), 1e-3)), ylabel="frame time [ms]")
     above.legend(loc="upper right", frameon=False, ncols=2, fontsize=8)
     above.set_title(f"{rows[0].scene.replace('_', ' ')}, overlap removed by {rows[0].overlap}", loc="left")
     tracked = [row.tracked_depth_mm for row in rows]
     below.plot(frame, tracked, color="#666666", linewidth=1.0, label="tracked posture")
     below.plot(frame, [row.depth_mm for row in rows], color="#009e73", linewidth=1.4, label="shown posture")
-    below.set_ylabel("deepest overlap [mm]")
-    below.set_xlabel("frame (shaded: the tracked posture is inside of something)")
+    below.set(ylabel="deepest overlap [mm]", xlabel="frame (shaded: the tracked posture is inside of something)")
     below.legend(loc="upper right", frameon=False, ncols=2, fontsize=8)
     return plot_style.save(chart, path)
 
@@ -187,3 +186,85 @@ def report(rows: Sequence[InteractionRow], facts: Mapping[str, str]) -> str:
     """Both tables beside the paper's, as Markdown."""
     goals = {"mean": GOAL_MEAN, "p99": GOAL_P99, "deepest": DEEPEST, "back": IN_TIME}
     return render("interaction.md", rows=rows, paper=PAPER, goals=goals, facts=facts)
+
+
+@dataclass(frozen=True)
+class WorstFrames:
+    """The worst frames of one scene by one method; numbers of frames count from 0.
+
+    Attributes:
+        row: the whole run.
+        deepest, slowest, farthest, sudden: frames with the deepest overlap left, the longest time of the processor, the
+            greatest distance between shown and tracked joints, and the greatest jerk.
+        milliseconds, query_percent, iterations, pairs: of the slowest: time, share of collision queries in it,
+            programs, goals or displacements, and overlapping pairs of the tracked posture.
+        distance_rad, tracked_mm: of the farthest; the second is how deep its tracked posture is inside of something.
+        picture: the frame to look at where something is missed, else -1.
+    """
+
+    row: InteractionRow
+    deepest: int
+    slowest: int
+    farthest: int
+    sudden: int
+    milliseconds: float
+    query_percent: float
+    iterations: int
+    pairs: int
+    distance_rad: float
+    tracked_mm: float
+    picture: int
+
+    @property
+    def why(self) -> str:
+        """One sentence."""
+        row = self.row
+        if row.cpu_mean_ms > GOAL_MEAN or row.cpu_p99_ms > GOAL_P99:
+            return (
+                f"slow where much is in contact: frame {self.slowest} has {self.pairs} overlapping pairs to leave and "
+                f"takes {self.iterations} rounds, {self.query_percent:.0f} % of its time are collision queries"
+            )
+        if row.passed or row.depth_mm > DEEPEST[row.overlap]:
+            return (
+                f"in frame {self.deepest} limbs hinder each other, and what frees one of them is not found within the "
+                "work of a frame"
+            )
+        if row.misses:
+            return "limbs that folded in contact do not find the way back by drawing joints, which is local"
+        if self.distance_rad > FAR:
+            return (
+                f"no line is missed; far from the tracked posture, which is {self.tracked_mm:.0f} mm inside, because "
+                "limbs have to fold"
+            )
+        return "no line is missed"
+
+
+def worst_frames(row: InteractionRow, recording: Recording, judged: Judgement) -> WorstFrames:
+    """Find them in one run."""
+    slowest, deepest = int(np.argmax(recording.cpu_seconds)), int(np.argmax(judged.depth))
+    farthest = int(np.argmax(judged.distance))
+    sudden = int(np.argmax(judged.jerk)) + 2 if len(judged.jerk) else 0
+    seconds = float(recording.seconds[slowest])
+    late = [frame for frame, after in judged.returns if after < 0 or after > IN_TIME]
+    picture = -1
+    if row.misses:
+        picture = next(iter([*judged.passed, *late]), slowest if "ms" in " ".join(row.misses) else deepest)
+    return WorstFrames(
+        row=row,
+        deepest=deepest,
+        slowest=slowest,
+        farthest=farthest,
+        sudden=sudden,
+        milliseconds=1e3 * float(recording.cpu_seconds[slowest]),
+        query_percent=100.0 * float(recording.contact_seconds[slowest]) / max(seconds, 1e-9),
+        iterations=int(recording.iterations[slowest]),
+        pairs=int(judged.tracked_pairs[slowest]),
+        distance_rad=float(judged.distance[farthest]),
+        tracked_mm=1e3 * float(judged.tracked_depth[farthest]),
+        picture=picture,
+    )
+
+
+def failures(worst: Sequence[WorstFrames], pictures: Sequence[tuple[WorstFrames, str]]) -> str:
+    """The part of the page: a table, and a picture, given by its path from the page, where a line is missed."""
+    return render("interaction_failures.md", worst=worst, pictures=pictures)

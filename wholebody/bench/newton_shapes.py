@@ -10,6 +10,8 @@ import numpy as np
 from wholebody.methods.newton.assembly import Assembly
 
 LINK = 0.2  # m
+ALONG_Y = (0.0, 1.0, 0.0)
+PULL = (0.03, -0.03, 0.02)  # m: of the end of a chain, as far as takes three systems at the paper's size
 
 
 def chain(count: int, bend: float = 0.1) -> Assembly:
@@ -26,6 +28,13 @@ def chain(count: int, bend: float = 0.1) -> Assembly:
             made.revolute(base, f"b{k}", at=place.translation, axis=axis)
         turn = pin.utils.rotate("y" if k % 2 else "z", bend)
         place = place * pin.SE3(np.eye(3), np.array((LINK, 0.0, 0.0))) * pin.SE3(turn, np.zeros(3))
+    return made
+
+
+def pulled_chain(count: int) -> Assembly:
+    """A chain whose end is to move by `PULL`."""
+    made, last, tip = chain(count), f"b{count - 1}", np.array((LINK, 0.0, 0.0))
+    made.point_goal(last, made.placement(last).act(tip) + np.array(PULL), place=tip)
     return made
 
 
@@ -70,23 +79,24 @@ def star(count: int) -> Assembly:
 
 def four_bar() -> Assembly:
     """A crank of 0.3, a coupler of 0.9 and a rocker of 0.7 on a ground of 1 m, closed."""
-    made, along_y = Assembly(), (0.0, 1.0, 0.0)
-    made.body("crank", (0, 0, 0)).body("coupler", (0, 0, 0.3)).body("rocker", (1, 0, 0))
-    made.revolute("world", "crank", at=(0, 0, 0), axis=along_y)
-    made.revolute("crank", "coupler", at=(0, 0, 0.3), axis=along_y)
-    made.revolute("coupler", "rocker", at_first=(0.9, 0, 0), at_second=(0, 0, 0.7), axis=along_y, axis_second=along_y)
-    made.revolute("world", "rocker", at=(1, 0, 0), axis=along_y)
+    made = _crank_and_coupler().body("rocker", (1, 0, 0))
+    made.revolute("coupler", "rocker", at_first=(0.9, 0, 0), at_second=(0, 0, 0.7), axis=ALONG_Y, axis_second=ALONG_Y)
+    made.revolute("world", "rocker", at=(1, 0, 0), axis=ALONG_Y)
     made.solve(tolerance=1e-10)
     return made
 
 
 def three_bar() -> Assembly:
     """The same without the joint that closes it."""
-    made, along_y = Assembly(), (0.0, 1.0, 0.0)
-    made.body("crank", (0, 0, 0)).body("coupler", (0, 0, 0.3)).body("rocker", (0.9, 0, 0.3))
-    made.revolute("world", "crank", at=(0, 0, 0), axis=along_y)
-    made.revolute("crank", "coupler", at=(0, 0, 0.3), axis=along_y)
-    made.revolute("coupler", "rocker", at=(0.9, 0, 0.3), axis=along_y)
+    made = _crank_and_coupler().body("rocker", (0.9, 0, 0.3))
+    made.revolute("coupler", "rocker", at=(0.9, 0, 0.3), axis=ALONG_Y)
+    return made
+
+
+def _crank_and_coupler() -> Assembly:
+    made = Assembly().body("crank", (0, 0, 0)).body("coupler", (0, 0, 0.3))
+    made.revolute("world", "crank", at=(0, 0, 0), axis=ALONG_Y)
+    made.revolute("crank", "coupler", at=(0, 0, 0.3), axis=ALONG_Y)
     return made
 
 

@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 import wholebody as wb
 from wholebody.arrays import Array
+from wholebody.bench import plot_style
 from wholebody.bench.problem_sets.bodies import CLEARANCE, TIPS
-from wholebody.bench.problem_sets.clutter import THINGS, reach_among
+from wholebody.bench.problem_sets.reaching import THINGS, reach_among
 from wholebody.bench.report import render
+from wholebody.bench.tables import filled
 
 
 @dataclass(frozen=True)
@@ -30,22 +33,15 @@ class Reach:
 
 @dataclass(frozen=True)
 class ReachRow:
-    """What came of one reach.
+    """What came of one reach; errors as judged independently, in m and rad.
 
     Attributes:
         seed: what it was made from.
-        solver: of the QP method.
-        status: as the method said.
         how: "directly", "by feasibility first", "from another start", or the message of what was not solved.
-        milliseconds: of the solve.
-        iterations: of the method.
-        goal_error: distance left, as judged independently [m].
-        penetration: deepest overlap, as judged [m].
-        clearance_violation: by how much the worst pair misses its clearance, as judged [m].
-        limit_violation: as judged [rad].
-        constraint_violation: of the feet, as judged [m, rad].
-        measure: effort of the answer.
-        witness_measure: effort of the witness.
+        penetration: deepest overlap.
+        clearance_violation: by how much the worst pair misses its clearance.
+        constraint_violation: of the feet.
+        measure, witness_measure: effort of the answer and of the witness.
     """
 
     seed: int
@@ -69,12 +65,7 @@ class ReachRow:
 
 
 def reach(seed: int, figure: wb.Figure | None = None) -> Reach:
-    """Make one reach; the same seed makes the same one.
-
-    Args:
-        seed: of everything random in it.
-        figure: the human, if it is loaded already.
-    """
+    """Make one reach; the same seed makes the same one. The human may be given if it is loaded already."""
     problem, witness = reach_among(figure or wb.load("human"), TIPS[seed % len(TIPS)], np.random.default_rng(seed))
     return Reach(seed, problem, witness)
 
@@ -84,20 +75,14 @@ def solve_reach(seed: int, solver: str, figure: wb.Figure | None = None) -> Reac
     made = reach(seed, figure)
     solution = wb.QP(solver=solver).solve(made.problem)
     judged = wb.assess(made.problem, solution.q)
-    how = solution.message.removeprefix("solved ")
-    return ReachRow(
+    return filled(
+        ReachRow,
+        solution,
+        judged,
         seed=seed,
         solver=solver,
-        status=solution.status,
-        how=how,
+        how=solution.message.removeprefix("solved "),
         milliseconds=1e3 * solution.seconds,
-        iterations=solution.iterations,
-        goal_error=judged.goal_error,
-        penetration=judged.penetration,
-        clearance_violation=judged.clearance_violation,
-        limit_violation=judged.limit_violation,
-        constraint_violation=judged.constraint_violation,
-        measure=judged.measure,
         witness_measure=wb.assess(made.problem, made.witness).measure,
     )
 
@@ -119,3 +104,19 @@ def run(seeds: range, solver: str, jobs: int = 1) -> Iterator[ReachRow]:
 def reaches_report(rows: Sequence[ReachRow], facts: Mapping[str, str], jobs: int) -> str:
     """Table of the random reaches, and what was not solved."""
     return render("reaches.md", rows=rows, facts=facts, jobs=jobs, things=THINGS, clearance=CLEARANCE)
+
+
+def reach_times(rows: Sequence[ReachRow], path: Path) -> tuple[Path, Path]:
+    """Share of the random reaches that were answered within a time."""
+    chart, axes = plot_style.figure(1, 1, (6.4, 3.4))
+    axis = axes[0][0]
+    for solver in dict.fromkeys(row.solver for row in rows):
+        mine = [row for row in rows if row.solver == solver]
+        times = np.sort([row.milliseconds for row in mine if row.status == "solved"])
+        share = 100.0 * np.arange(1, len(times) + 1) / len(mine)
+        color = plot_style.COLORS.get(f"wholebody/{solver}", "#000000")
+        axis.step(times, share, where="post", color=color, linewidth=1.8, label=f"wholebody/{solver}")
+    plot_style.plain_log(axis)
+    axis.set(ylim=(0.0, 103.0), xlabel="time of a solve [ms]", ylabel="reaches solved [%]")
+    axis.legend(loc="lower right", frameon=False)
+    return plot_style.save(chart, path)

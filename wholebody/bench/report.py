@@ -24,12 +24,7 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 
 def render(name: str, **values: Any) -> str:
-    """Fill in a template; empty lines beside each other become one.
-
-    Args:
-        name: of the file, without its last suffix.
-        values: what its names stand for.
-    """
+    """Fill in a template, named without its last suffix; empty lines beside each other become one."""
     lines: list[str] = []
     for line in _environment().get_template(f"{name}.jinja").render(values).strip().split("\n"):
         if line.strip() or (lines and lines[-1]):

@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,7 +16,7 @@ import numpy as np
 import wholebody as wb
 from wholebody.bench import newton_shapes, plot_style
 from wholebody.bench.chains import TIP, chain, task
-from wholebody.bench.newton_solves import PAPER_WAY, assembly_row
+from wholebody.bench.newton import assembly_row
 from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
 from wholebody.methods.drag import Drag
@@ -47,17 +48,13 @@ class ScalingRow:
     """One method at one size.
 
     Attributes:
-        series: what grows: "joints", "pieces" of each segment, or "things" around.
-        size: how many.
+        series, size: what grows ("joints", "pieces" of each segment, or "things" around), and how many there are.
         method: its name; "qp, simplified" solves what `wb.simplify` leaves.
         joints, pieces, pairs: of the scene.
-        build_ms: to build the scene's geometry [ms]; nan where nothing is built.
-        problem_ms: to state the problem; where simplified, to simplify it [ms].
-        solve_ms: a solve without its judgement, least of the repeats, by the clock [ms].
-        judge_ms: the judgement of an answer, least, by the clock [ms].
-        step_ms: a frame of a drag, median [ms]; nan for methods without a step of their own.
-        iterations: of the solve.
-        status: of the solve.
+        build_ms: to build the scene's geometry; nan where nothing is built.
+        problem_ms: to state the problem; where simplified, to simplify it.
+        solve_ms, judge_ms: a solve without its judgement, and the judgement, least of the repeats, by the clock.
+        step_ms: a frame of a drag, median; nan for methods without a step of their own.
     """
 
     series: str
@@ -109,10 +106,7 @@ def rows(
 def assembly_rows(sizes: Sequence[int], repeats: int) -> Iterator[ScalingRow]:
     """Sparse Newton on chains of loose bodies: no model of joints, seven variables a body."""
     for size in sizes:
-        build_ms, made = cpu_ms(lambda size=size: newton_shapes.chain(size))  # type: ignore[misc]
-        last = f"b{size - 1}"
-        tip = np.array((newton_shapes.LINK, 0.0, 0.0))
-        made.point_goal(last, made.placement(last).act(tip) + np.array(PAPER_WAY), place=tip)
+        build_ms, made = cpu_ms(partial(newton_shapes.pulled_chain, size))
         found = assembly_row(f"chain of {size}", made, repeats)
         yield ScalingRow(
             "joints", size, ASSEMBLY, size, 0, 0, build_ms, np.nan, found.ms, np.nan, np.nan,
@@ -178,7 +172,7 @@ def _step_ms(problem: wb.Problem, method: str) -> float:
     for frame in range(FRAMES + 1):
         angle = 0.2 * np.pi * frame
         place = center + CIRCLE * np.array((0.0, np.sin(angle), 1.0 - np.cos(angle)))
-        times.append(cpu_ms(lambda place=place: drag.to(place))[0])  # type: ignore[misc]
+        times.append(cpu_ms(partial(drag.to, place))[0])
     return float(np.median(times[1:]))
 
 
@@ -201,21 +195,16 @@ def chart(rows: Sequence[ScalingRow], path: Path) -> tuple[Path, Path]:
     for column, name in enumerate(series):
         mine = [row for row in rows if row.series == name]
         above, below = axes[0][column], axes[1][column]
-        for method in LOOKS:
-            color, marker, line = LOOKS[method]
+        for method, (color, marker, line) in LOOKS.items():
             shown = [row for row in mine if row.method == method]
-            if shown:
-                above.plot(
-                    [row.size for row in shown], [row.solve_ms for row in shown], line, color=color, marker=marker,
-                    markersize=5, linewidth=1.5, label=method, fillstyle="none" if line == "--" else "full",
-                )  # fmt: skip
             stepped = [row for row in shown if not math.isnan(row.step_ms)]
+            look = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.5}
+            look["fillstyle"] = "none" if line == "--" else "full"
+            if shown:
+                above.plot([row.size for row in shown], [row.solve_ms for row in shown], line, label=method, **look)
             if stepped:
-                below.plot(
-                    [row.size for row in stepped], [row.step_ms for row in stepped], line, color=color, marker=marker,
-                    markersize=5, linewidth=1.5, label=f"a step, {method}",
-                    fillstyle="none" if line == "--" else "full",
-                )  # fmt: skip
+                sizes, times = [row.size for row in stepped], [row.step_ms for row in stepped]
+                below.plot(sizes, times, line, label=f"a step, {method}", **look)
         whole = [row for row in mine if row.method == "qp"]
         for label, color, values in (
             ("the judgement", "#009e73", [row.judge_ms for row in whole]),
@@ -223,8 +212,7 @@ def chart(rows: Sequence[ScalingRow], path: Path) -> tuple[Path, Path]:
         ):
             below.plot([row.size for row in whole], values, ":", color=color, marker=".", linewidth=1.5, label=label)
         for axis in (above, below):
-            axis.set_xscale("log")
-            axis.set_yscale("log")
+            axis.set(xscale="log", yscale="log")
             plot_style.plain_log(axis)
         above.set_title(f"more {NAMES[name]}", loc="left")
         below.set_xlabel(NAMES[name])
@@ -244,13 +232,7 @@ def chart(rows: Sequence[ScalingRow], path: Path) -> tuple[Path, Path]:
 
 
 def report(rows: Sequence[ScalingRow], left_out: Sequence[str], facts: Mapping[str, str]) -> str:
-    """Exponents, then the times at every size.
-
-    Args:
-        rows: measured.
-        left_out: sentences on methods that were not asked at some size.
-        facts: of the machine.
-    """
+    """Exponents, then the times at every size; `left_out` are sentences on methods that were not asked at some size."""
     methods = [name for name in LOOKS if any(row.method == name for row in rows)]
     keys = dict.fromkeys((row.series, row.size) for row in rows)
     sizes = [{"series": series, "size": size, "rows": _by_method(rows, methods, series, size)} for series, size in keys]

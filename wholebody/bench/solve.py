@@ -38,15 +38,10 @@ class SolveRow:
     """Times of one way to solve a task.
 
     Attributes:
-        task: name of its file.
-        solver: of the QP method.
         way: "cold": a problem and a method that have not been used; "warm": the same ones again.
-        count: solves.
         pairs: of pieces, that could touch.
         status: of all of them, or the worst.
-        iterations: of the method.
-        median_ms, p95_ms: wall time of a solve, the independent assessment included [ms].
-        cpu_median_ms: of the processor [ms].
+        median_ms, p95_ms, cpu_median_ms: of a solve, the independent assessment included.
     """
 
     task: str
@@ -66,10 +61,8 @@ class MemoryRow:
     """Peak memory of a command in a process of its own.
 
     Attributes:
-        command: what ran.
         peak_mb: greatest resident memory of the process itself [MB of 1e6 bytes].
         children_mb: greatest of any process it started, a browser for the picture, say [MB].
-        seconds: it took.
     """
 
     command: str

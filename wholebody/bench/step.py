@@ -8,53 +8,47 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from wholebody.arrays import Array
+from wholebody.bench import plot_style
 from wholebody.bench import track as setting
 from wholebody.bench.adapters import make_tool
 from wholebody.bench.adapters.base import Tool
-from wholebody.bench.judge import Verdict, judge
+from wholebody.bench.adapters.own import WholebodyTool
 from wholebody.bench.report import render
-from wholebody.bench.track import CLEARANCE, Track
+from wholebody.bench.tables import filled
+from wholebody.bench.track import CLEARANCE, DT, Track, Verdict, judge
 
 REFERENCE = "placo"
+GREY = "#666666"
+THICK = "wholebody/osqp"  # drawn wide and first: with DAQP the same programs have the same answers, and would hide it
 JUDGED = ("free", "contact")  # reaches for which a figure was asked
 
 
 @dataclass(frozen=True)
 class StepRow:
-    """What one tool did on one reach, over all repeats.
+    """What one tool did on one reach, over all repeats; units are in the names, speeds are shares of their bounds.
 
     Attributes:
-        reach: "free", "contact" or "alone".
-        tool: its name.
-        repeats: timed runs.
-        steps: of each.
         pairs: of pieces, that could touch.
-        setup_ms: median time to set the tool up and make its first step, which is not among the others [ms].
-        median_us: median wall time of a step [us].
-        p95_us: the time that 95 % of all steps stayed below [us].
-        cpu_median_us: median time of a step that the processor worked on it, without waiting for other work [us].
-        cpu_p95_us: 95 % of all steps stayed below [us].
-        ratio: median_us over the reference's in the same repeat, median of the repeats; nan without the reference.
-        ratio_p95: the same of p95.
-        cpu_ratio_p95: the same of the processor's time.
-        least_mm: least distance of any pair after any step [mm].
+        setup_ms: to set the tool up and make its first step, which is not among the others; median.
+        median_us, p95_us, cpu_median_us, cpu_p95_us: of all steps, by the clock and by the processor's time.
+        ratio, ratio_p95, cpu_ratio_p95: of median_us, p95_us and cpu_p95_us to the reference's in the same repeat,
+            median of the repeats; nan without the reference.
+        least_mm: least distance of any pair after any step.
         penetrating: steps after which some pair overlapped.
-        final_error_mm: distance of the fingertip from the last target [mm].
-        mean_error_mm: mean over the steps [mm].
-        foot_drift_mm: greatest distance of a foot from where it stood [mm].
+        final_error_mm, mean_error_mm: distance of the fingertip from its target.
+        foot_drift_mm: greatest distance of a foot from where it stood.
         limit_violation: greatest excess over a joint limit [rad].
-        root_speed: greatest speed of the root, as a share of the bound.
         acceleration: mean of all joints' absolute accelerations [rad/s^2].
-        near: mean number of pairs nearer than what counts.
-        touching: mean number of pairs in contact.
+        near, touching: mean number of pairs nearer than what counts, and in contact.
         failures: steps for which the tool found no answer.
-        rows: mean number of contact rows; nan where the tool does not tell.
-        exact: share of steps whose program was solved to rounding; nan where it does not tell.
-        at_once: share of steps closed from the last active set, without the QP solver; nan where it does not tell.
+        rows: mean number of contact rows.
+        exact, at_once: shares of steps whose program was solved to rounding, and closed from the last active set
+            without the QP solver; nan, as rows are, where the tool does not tell.
     """
 
     reach: str
@@ -113,17 +107,11 @@ class _Run:
 def measure(
     track: Track, tools: Sequence[str], repeats: int, say: Callable[[str], None] = lambda text: None
 ) -> tuple[list[StepRow], list[StepTime]]:
-    """Let every tool make a reach a number of times.
+    """Let every tool make a reach a number of times; `say` takes a line about each repeat.
 
     In every repeat each tool makes the whole reach once, from a fresh set-up and from standing; the order of the tools
     rotates from repeat to repeat. One step of each set-up is made before the clock starts. A first round, in which
     code and data come into the caches, is not counted.
-
-    Args:
-        track: the reach.
-        tools: names.
-        repeats: timed runs of each.
-        say: takes a line about each repeat.
     """
     runs: dict[str, list[_Run]] = {name: [] for name in tools}
     for repeat in range(repeats + 1):
@@ -182,10 +170,11 @@ def _quiet() -> Iterator[None]:
 
 def _row(track: Track, name: str, runs: dict[str, list[_Run]], verdict: Verdict) -> StepRow:
     mine, reference = runs[name], runs.get(REFERENCE)
-    wall = np.concatenate([run.wall for run in mine])
-    cpu = np.concatenate([run.cpu for run in mine])
+    wall, cpu = (np.concatenate([getattr(run, clock) for run in mine]) for clock in ("wall", "cpu"))
     told = mine[0].tool.remarks()
-    return StepRow(
+    return filled(
+        StepRow,
+        verdict,
         reach=track.name,
         tool=name,
         repeats=len(mine),
@@ -196,30 +185,30 @@ def _row(track: Track, name: str, runs: dict[str, list[_Run]], verdict: Verdict)
         p95_us=float(np.quantile(wall, 0.95)),
         cpu_median_us=float(np.median(cpu)),
         cpu_p95_us=float(np.quantile(cpu, 0.95)),
-        ratio=_ratio(mine, reference, lambda run: float(np.median(run.wall))),
-        ratio_p95=_ratio(mine, reference, lambda run: float(np.quantile(run.wall, 0.95))),
-        cpu_ratio_p95=_ratio(mine, reference, lambda run: float(np.quantile(run.cpu, 0.95))),
+        ratio=_ratio(mine, reference, "wall", 0.5),
+        ratio_p95=_ratio(mine, reference, "wall", 0.95),
+        cpu_ratio_p95=_ratio(mine, reference, "cpu", 0.95),
         least_mm=1e3 * float(verdict.least_distance.min()),
         penetrating=int((verdict.least_distance < 0.0).sum()),
         final_error_mm=1e3 * float(verdict.error[-1]),
         mean_error_mm=1e3 * float(verdict.error.mean()),
         foot_drift_mm=1e3 * verdict.foot_drift,
-        limit_violation=verdict.limit_violation,
         root_speed=verdict.fastest_root,
-        acceleration=verdict.acceleration,
         near=float(verdict.near.mean()),
         touching=float(verdict.touching.mean()),
         failures=mine[0].tool.failures,
-        rows=told.get("rows", float("nan")),
-        exact=told.get("exact", float("nan")),
-        at_once=told.get("at_once", float("nan")),
+        **{name: told.get(name, float("nan")) for name in ("rows", "exact", "at_once")},
     )
 
 
-def _ratio(mine: list[_Run], reference: list[_Run] | None, figure: Callable[[_Run], float]) -> float:
+def _ratio(mine: list[_Run], reference: list[_Run] | None, clock: str, share: float) -> float:
+    """Quantile of a clock over that of the reference in the same repeat, median of the repeats."""
     if reference is None:
         return float("nan")
-    return float(np.median([figure(run) / figure(other) for run, other in zip(mine, reference, strict=True)]))
+    pairs = zip(mine, reference, strict=True)
+    return float(
+        np.median([np.quantile(getattr(a, clock), share) / np.quantile(getattr(b, clock), share) for a, b in pairs])
+    )
 
 
 def goal_lines(rows: Sequence[StepRow]) -> list[str]:
@@ -251,14 +240,96 @@ def step_report(
 ) -> str:  # fmt: skip
     """Tables of the tracking steps.
 
-    Args:
-        rows: of all tools and reaches.
-        facts: of the machine.
-        differences: tool -> what it cannot express.
-        profile: reach -> median of a whole step and of its linearisation [us].
+    `differences` are what tools cannot express; `profile` is the median of a whole step and of its linearisation, by
+    reach [us].
     """
     tools = dict.fromkeys(row.tool for row in rows)
     stated = [line for name in tools for line in differences.get(name, ())]
     return render(
         "step.md", rows=rows, facts=facts, stated=stated, profile=profile, goals=goal_lines(rows), track=setting
     )
+
+
+WITHIN_STEP = 0.06  # m beyond the clearance: as far as a step of `QP` looks
+
+
+def linearise_us(track: Track, solver: str) -> tuple[float, float]:
+    """Median time of a whole step and of its linearisation alone, both of one run [us of the processor].
+
+    The linearisation is replayed by itself at the postures of the run.
+    """
+    tool = WholebodyTool(track, solver)
+    tool.step(track.targets[0])
+    tool.reset(track.start)
+    lineariser = tool.problem.lineariser(tool.problem.workspace(), DT)
+    lineariser.at(track.start, WITHIN_STEP)
+    whole, part = [], []
+    for target in track.targets:
+        q = tool.posture()
+        began = time.thread_time_ns()
+        tool.step(target)
+        whole.append(time.thread_time_ns() - began)
+        began = time.thread_time_ns()
+        lineariser.at(q, WITHIN_STEP)
+        part.append(time.thread_time_ns() - began)
+    return float(np.median(whole)) / 1e3, float(np.median(part)) / 1e3
+
+
+def step_times(times: Sequence[StepTime], path: Path) -> tuple[Path, Path]:
+    """Time of a step of every tool: the middle half as a box, 5 to 95 % as whiskers, the median written beside it."""
+    reaches, tools = _names(times)
+    chart, axes = plot_style.figure(1, len(reaches), (4.6 * len(reaches), 0.9 + 0.5 * len(tools)))
+    for column, reach in enumerate(reaches):
+        axis = axes[0][column]
+        for place, tool in enumerate(reversed(tools)):
+            wall = np.array([time.wall_us for time in times if (time.reach, time.tool) == (reach, tool)])
+            color = plot_style.COLORS[tool]
+            least, low, median, high, most = np.quantile(wall, (0.05, 0.25, 0.5, 0.75, 0.95))
+            axis.plot([least, most], [place, place], color=color, linewidth=1.6, marker="|", markersize=9)
+            axis.barh(place, high - low, left=low, height=0.55, color=color, alpha=0.85)
+            axis.plot([median, median], [place - 0.275, place + 0.275], color="white", linewidth=1.6)
+            axis.annotate(
+                f"{median:.0f}", (median, place), (0, 12), textcoords="offset points",
+                ha="center", va="bottom", fontsize=8, color=GREY,
+            )  # fmt: skip
+        plot_style.plain_log(axis)
+        axis.set_yticks(range(len(tools)), tools[::-1] if column == 0 else [""] * len(tools))
+        axis.set_ylim(-0.6, len(tools) - 0.2)
+        axis.grid(axis="y", visible=False)
+        axis.set_title(f"{reach} reach", loc="left")
+        axis.set_xlabel("time of a step [µs], 5 to 95 %, median")
+    return plot_style.save(chart, path)
+
+
+def least_distances(times: Sequence[StepTime], path: Path) -> tuple[Path, Path]:
+    """Least distance of any pair after every step, for every tool."""
+    reaches, tools = _names(times)
+    chart, axes = plot_style.figure(1, len(reaches), (5.0 * len(reaches), 3.4))
+    for column, reach in enumerate(reaches):
+        axis = axes[0][column]
+        axis.axhspan(-1e3, 0.0, color="#f4dddd", zorder=0)
+        axis.axhline(1e3 * CLEARANCE, color=GREY, linewidth=1.0, linestyle="--")
+        lowest = 0.0
+        for tool in sorted(tools, key=lambda name: name != THICK):
+            chosen = [time for time in times if (time.reach, time.tool, time.repeat) == (reach, tool, 1)]
+            least = np.array([time.least_mm for time in chosen])
+            lowest = min(lowest, float(least.min()))
+            width = 3.2 if tool == THICK else 1.5
+            axis.plot([time.step for time in chosen], least, color=plot_style.COLORS[tool], linewidth=width, label=tool)
+        axis.set_ylim(1.15 * lowest - 2.0, 30.0)
+        axis.text(2, 1.05 * lowest - 1.5, "inside", fontsize=8, color=GREY, va="bottom")
+        last = max(time.step for time in times)
+        axis.text(last, 1e3 * CLEARANCE - 0.4, "clearance asked", fontsize=8, color=GREY, va="top", ha="right")
+        axis.set_title(f"{reach} reach", loc="left")
+        axis.set_xlabel("step")
+        if column == 0:
+            axis.set_ylabel("least distance of any pair [mm]")
+    handles, labels = axes[0][0].get_legend_handles_labels()
+    chart.legend(handles, labels, loc="outside lower center", ncols=len(tools), frameon=False)
+    return plot_style.save(chart, path)
+
+
+def _names(times: Sequence[StepTime]) -> tuple[list[str], list[str]]:
+    reaches = list(dict.fromkeys(time.reach for time in times))
+    present = {time.tool for time in times}
+    return reaches, [tool for tool in plot_style.COLORS if tool in present]

@@ -59,6 +59,14 @@ def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
     return facts, rows
 
 
+def filled(kind: type[_R], *sources: object, **values: Any) -> _R:
+    """A row of a kind: fields by name, and all others from the first source that has an attribute of that name."""
+    names = [field.name for field in dataclasses.fields(kind) if field.name not in values]  # type: ignore[arg-type]
+    for name in names:
+        values[name] = next(getattr(source, name) for source in sources if hasattr(source, name))
+    return kind(**values)
+
+
 def replace_section(path: Path, name: str, text: str) -> None:
     """Put text between the markers ``<!-- bench:NAME -->`` and ``<!-- /bench:NAME -->`` of a page.
 

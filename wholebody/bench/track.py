@@ -3,11 +3,15 @@
 Two ways for the fingertip: "free" passes the body and the objects and comes near many without having to touch any;
 "contact" asks for a place inside a box, which nobody can reach, and then for one before the chest. "alone" is the free
 way without the objects: far fewer pairs, which tells what a tool's time is made of.
+
+What a tool does is judged by the judge of all motions, and by where the tip and the feet are: no tool's own distances
+are believed, ours included.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +20,7 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.problem_sets.things import Occupied
 from wholebody.errors import InputError, UnknownNameError
+from wholebody.motion_assessment import limit_violation, pairs_along, velocities
 
 VARIANTS = ("free", "contact", "alone")
 DT = 0.01  # s
@@ -23,7 +28,7 @@ CLEARANCE = 0.010  # m
 WITHIN = 0.070  # m: pairs nearer than this count for every tool that has such a setting
 JOINT_SPEED = 4.0  # rad/s
 ROOT_SPEED, ROOT_TURN = 1.0, 2.0  # m/s, rad/s
-SEED = 7
+SEED = 7  # of the objects
 BOXES, SPHERES, HULLS, HULL_POINTS = 7, 6, 7, 100
 BLOCK = ((0.20, 0.24, 0.20), (0.44, -0.44, 1.05))  # edges and place of the box that the contact reach is asked into
 INSIDE = ((0.38, -0.48, 1.02), (0.42, -0.38, 1.08))  # m: the targets go from one of these to the other, inside the box
@@ -31,6 +36,7 @@ INTO, ALONG = 0.35, 0.25  # shares of the time for the ways into the box and wit
 FREE = ((0.32, -0.20, 0.92), (0.38, 0.18, 1.12), (0.30, -0.22, 1.42))  # m: by way of these places
 CHEST = 0.16  # m: before the origin of the thorax' frame, level with it
 ROOM_START, ROOM_WAY = 0.025, 0.075  # m: what objects leave free around the standing body and around the free way
+TOUCHING = 1e-3  # m: a pair nearer than the clearance and this is in contact
 SPACE = ((0.05, -0.90, 0.25), (0.85, 0.65, 1.85))  # m: where objects are put
 
 
@@ -60,13 +66,12 @@ class Track:
         return len(self.scene.geometry.collisionPairs)
 
 
-def track(name: str, steps: int = 200, seed: int = SEED) -> Track:
+def track(name: str, steps: int = 200) -> Track:
     """Build a reach.
 
     Args:
         name: "free", "contact" or "alone".
         steps: of the way.
-        seed: of the objects.
 
     Raises:
         UnknownNameError: another name.
@@ -85,7 +90,7 @@ def track(name: str, steps: int = 200, seed: int = SEED) -> Track:
     free = smooth_way(np.vstack([tip, FREE]), 400)
     scene = wb.Scene(figure)
     if name != "alone":
-        add_objects(scene, start, free, np.random.default_rng(seed))
+        add_objects(scene, start, free, np.random.default_rng(SEED))
     if name != "contact":
         return Track(name, scene, start, smooth_way(np.vstack([tip, FREE]), steps))
     chest = thorax + (CHEST, 0.0, 0.0)
@@ -155,3 +160,64 @@ def _shape(kind: str, rng: np.random.Generator) -> wb.Shape:
     points = rng.normal(size=(HULL_POINTS, 3))
     points *= rng.uniform(0.05, 0.12, 3) / np.linalg.norm(points, axis=1, keepdims=True)
     return wb.Hull(points)
+
+
+class Verdict(NamedTuple):
+    """What came of one run.
+
+    Attributes:
+        least_distance: (steps,) least signed distance of all pairs after each step [m].
+        near: (steps,) pairs nearer than `WITHIN`.
+        touching: (steps,) pairs at the clearance or nearer, to 1 mm.
+        error: (steps,) distance of the fingertip from its target [m].
+        foot_drift: greatest distance of a foot from where it began [m].
+        foot_turn: greatest angle of a foot from how it began [rad].
+        limit_violation: how far the worst joint was out of its limits [rad].
+        fastest_joint: greatest step of a joint, as a share of what the speed bound allows.
+        fastest_root: the same for the root, in its place and its orientation.
+        acceleration: mean of all joints' absolute accelerations [rad/s^2]; high where a tool trembles.
+    """
+
+    least_distance: Array
+    near: Array
+    touching: Array
+    error: Array
+    foot_drift: float
+    foot_turn: float
+    limit_violation: float
+    fastest_joint: float
+    fastest_root: float
+    acceleration: float
+
+
+def judge(track: Track, postures: Array) -> Verdict:
+    """Judge the postures (steps, nq) that a tool went through.
+
+    Raises:
+        ValueError: a posture is not finite.
+    """
+    if not np.isfinite(postures).all():
+        raise ValueError("a tool went to a posture that is not finite")
+    scene, figure = track.scene, track.scene.figure
+    feet, tip = [figure.frame_id(name) for name in track.feet], figure.frame_id(track.tip)
+    state = scene.state(track.start)
+    stood = [pin.SE3(state.frame(foot)) for foot in feet]
+    least, near, touching, error, drift, turn = [], [], [], [], [0.0], [0.0]
+    for pairs, target in zip(pairs_along(scene, postures), track.targets, strict=True):
+        least.append(pairs.least)
+        near.append(int((pairs.distance < WITHIN).sum()))
+        touching.append(int((pairs.distance < CLEARANCE + TOUCHING).sum()))
+        error.append(float(np.linalg.norm(pairs.state.frame(tip).translation - target)))
+        for foot, there in zip(feet, stood, strict=True):
+            moved = there.actInv(pairs.state.frame(foot))
+            drift.append(float(np.linalg.norm(moved.translation)))
+            turn.append(float(np.linalg.norm(pin.log3(moved.rotation))))
+    whole = np.vstack([track.start, postures])
+    speed = np.abs(velocities(scene.model, whole, DT)).max(axis=0)
+    angles = np.vstack([track.start, whole])[:, figure.limits.idx_q]
+    return Verdict(
+        np.array(least), np.array(near), np.array(touching), np.array(error), max(drift), max(turn),
+        limit_violation(figure, postures), float(speed[6:].max()) / JOINT_SPEED,
+        max(float(speed[:3].max()) / ROOT_SPEED, float(speed[3:6].max()) / ROOT_TURN),
+        float(np.abs(np.diff(angles, 2, axis=0)).mean()) / DT**2,
+    )  # fmt: skip

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from wholebody.bench.interaction import InteractionRow
-    from wholebody.bench.interaction_failures import WorstFrames
+    from wholebody.bench.interaction import InteractionRow, WorstFrames
     from wholebody.interaction import InteractionScene, Judgement, Recording
 
 HELP = "follow a tracker frame by frame through a gallery without going into walls"
@@ -114,8 +113,7 @@ def _run_one(
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from wholebody.bench.interaction import frame_chart, frame_rows, summary
-    from wholebody.bench.interaction_failures import worst_frames
+    from wholebody.bench.interaction import frame_chart, frame_rows, summary, worst_frames
     from wholebody.bench.tables import write_rows
     from wholebody.interaction import follow, judge
 
@@ -216,7 +214,7 @@ def _print(rows: list[InteractionRow]) -> None:
 def _update(docs: Path, text: str, worst: list[WorstFrames], out: Path) -> None:
     import shutil
 
-    from wholebody.bench.interaction_failures import failures
+    from wholebody.bench.interaction import failures
     from wholebody.bench.tables import replace_section
 
     folder = docs / "assets" / "interaction"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -70,7 +69,7 @@ def describe(task: Task, solution: Solution, folder: Path) -> dict[str, Any]:
         "iterations": solution.iterations,
         "goals": [goal._asdict() for goal in goals_left(task, q)],
         "measures": {type(term).__name__: float(term.value(state)) for term in task.problem.measures},
-        "assessment": asdict(solution.assessment),
+        "assessment": solution.assessment.summary(),
         "root": q[:7].tolist() if figure.root == "free" else None,
         "joints": figure.joint_values(q),
         "q": q.tolist(),

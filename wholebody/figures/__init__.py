@@ -1,4 +1,4 @@
-"""What a body is: people, avatars, hands and robots as figures."""
+"""Figures: people, avatars, hands and robots."""
 
 from wholebody.figures.denavit_hartenberg import DenavitHartenberg, denavit_hartenberg
 from wholebody.figures.description import Chain, JointCone, Limits

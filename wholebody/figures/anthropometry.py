@@ -1,4 +1,4 @@
-"""From sex, stature and mass to the lengths, masses and radii of a body.
+"""Lengths, masses and radii of a body from sex, stature and mass.
 
 Lengths and masses are fractions (de Leva 1996; ANSUR II), radii are linear fits to ANSUR II,
 ``r = c0 + cq sqrt(mass / stature) + cH stature``; the tables in ``figures/data`` name the source of every column.
@@ -20,13 +20,13 @@ from wholebody.checks import number, shown
 from wholebody.errors import InputError, UnknownNameError
 
 STATURE_RANGE = (1.3, 2.2)
-"""Metres. The fits come from adults of 1.4 to 2.0 m; beyond this range they are no longer a body."""
+"""Metres. The fits come from adults of 1.4 to 2.0 m; beyond this range they are invalid."""
 
 MASS_RANGE = (25.0, 250.0)
 """Kilograms."""
 
 BODY_MASS_INDEX_RANGE = (13.0, 50.0)
-"""kg / m^2. Outside, stature and mass do not belong to one living person: most likely a wrong unit."""
+"""kg / m^2. Outside, no living person has this stature and mass; most likely a unit is wrong."""
 
 _SEXES = {"male": "M", "female": "F"}
 
@@ -41,7 +41,7 @@ Row = dict[str, str]
 
 @dataclass(frozen=True)
 class Body:
-    """One person: everything else follows from these three.
+    """One person; all other quantities follow from these three.
 
     Attributes:
         sex: "male" or "female".
@@ -59,7 +59,7 @@ class Body:
         return _SEXES[self.sex]
 
     def segment(self, name: str, quantity: str) -> float:
-        """Return a number of the segment table for this sex, as it stands there (mostly a fraction of the stature)."""
+        """Return a number of the segment table for this sex, without conversion (mostly a fraction of the stature)."""
         return float(_row("segments", "name", name)[f"{quantity}_{self.column}"])
 
     def length(self, segment: str) -> float:
@@ -96,7 +96,7 @@ def body(sex: str = "male", stature: float | None = None, mass: float | None = N
         mass: kilograms; if left out, the median of the sex, or the mass expected at the stature that was given.
 
     Raises:
-        InputError: an unknown sex, or a number that no person has.
+        InputError: an unknown sex, or a number out of the range of people.
     """
     if not isinstance(sex, str) or sex.lower() not in _SEXES:
         raise InputError(f"sex is {shown(sex)}; give 'male' or 'female'")

@@ -1,7 +1,7 @@
 """A body as plain data, its URDF text, and Pinocchio's model and geometry of it.
 
-The builders (human, avatar, hand) write a `BodySpec`; the URDF text of it is what Pinocchio reads and what is packaged,
-so that the figure in memory and the file on disk cannot differ.
+The builders (human, avatar, hand) write a `BodySpec`. Pinocchio reads the same URDF text that is packaged, so the
+figure in memory and the file on disk cannot differ.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Link(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """A revolute joint, or a fixed one if `axis` is None; `origin` is the child's place in the parent link."""
+    """A revolute joint, or a fixed one if `axis` is None; `origin` is the child's placement in the parent link."""
 
     name: str
     parent: str
@@ -58,7 +58,7 @@ class Joint(NamedTuple):
 
 
 class Landmark(NamedTuple):
-    """A frame that people reach with, fixed on a segment."""
+    """A frame for goals, fixed on a segment."""
 
     name: str
     segment: str
@@ -67,15 +67,15 @@ class Landmark(NamedTuple):
 
 @dataclass(frozen=True)
 class BodySpec:
-    """Everything that a URDF says about a body.
+    """The content of a body's URDF.
 
     Attributes:
         name: name of the robot in the URDF.
         title: one line for the head of the file.
         links: the root link first.
         joints: in the order of the links they end in.
-        landmarks: frames to reach with.
-        solids: collision pieces, also drawn.
+        landmarks: frames for goals.
+        solids: collision pieces, which are also drawn.
     """
 
     name: str
@@ -110,7 +110,7 @@ def urdf_text(spec: BodySpec, extension: str = "") -> str:
 
     Args:
         spec: the body.
-        extension: text of an element to stand at the end, see `wholebody.figures.urdf_extension`.
+        extension: text of an element at the end of the file, see `wholebody.figures.urdf_extension`.
     """
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',

@@ -18,7 +18,7 @@ from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
 
 _PARALLEL = 1e-9
-"""Axes closer to parallel than this (sine of the angle) are taken as parallel: beyond it, d would be kilometres."""
+"""Axes with a smaller sine of their angle count as parallel; otherwise d would be kilometres."""
 
 
 class DenavitHartenberg(NamedTuple):
@@ -26,7 +26,7 @@ class DenavitHartenberg(NamedTuple):
 
     Attributes:
         joints: (n) names, from the root outwards.
-        reference: frame in which the branch stands.
+        reference: reference frame of the branch.
         tip: frame at its end.
         base: placement of DH frame 0 in the reference frame.
         offset: (n,) radians, added to the joint values.
@@ -161,7 +161,7 @@ def _any_normal(z: Array) -> Array:
 
 
 def _parameters(link: pin.SE3) -> tuple[float, float, float, float]:
-    """Read theta, d, a, alpha off one link's placement."""
+    """Theta, d, a, alpha of one link's placement."""
     rotation, translation = link.rotation, link.translation
     theta = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
     alpha = float(np.arctan2(rotation[2, 1], rotation[2, 2]))

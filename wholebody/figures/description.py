@@ -1,4 +1,4 @@
-"""What a figure knows by name, beside Pinocchio's model and geometry."""
+"""The named parts of a figure, in addition to Pinocchio's model and geometry."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class JointCone(NamedTuple):
     """Reach cone of a limb.
 
     Attributes:
-        cone: directions that the limb can take.
-        reference: frame in which the cone stands.
+        cone: allowed directions of the limb.
+        reference: frame to which the cone is fixed.
         limb: frame that carries the limb.
         axis: (3,) unit direction of the limb in its own frame.
     """
@@ -40,7 +40,7 @@ class JointCone(NamedTuple):
 
 
 class ExcludedPair(NamedTuple):
-    """Two pieces that are never tested, and why."""
+    """Two pieces that are never tested, with the reason."""
 
     a: str
     b: str
@@ -51,8 +51,8 @@ class Limits(NamedTuple):
     """Limits of the joints with one degree of freedom that have them.
 
     Attributes:
-        idx_q: (n,) places in the posture.
-        idx_v: (n,) places in the tangent.
+        idx_q: (n,) indices in the posture.
+        idx_v: (n,) indices in the tangent vector.
         lower: (n,) radians or metres.
         upper: (n,)
     """
@@ -67,8 +67,8 @@ class Follower(NamedTuple):
     """A joint whose value is that of another times a slope plus an offset (mimic).
 
     Attributes:
-        joint: name of the other one.
-        idx_q: its place in the posture.
+        joint: name of the followed joint.
+        idx_q: its index in the posture.
         slope: never zero.
         offset: radians or metres.
     """
@@ -83,12 +83,12 @@ class Follower(NamedTuple):
         return self.slope * float(q[self.idx_q]) + self.offset
 
     def leading(self, value: float) -> float:
-        """Value of the other joint at which this one has a value."""
+        """Value of the followed joint at which this joint has a value."""
         return (value - self.offset) / self.slope
 
 
 class Articulated(Protocol):
-    """What a posture, or a smaller figure, is made from: a `Figure`; see there."""
+    """The part of a `Figure` from which postures and smaller figures are made; see `Figure`."""
 
     @property
     def model(self) -> Any:
@@ -100,7 +100,7 @@ class Articulated(Protocol):
 
     @property
     def visual(self) -> Any:
-        """What is drawn."""
+        """The geometry that is drawn."""
 
     @property
     def root(self) -> str:
@@ -126,16 +126,16 @@ class Articulated(Protocol):
         """A copy of a posture with every joint within its limits."""
 
     def describe(self) -> Description:
-        """What it knows beyond model and geometry."""
+        """Its named parts."""
 
 
 class Description(NamedTuple):
-    """What a figure knows beyond its model and geometry; all of it by name.
+    """The named parts of a figure, in addition to its model and geometry.
 
     Attributes:
         groups: group to joints, without the root.
         chains: limbs, from the root outwards.
-        frames: names that people reach with.
+        frames: names of frames for goals.
         segments: links with mass or geometry.
         postures: name to a function that computes the posture of a figure.
         cones: reach cones of ball joints.

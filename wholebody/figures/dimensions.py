@@ -66,7 +66,7 @@ class Dimensions:
         self.eye_x = self.head_x + self.head_radius
 
     def joint(self, name: str) -> tuple[float, float, float]:
-        """Place of a joint in its parent segment's frame."""
+        """Position of a joint in its parent segment's frame."""
         row, body = keyed("joints", "name")[name], self.body
         x, y, z = (float(row[f"o{axis}_{body.column}"]) * body.stature for axis in "xyz")
         return x, y, z

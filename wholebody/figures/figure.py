@@ -16,22 +16,22 @@ from wholebody.figures.description import ROOT_JOINT, Description, followers_of,
 from wholebody.figures.reduction import reduced_parts
 
 LARGEST = 1e6
-"""Largest value of a joint, radians or metres, and largest tolerance: what is beyond is a slip."""
+"""Largest value of a joint, radians or metres, and largest tolerance; larger ones are refused as mistakes."""
 
 HEAVIEST = 1e12
-"""Kilograms: greatest mass of what one joint carries."""
+"""Kilograms: greatest mass carried by one joint."""
 
 
 def check_model(model: pin.Model, name: str) -> None:
-    """Refuse a model whose numbers no body has: they would come back as postures that are not numbers.
+    """Refuse a model with impossible numbers, which would lead to postures with NaN.
 
     Args:
         model: Pinocchio's model.
-        name: of the figure, for the sentence.
+        name: of the figure, for the message.
 
     Raises:
-        InputError: a mass is negative or beyond `HEAVIEST`, a place, an inertia or a limit is not a number, or a lower
-            limit is above the upper one.
+        InputError: a mass is negative or beyond `HEAVIEST`, a position, an inertia or a limit is not a number, or a
+            lower limit is above the upper one.
     """
     for joint in range(1, model.njoints):
         inertia, at = model.inertias[joint], model.jointPlacements[joint]
@@ -57,21 +57,21 @@ def check_model(model: pin.Model, name: str) -> None:
 
 
 class Figure:
-    """An articulated body: Pinocchio's model and geometry, and names for everything one asks of them.
+    """An articulated body: Pinocchio's model and geometry, with named joint groups, chains, frames and postures.
 
-    Nothing of it changes, so any number of scenes and threads may share one. It can be pickled and copied.
+    It never changes, so any number of scenes and threads may share one. It can be pickled and copied.
 
     Attributes:
         name: such as "human".
         model: Pinocchio's model; `model.nq` numbers make a posture, `model.nv` a displacement.
         geometry: the convex pieces and the pairs of them that can touch. A piece is called "<segment>" or
             "<segment>:<k>".
-        visual: what is drawn.
+        visual: the geometry that is drawn.
         detail: "spheres", "capsules", "hulls", or "own" for the geometry of a URDF.
         root: "free" (a floating base) or "fixed".
         groups: group to joint names, without the root.
         chains: limb to its joints from the root outwards, and the frame at its tip.
-        frames: names that people reach with.
+        frames: names of frames for goals.
         segments: names of the links; they are frames too.
         cones: reach cones of shoulders and hips.
         collision_groups: segment to collision group ("torso_head", "left_arm", ...).
@@ -95,7 +95,7 @@ class Figure:
         """Assemble a figure; `wholebody.load` is the usual way to get one.
 
         Raises:
-            InputError: a mass, a place or a limit of the model is not finite or cannot be.
+            InputError: a mass, a position or a limit of the model is not finite or is impossible.
         """
         check_model(model, name)
         self.name, self.model, self.geometry, self.detail = name, model, geometry, detail
@@ -112,6 +112,7 @@ class Figure:
         self.root = "free" if first is not None and first.nq == 7 else "fixed"
         self._frame_ids = {frame.name: index for index, frame in reversed(list(enumerate(model.frames)))}
         self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
+        self._joints = tuple(name for name in self._joint_ids if name != ROOT_JOINT)
         self.limits = limits_of(model)
         self.followers = MappingProxyType(followers_of(model))
         root = slice(0, 6 if self.root == "free" else 0)
@@ -130,7 +131,7 @@ class Figure:
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what it is made from; mappings that cannot be changed cannot be pickled."""
+        """Return the arguments that it is made from; read-only mappings cannot be pickled."""
         known: dict[str, Any] = {
             name: dict(part) if isinstance(part, Mapping) else part
             for name, part in self._description._asdict().items()
@@ -141,11 +142,11 @@ class Figure:
     @property
     def joints(self) -> tuple[str, ...]:
         """Names of the joints in the model's order, without the free root."""
-        return tuple(name for name in list(self.model.names)[1:] if name != ROOT_JOINT)
+        return self._joints
 
     @property
     def postures(self) -> tuple[str, ...]:
-        """Names of the postures; the first one is where a problem starts if nothing else is said."""
+        """Names of the postures; the first one is the default start of a problem."""
         return tuple(self._description.postures)
 
     def posture(self, name: str) -> Array:
@@ -204,9 +205,9 @@ class Figure:
         return tuple(found)
 
     def dofs(self, names: str | Iterable[str]) -> Indices:
-        """Return the places in the tangent, ascending, of joints and groups; "root" is the six of a free root.
+        """Return the indices in the tangent vector, ascending, of joints and groups; "root" is the six of a free root.
 
-        The place of a joint that follows another (mimic) is that of the one it follows.
+        The index of a joint that follows another (mimic) is that of the followed joint.
 
         Raises:
             UnknownNameError: neither a joint nor a group.
@@ -218,7 +219,7 @@ class Figure:
         return np.array(sorted(places), dtype=np.intp)
 
     def joint_values(self, q: Array) -> dict[str, float]:
-        """Return the value of each one-degree joint by name: radians, or metres for sliding joints."""
+        """Return the value of each one-degree joint by name: radians, or metres for prismatic joints."""
         q = self._checked(q)
         values = {}
         for name in self.joints:
@@ -234,11 +235,11 @@ class Figure:
     def with_joints(self, q: Array, values: Mapping[str, float]) -> Array:
         """Return a copy of the posture q with some joints at other values.
 
-        A joint that follows another (mimic) moves that one.
+        A value of a joint that follows another (mimic) moves the followed joint.
 
         Args:
             q: (nq,).
-            values: joint name to radians (metres for sliding joints).
+            values: joint name to radians (metres for prismatic joints).
 
         Raises:
             UnknownNameError: a joint that does not exist.
@@ -267,7 +268,7 @@ class Figure:
     def tangent_bounds(self, q: Array) -> tuple[Array, Array]:
         """Return lower and upper bound, each (nv,), of the displacement of q within the limits.
 
-        Infinite where there is no limit. Where q is beyond a limit, both bounds have the sign of the way back.
+        Infinite without a limit. If q is beyond a limit, both bounds have the sign of the motion back.
         """
         q = self._checked(q)
         lower, upper = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
@@ -292,18 +293,18 @@ class Figure:
 
         Args:
             joints: joints and groups to keep; "root" keeps a free root, which is locked otherwise.
-            posture: where the others are locked: a name or an array (nq,); the first posture if left out.
+            posture: values of the locked joints: a name or an array (nq,); the first posture if left out.
 
         Raises:
             UnknownNameError: neither a joint nor a group, or an unknown posture.
-            InputError: no joint is left.
+            InputError: no joint remains.
         """
         q = self.neutral if posture is None else self.posture(posture) if isinstance(posture, str) else posture
         parts = reduced_parts(self, self.joint_names(joints), self._checked(q))
         return Figure(self.name, parts.model, parts.geometry, self.detail, parts.description, parts.visual)
 
     def describe(self) -> Description:
-        """Return what the figure knows beyond model and geometry, to build another one from it."""
+        """Return the named parts of the figure, to build another one from them."""
         return self._description
 
     def _checked(self, q: Any) -> Array:

@@ -1,7 +1,7 @@
 """The hand: fifteen ellipsoids, each a polyhedron of a hundred triangles, on a free root at the wrist (Schmidl & Lin).
 
 The hand's frame is that of the person's hand: fingers along -z, thumb towards +x, palm towards -y on the left and +y on
-the right. The root of the thumb is fixed at its resting place, so that the thumb has two parts.
+the right. The root of the thumb is fixed at its resting placement, so that the thumb has two parts.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def hand_spec(side: str = "right", person: Body | None = None) -> BodySpec:
 
     Args:
         side: "left" or "right".
-        person: whose hand; the median man's if left out.
+        person: the hand's person; the median man if left out.
 
     Raises:
         InputError: another side.
@@ -137,7 +137,7 @@ def _polyhedron(size: Dimensions, part: str) -> tuple[object, pin.SE3]:
 
 
 def _base(size: Dimensions, side: str, finger: str) -> pin.SE3:
-    """Place of a finger's first joint in the hand: its knuckle, or the thumb's one beyond the fixed metacarpal."""
+    """Placement of a finger's first joint in the hand: its knuckle, or the thumb's joint after the fixed metacarpal."""
     lateral, distal = FINGER_BASES[finger]
     knuckle = np.array([lateral * size.hand_breadth, 0.0, -distal * size.hand_length])
     if finger != "thumb":
@@ -170,7 +170,7 @@ def _joints(side: str, finger: str, key: str, parent: str, segment: str, origin:
 
 
 def _links(size: Dimensions, solids: list[Solid]) -> Iterator[Link]:
-    """Links whose mass follows their volume; solid ellipsoids."""
+    """Links as solid ellipsoids whose mass is proportional to their volume."""
     volumes = [float(np.prod(solid.mesh[1])) for solid in solids if solid.mesh is not None]
     total = size.body.segment_mass("left_hand")
     for solid, volume in zip(solids, volumes, strict=True):

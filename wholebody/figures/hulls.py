@@ -35,7 +35,7 @@ def unit_sphere(rings: int = RINGS, around: int = AROUND) -> tuple[Array, NDArra
 
 def convex(points: Array, what: str) -> tuple[Any, pin.SE3]:
     """Return the hull of points (n, 3) as coal's Convex about the centre of its bounding sphere, and that centre."""
-    # Figures stand below geometry; only building needs this one function of it, and one safe hull is enough.
+    # imported here: only building a figure needs it
     from wholebody.geometry.hull import hull_piece
 
     piece = hull_piece(points, what)

@@ -1,4 +1,4 @@
-"""The person in capsules and boxes: the default detail, exact and fast to measure distances between."""
+"""The person in capsules and boxes: the default detail, for which distances are exact and fast."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class TrunkPart(NamedTuple):
 
 
 def trunk_parts(size: Dimensions) -> tuple[TrunkPart, ...]:
-    """Return place and half sizes from the pelvis to the thorax."""
+    """Return positions and half sizes of the parts from the pelvis to the thorax."""
     radius, height, length = size.body.radius, size.stature, size.body.length
     waist_x, waist_y, chest_x, chest_y = radius("waist_x"), radius("waist_y"), radius("chest_x"), radius("chest_y")
     low, up, ribs, chest = (length(name) for name in ("lower_lumbar", "upper_lumbar", "lower_thorax", "thorax"))

@@ -1,4 +1,4 @@
-"""The person as a figure: groups, chains, cones, postures; and the avatar, which is the person on a rigid torso."""
+"""The person as a figure: groups, chains, cones, postures; and the avatar, which is the person with a rigid torso."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which pieces of the person can touch: all across the body, but not neighbours, which overlap where flesh meets."""
+"""Pairs of pieces of the person that can touch: all except neighbours, which overlap at their joint."""
 
 from __future__ import annotations
 

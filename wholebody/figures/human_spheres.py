@@ -1,7 +1,7 @@
 """The 39 spheres in five groups that whole motions are tested with (Degenhardt's thesis, section 3.3.1).
 
 Layout and radii are estimates calibrated on ANSUR II; for other builds the radius grows with the square root of mass
-per stature. The detail is coarse: tips of fingers lie up to 1 cm and palms 3 cm inside it, so reach with another one.
+per stature. The detail is coarse: fingertips are up to 1 cm and palms 3 cm inside it, so use another one for reaching.
 """
 
 from __future__ import annotations

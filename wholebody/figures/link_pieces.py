@@ -1,4 +1,4 @@
-"""The convex pieces of what a robot's links collide with: shapes exactly, meshes as hulls or decomposed."""
+"""The convex collision pieces of a robot's links: exact shapes, and meshes as hulls or decomposed."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from wholebody.geometry.meshes import EmptyMeshError, read_mesh
 from wholebody.geometry.pieces import LARGEST, SMALLEST
 
 CYLINDER_SIDES = 32
-"""A cylinder becomes a prism around it with this many sides; its corners stand out by 0.5 % of the radius."""
+"""A cylinder becomes a prism around it with this many sides; its corners protrude by 0.5 % of the radius."""
 
 WHOLE_IN_ONE_FILE = (".obj", ".stl", ".glb", ".dae")
-"""Kinds of mesh files whose triangles are all in the file itself, so that its content says what they are."""
+"""Kinds of mesh files whose triangles are all in the file itself, so that its content identifies them."""
 
 _log = logging.getLogger(__name__)
 
 Concavity = float | Mapping[str, float] | None
-"""None: a hull for each mesh. A number: what a decomposition of every mesh may leave. A mapping: of which links."""
+"""None: a hull for each mesh. A number: concavity of the pieces of every mesh. A mapping: the same for some links."""
 
 
 class LinkShape(NamedTuple):
@@ -57,15 +57,15 @@ class LinkShape(NamedTuple):
 
 
 CONCAVITY = (0.01, 1.0)
-"""What convex pieces of a mesh may leave, as a share of its size: close, and hulls."""
+"""Least and greatest concavity of the pieces, as a share of a mesh's size: close pieces, and hulls."""
 
 
 def check_concavity(concavity: object, links: Iterable[str]) -> Concavity:
-    """Return what was asked for, checked.
+    """Check the argument and return it.
 
     Raises:
         InputError: not None, a number from 0.01 to 1, or a mapping to such numbers.
-        UnknownNameError: a link that is not there.
+        UnknownNameError: an unknown link.
     """
     names = tuple(links)
     if concavity is None:
@@ -79,7 +79,7 @@ def check_concavity(concavity: object, links: Iterable[str]) -> Concavity:
 
 
 def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any, pin.SE3]], tuple[str, ...]]:
-    """Convex pieces of one shape, in its own frame, and one sentence on each thing that was changed about it.
+    """Convex pieces of one shape, in its own frame, and one sentence on each change of the shape.
 
     Raises:
         WholebodyError: a mesh that cannot be read.
@@ -106,7 +106,7 @@ def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any,
 
 
 def _solid(size: tuple[float, ...], kind: str) -> tuple[tuple[float, ...], tuple[str, ...]]:
-    """Sizes that coal can be trusted with."""
+    """Sizes for which coal is reliable, and notes on changes."""
     if min(size) >= SMALLEST:
         return size, ()
     note = f"its {kind} is {min(size):.2g} m thin, so it is made {SMALLEST} m thick"

@@ -14,7 +14,7 @@ from wholebody.figures.figure import Figure
 from wholebody.files import check_file, is_file
 
 MOST_SAMPLES = 100_000
-"""Most random postures by which always-overlapping pairs are found: more take minutes."""
+"""Most random postures for finding pairs that always overlap: more take minutes."""
 
 LAST_SEED = 2**32 - 1
 
@@ -32,7 +32,7 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
 
     Raises:
         UnknownNameError: an unknown name or option.
-        InputError: a value that no body has.
+        InputError: a value that is impossible for a body.
         FileFormatError: a file that cannot be read.
     """
     from wholebody.figures.hand import hand_figure

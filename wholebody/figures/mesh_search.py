@@ -1,4 +1,4 @@
-"""Where the mesh of a robot description lies: by path, or in a package, as the tools of ROS find it."""
+"""Search for the meshes of a robot description, by path or in a package, by the rules of ROS."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def find_mesh(
     packages or be one.
 
     Args:
-        name: as the file writes it.
-        place: of the mesh in the file, for the error's sentence.
+        name: the mesh's name in the file.
+        place: of the mesh in the file, for messages.
         path: of the file.
-        package_dirs: folders that are named by the caller.
+        package_dirs: the caller's folders.
         environ: the environment variables.
 
     Raises:

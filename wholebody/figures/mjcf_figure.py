@@ -1,4 +1,4 @@
-"""A figure from an MJCF file (MuJoCo), as far as Pinocchio reads it: bodies, joints, and the geoms that collide."""
+"""A figure from an MJCF file (MuJoCo), as far as Pinocchio reads it: bodies, joints, and collision geoms."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from wholebody.figures.urdf_figure import SAMPLES, urdf_figure
 from wholebody.figures.xml_reading import read_xml
 
 _PLACED = {"pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"}
-"""Attributes that place a body; Pinocchio drops them of a first body that is fixed."""
+"""Attributes for the placement of a body; Pinocchio ignores them for a first body that is fixed."""
 WORLD = "universe"
 """Pinocchio's frame of the world, whose geoms it reads from 4.0 on."""
 
@@ -34,20 +34,20 @@ def xml_figure(
     samples: int = SAMPLES,
     seed: int = 0,
 ) -> Figure:
-    """Return the figure of an ``.xml`` file, which is an MJCF if its outermost element is ``<mujoco>``, else a URDF.
+    """Return the figure of an ``.xml`` file: an MJCF if its outermost element is ``<mujoco>``, otherwise a URDF.
 
     Args:
         path: the file.
-        root: "fixed" to the world, or "free"; if left out, as the file says.
+        root: "fixed" to the world, or "free"; if left out, as in the file.
         package_dirs: as for `urdf_figure`; an MJCF has no packages.
         concavity: as for `urdf_figure`.
         samples: as for `urdf_figure`.
         seed: as for `urdf_figure`.
 
     Raises:
-        FileFormatError: a file that cannot be read, with the place and the mend.
-        InputError: another root, a concavity out of range, or more joints than memory suffices for.
-        UnknownNameError: `concavity` names a link that is not there.
+        FileFormatError: a file that cannot be read, with the place and the correction.
+        InputError: another root, a concavity out of range, or too many joints for the memory.
+        UnknownNameError: `concavity` names an unknown link.
     """
     place = Path(path)
     outermost = read_xml(place, "URDF or MJCF")
@@ -71,7 +71,7 @@ def _read(path: Path, root: str | None) -> tuple[pin.Model, pin.GeometryModel]:
     base = [pin.JointModelFreeFlyer(), ROOT_JOINT] if root == "free" else []
     try:
         built = pin.buildModelFromMJCF(str(path), *base)
-        model = built[0] if isinstance(built, tuple) else built  # with its constraints, where the root has a name
+        model = built[0] if isinstance(built, tuple) else built  # a tuple with its constraints, if the root has a name
         meshes = pin.buildGeomFromMJCF(model, str(path), pin.COLLISION)
     except Exception as error:  # boost's and Pinocchio's own, of several kinds
         reason = " ".join(str(error).split()).rpartition("message: ")[2]
@@ -122,7 +122,7 @@ def _triangles(link: str, at: pin.SE3, vertices: Array, faces: list[Any]) -> Lin
 
 
 def _unread(outermost: Element) -> list[str]:
-    """Sentences on what of the file is not kept."""
+    """Sentences on the parts of the file that are ignored."""
     notes = []
     if outermost.find("worldbody/geom") is not None:
         notes.append("the geoms of the world are not read; add them to the scene")

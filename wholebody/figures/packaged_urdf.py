@@ -1,4 +1,4 @@
-"""The URDF files and tasks that come with the package: where they are, and how they are written."""
+"""The URDF files and tasks in the package: their folders, and writing them."""
 
 from __future__ import annotations
 

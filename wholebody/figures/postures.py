@@ -1,4 +1,4 @@
-"""Named postures of the person, in degrees, and where the root stands for them."""
+"""Named postures of the person, in degrees, and the placement of the root for them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wholebody.arrays import Array
 from wholebody.figures.description import Articulated
 
 GAP = 0.004
-"""Metres that a named posture leaves between any two pieces; arms and legs move outwards where a build needs it."""
+"""Least distance of any two pieces in a named posture, metres; arms and legs move outwards if a build needs it."""
 
 _SPREAD_STEP = math.radians(1.0)
 _SPREAD_STEPS = 45
@@ -65,10 +65,10 @@ HUMAN: dict[str, Attitude] = {
 
 
 def stand(figure: Articulated, attitude: Attitude) -> Array:
-    """Return the posture (nq,) of an attitude: pelvis above the origin, lowest piece on z = 0, no piece in another.
+    """Return the posture (nq,) of an attitude: pelvis above the origin, lowest piece on z = 0, no overlap.
 
-    Very stout builds (body mass index above about 45) cannot squat: there the thighs, spread to their limit,
-    press on the belly.
+    Very stout builds (body mass index above about 45) cannot squat: their thighs, spread to the limit,
+    overlap the belly.
     """
     q = pin.neutral(figure.model)
     values: dict[str, float] = {}

@@ -1,9 +1,9 @@
-"""Reach cones: which directions a limb can take, as a polygon on the sphere.
+"""Reach cones: the allowed directions of a limb, as a polygon on the sphere.
 
 Wilhelms & Van Gelder, Fast and Easy Reach-Cone Joint Limits, Journal of Graphics Tools 6(2), 2001. The polygon is
 star-shaped about a visible point V: the planes through V and each vertex P_i cut the sphere into wedges, and exactly
-one wedge holds a direction L: ``S_i . L >= 0 > S_{i+1} . L`` with ``S_i = V x P_i``. L is inside iff ``B_i . L >= 0``
-with the boundary normal ``B_i = P_i x P_{i+1}``. The polygon may be concave and larger than a hemisphere.
+one wedge contains a direction L: ``S_i . L >= 0 > S_{i+1} . L`` with ``S_i = V x P_i``. L is inside iff ``B_i . L >=
+0`` with the boundary normal ``B_i = P_i x P_{i+1}``. The polygon may be concave and larger than a hemisphere.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from wholebody.arrays import Array
 from wholebody.errors import InputError
 
 _PARALLEL = 1e-12
-TOUCHING = 1e-9  # rad: nearer to an edge than this a direction lies on it
+TOUCHING = 1e-9  # rad: a direction nearer to an edge than this is on it
 
 
 class ReachCone:
@@ -72,8 +72,8 @@ class ReachCone:
     def signed_angle(self, direction: Any) -> tuple[Any, Array]:
         """Return the angle to the nearest edge, radians, positive inside, and its gradient on the sphere.
 
-        A turn of the direction by a small vector w, ``L + w x L``, changes the angle by ``gradient . (w x L)``; the
-        gradient is tangent to the sphere and of length 1, save where the nearest edge changes.
+        A rotation of the direction by a small vector w, ``L + w x L``, changes the angle by ``gradient . (w x L)``; the
+        gradient is tangent to the sphere and of length 1, except where the nearest edge changes.
 
         Returns:
             (angle, gradient): float and (3,), or (n,) and (n, 3).
@@ -98,7 +98,7 @@ class ReachCone:
         return angle, away
 
     def _signed_angle_of_one(self, direction: Array) -> tuple[float, Array]:
-        """The same for one direction in a quarter of the time: constraints ask for one limb at a time."""
+        """The same for one direction in a quarter of the time: constraints evaluate one limb at a time."""
         count = len(self.vertices)
         height, before, after, corner, side = (self._table @ direction).reshape(5, count)
         within = (before >= 0.0) & (after >= 0.0)

@@ -1,4 +1,4 @@
-"""A smaller figure: only some joints move, the others are locked."""
+"""Reduction of a figure: only some joints move, the others are locked."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LOCKED = "locked together"
 
 
 class ReducedParts(NamedTuple):
-    """What a smaller figure is assembled from."""
+    """The parts from which a smaller figure is made."""
 
     model: pin.Model
     geometry: pin.GeometryModel
@@ -90,7 +90,7 @@ def _filtered(groups: Mapping[str, tuple[str, ...]], names: set[str]) -> dict[st
 
 
 def _restricted(whole: Articulated, name: str, part: Articulated) -> Array:
-    """Posture of the reduced figure: the whole one's values of the joints that are left."""
+    """Posture of the reduced figure: the whole one's values of the remaining joints."""
     q, values = whole.posture(name), pin.neutral(part.model)
     for joint in range(1, part.model.njoints):
         source = whole.model.joints[whole.model.getJointId(part.model.names[joint])]

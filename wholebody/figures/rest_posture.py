@@ -1,7 +1,7 @@
-"""The posture in which a robot begins: near zero, within its limits, and free of contact with itself.
+"""The default posture of a robot: near zero, within its limits, and free of self-contact.
 
-Many descriptions overlap at zero: hands in thighs, fingers in each other, wrists in forearms whose hulls are larger
-than the parts. Pairs are parted by moving the joints as little as possible; the few that nothing parts are not tested.
+Many descriptions overlap at zero: hands and thighs, fingers, or wrists and forearms whose hulls are larger than the
+parts. The joints move as little as possible to separate the pairs; the few pairs that still overlap are not tested.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 
 APART = 1e-3
-"""Metres that the posture leaves between two pieces."""
+"""Least distance of two pieces in the posture, metres."""
 
 STEPS = 60
 """Corrections from one start; ordinary overlaps take three to ten."""
@@ -27,27 +27,27 @@ LONGEST_STEP = 0.25
 """Largest change of a joint in one correction, radians or metres."""
 
 DAMPING = 1e-4
-"""Square metres added to the diagonal of the normal equations: larger = shorter steps along poor directions."""
+"""Square metres added to the diagonal of the normal equations; larger = shorter steps along singular directions."""
 
 PATIENCE = 12
-"""Corrections without fewer overlaps or less depth after which a start is given up."""
+"""Corrections without fewer overlaps or less depth after which the attempt from a start ends."""
 
 TRIES = 8
-"""Random postures to begin from, half-way from zero, where zero itself does not lead out."""
+"""Random starts, half-way from zero, if zero itself does not lead to a free posture."""
 
 BACK = (1.0, 0.5, 0.25)
-"""Shares of its way back to zero that a joint is moved by where the posture stays free."""
+"""Shares of the motion back to zero that are tried for each joint, while the posture stays free."""
 
 UNPARTED = "overlap at zero, and no posture was found that parts them"
 
 
 class RestPosture(NamedTuple):
-    """Where a robot begins.
+    """The default posture of a robot.
 
     Attributes:
         q: (nq,) posture within the limits without self-contact.
-        zero: (nq,) all joints at zero, or where that is outside the limits, at the nearest value.
-        excluded: pairs that could not be parted; they are removed from the geometry.
+        zero: (nq,) all joints at zero, or at the nearest value within the limits.
+        excluded: pairs that could not be separated; they are removed from the geometry.
         parted: pairs of pieces that overlap at `zero` and not at `q`, by name.
     """
 
@@ -58,12 +58,12 @@ class RestPosture(NamedTuple):
 
 
 def rest_posture(model: pin.Model, geometry: pin.GeometryModel, seed: int) -> RestPosture:
-    """Find the posture near zero that is free of self-contact; pairs that cannot be parted leave the geometry.
+    """Find a posture near zero that is free of self-contact; pairs that cannot be separated are removed.
 
     Args:
         model: Pinocchio's model.
         geometry: its pieces and the pairs that can touch.
-        seed: of the postures to begin from where zero does not lead out.
+        seed: of the random starts.
     """
     limits = limits_of(model)
     zero = pin.neutral(model)
@@ -89,7 +89,7 @@ def rest_posture(model: pin.Model, geometry: pin.GeometryModel, seed: int) -> Re
 
 
 class _Try(NamedTuple):
-    """Where one start led: the posture, the pairs that still overlap there, and the sum of their distances."""
+    """Result from one start: the posture, the pairs that still overlap, and the sum of their distances."""
 
     q: Array
     left: tuple[int, ...]
@@ -112,11 +112,10 @@ class _Parting:
             self.movable[:6] = False
 
     def contacts(self, q: Array, within: float) -> Contacts:
-        self.state.update(q)
-        return self.proximity.near(self.state.data, within)
+        return self.proximity.query(self.state.update(q), within)
 
     def away_from(self, q: Array) -> _Try:
-        """Correct until nothing is nearer than `APART`; else the posture with the fewest overlaps on the way."""
+        """Correct until nothing is nearer than `APART`; otherwise return the posture with the fewest overlaps."""
         best: _Try | None = None
         since = 0
         for _ in range(STEPS):
@@ -133,7 +132,7 @@ class _Parting:
         return best
 
     def pulled_back(self, q: Array, left: frozenset[int]) -> Array:
-        """Move every joint back towards zero as far as the posture stays free, but for the pairs that are left out."""
+        """Move every joint back towards zero while the posture stays free, ignoring the pairs that are left out."""
         way = np.asarray(pin.difference(self.model, self.zero, q))
         for place in np.argsort(-np.abs(way), kind="stable").tolist():
             for share in BACK:

@@ -1,4 +1,4 @@
-"""From a robot's model and collision shapes to its figure: pieces, pairs, the posture it begins in, chains."""
+"""The figure of a robot from its model and collision shapes: pieces, pairs, default posture, chains."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from wholebody.figures.self_pairs import choose_pairs
 from wholebody.geometry.large_models import geometry_model
 
 DATA_KEPT = 4
-"""Pinocchio's data that a scene with one problem holds."""
+"""Number of Pinocchio's data objects in a scene with one problem."""
 
 COLOR = (0.62, 0.66, 0.70, 1.0)
 
@@ -34,15 +34,15 @@ def robot_figure(
     samples: int,
     seed: int,
 ) -> Figure:
-    """Return the figure of a robot about which nothing is known but its model and geometry.
+    """Return the figure of a robot from its model and geometry alone.
 
     Args:
         name: of the robot.
         model: Pinocchio's model.
         links: names, the root link first.
-        geometry: pieces; its pairs are chosen here.
-        notes: what had to be changed so far.
-        samples: random postures by which the pairs are chosen.
+        geometry: the pieces; this function chooses its pairs.
+        notes: changes made so far.
+        samples: number of random postures for choosing the pairs.
         seed: of those postures.
     """
     excluded = choose_pairs(model, geometry, samples, seed)
@@ -79,9 +79,9 @@ def _told(rest: RestPosture) -> list[str]:
 
 
 def check_size(model: pin.Model, path: Path) -> None:
-    """Refuse a model for which the memory of this machine does not suffice.
+    """Refuse a model that needs more memory than this machine has.
 
-    Pinocchio's data hold four tables of the cube of the degrees of freedom: 0.26 GB for 200 of them, 108 GB for 1,500.
+    Pinocchio's data has four tables of the cube of the degrees of freedom: 0.26 GB for 200 of them, 108 GB for 1,500.
 
     Raises:
         InputError: too many degrees of freedom.
@@ -95,7 +95,7 @@ def check_size(model: pin.Model, path: Path) -> None:
 
 
 def machine_memory() -> float:
-    """Return the bytes of memory of this machine; inf where the system does not say."""
+    """Return the bytes of memory of this machine; inf if the system does not report it."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, ValueError, OSError):
@@ -118,14 +118,14 @@ def link_chains(model: pin.Model, links: Iterable[str]) -> dict[str, Chain]:
 def geometry_of_links(
     model: pin.Model, shapes: Iterable[LinkShape], concavity: Concavity, path: Path, named: bool = False
 ) -> tuple[pin.GeometryModel, tuple[str, ...]]:
-    """Return the convex pieces of links, and one sentence on each thing that was changed about them.
+    """Return the convex pieces of links, and one sentence on each change.
 
     Args:
         model: Pinocchio's model.
         shapes: of the links.
         concavity: see `link_pieces`.
         path: of the file, for errors.
-        named: call a piece as its shape is called in the file, and not "<link>:<k>".
+        named: whether a piece has the name of its shape in the file, and not "<link>:<k>".
 
     Raises:
         FileFormatError: a mesh that cannot be read, with the link.

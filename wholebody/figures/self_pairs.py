@@ -1,4 +1,4 @@
-"""Which pieces of a figure can touch each other, where nobody has said so: adjacency, and random postures."""
+"""Choice of the pairs of pieces that can touch, by adjacency and random postures, if a file does not give them."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from wholebody.arrays import Array, Indices
 from wholebody.figures.description import ExcludedPair
 
 SELDOM = 0.02
-"""Share of the sampled postures: pairs that are free in no more of them are shells in shells, and are left out."""
+"""Share of the sampled postures: pairs that are free in at most this share are left out, as nested shells."""
 
 TOUCHING = 2e-4
-"""Metres: pieces nearer than this touch. The phalanges of some hands come no farther apart in any posture."""
+"""Metres: pieces nearer than this touch. The phalanges of some hands are never farther apart."""
 
 UNLIMITED = np.pi
-"""Range, each way, in which joints without limits are sampled: radians, or metres for sliding joints."""
+"""Range in both directions for sampling joints without limits: radians, or metres for prismatic joints."""
 
 
 def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int, seed: int) -> tuple[ExcludedPair, ...]:
-    """Put the pairs that can touch into the geometry.
+    """Set the pairs of the geometry to those that can touch.
 
-    Left out are pieces on one link or joint, pieces of neighbours (no piece on any joint between them), and pairs that
-    touch or overlap in all but a few of a number of random postures within the limits: shells in shells, which next to
-    nothing could free.
+    Pairs of pieces on one link or joint are left out, and pairs of neighbours (no piece on any joint between them).
+    Pairs that touch or overlap in nearly all of a number of random postures within the limits are left out too: they
+    are nested shells, which almost no posture separates.
 
     Args:
         model: Pinocchio's model.
@@ -64,7 +64,7 @@ def choose_pairs(model: pin.Model, geometry: pin.GeometryModel, samples: int, se
 
 
 def drop_pairs(geometry: pin.GeometryModel, numbers: Iterable[int], reason: str) -> list[ExcludedPair]:
-    """Remove pairs, given by their places among the collision pairs, and return them with a reason."""
+    """Remove pairs, given by their indices among the collision pairs, and return them with a reason."""
     gone = set(numbers)
     if not gone:
         return []
@@ -107,9 +107,9 @@ def _carriers_above(model: pin.Model, joint: Indices) -> Indices:
 
 
 def _seldom_free(model: pin.Model, geometry: pin.GeometryModel, postures: Array) -> dict[int, int]:
-    """Pairs that touch or overlap in all but `SELDOM` of these postures, and in how many they do not.
+    """Pairs that touch or overlap in all but a share `SELDOM` of these postures -> number of postures without contact.
 
-    A pair is asked about until it was free too often, which of most is at once.
+    A pair is tested until it was free too often; for most pairs that happens at once.
     """
     if not len(geometry.collisionPairs) or not len(postures):
         return {}

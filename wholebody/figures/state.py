@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from wholebody.arrays import Array
 from wholebody.checks import instance, posture, whole
 from wholebody.errors import InputError
+from wholebody.geometry.memory_views import placement_view
 
 UNIT_TOLERANCE = 1e-3  # how far a quaternion's length may be from 1 before it is taken for a mistake
 
@@ -41,6 +43,8 @@ class State:
         jacobian: (6, n) columns of the joints, world frame. n is nv, and one more for each degree of freedom of a joint
             that follows another (mimic): `folded` and `spread` translate.
         support: (njoints, n) 1 where a column moves a joint, else 0.
+        column_joint: (n,) the joint that a column belongs to.
+        parents: (njoints,) the joint that carries each joint.
     """
 
     def __init__(self, model: pin.Model) -> None:
@@ -50,10 +54,13 @@ class State:
         self.data = model.createData()
         self.q: Array = pin.neutral(model)
         self.support = joint_support(model)
+        self.parents: NDArray[np.intp] = np.array(list(model.parents), dtype=np.intp)
+        self.column_joint: NDArray[np.intp] = self.support.argmax(axis=0).astype(np.intp)
         self._columns = extended_columns(model)
         if self._columns is not None:
             self._fold = np.eye(model.nv)[self._columns]
         self.jacobian: Array = np.zeros((6, self.support.shape[1]), order="F")
+        self._joints = placement_view(self.data.oMi)
         self._frames: dict[int, pin.SE3] = {}
         self._center_of_mass: Array | None = None
         self._companions: dict[object, State] = {}
@@ -65,7 +72,9 @@ class State:
         Raises:
             InputError: q has the wrong shape, or a value that is not finite.
         """
-        q = posture(q, self.model.nq)
+        usual = type(q) is np.ndarray and q.dtype == np.float64 and q.shape == (self.model.nq,)
+        if not usual or not isfinite(q.dot(q)):
+            q = posture(q, self.model.nq)
         if not pin.isNormalized(self.model, q, UNIT_TOLERANCE):
             raise InputError(
                 "the posture's quaternion is not of unit length; normalise it with pin.normalize(model, q)"
@@ -76,6 +85,13 @@ class State:
         self._frames.clear()
         self._center_of_mass = None
         return self
+
+    @property
+    def joints(self) -> Array:
+        """(njoints, 4, 3) placements of the joints: columns of the rotation, then the translation. A view."""
+        if self._joints is not None:
+            return self._joints
+        return np.array([[*M.rotation.T, M.translation] for M in self.data.oMi], dtype=float)
 
     def companion(self, key: object, model: pin.Model) -> State:
         """A state of another model that goes along with this one: the same for the same key, and of this run alone."""
@@ -151,21 +167,22 @@ def _restored(model: pin.Model, q: Array) -> State:
 
 def joint_support(model: pin.Model) -> Array:
     """Which columns of the joint Jacobian move which joint: 0/1 array (njoints, n); the world's row is zero."""
-    support = np.zeros((model.njoints, sum(joint.nvExtended for joint in list(model.joints)[1:])))
+    parents, firsts, widths = (vector.tolist() for vector in (model.parents, model.idx_vExtendeds, model.nvExtendeds))
+    support = np.zeros((model.njoints, sum(widths)))
     for joint in range(1, model.njoints):
-        support[joint] = support[model.parents[joint]]
-        first = model.joints[joint].idx_vExtended
-        support[joint, first : first + model.joints[joint].nvExtended] = 1.0
+        support[joint] = support[parents[joint]]
+        support[joint, firsts[joint] : firsts[joint] + widths[joint]] = 1.0
     return support
 
 
 def extended_columns(model: pin.Model) -> NDArray[np.intp] | None:
     """Place in the tangent of each column of the joint Jacobian; None where no joint follows another."""
-    joints = list(model.joints)[1:]
-    if not any(joint.nv != joint.nvExtended for joint in joints):
+    widths, extended = model.nvs.tolist(), model.nvExtendeds.tolist()
+    if widths == extended:
         return None
-    columns = np.zeros(sum(joint.nvExtended for joint in joints), dtype=np.intp)
-    for joint in joints:
-        size = joint.nvExtended
-        columns[joint.idx_vExtended : joint.idx_vExtended + size] = np.arange(joint.idx_v, joint.idx_v + size)
+    places, first = model.idx_vs.tolist(), model.idx_vExtendeds.tolist()
+    columns = np.zeros(sum(extended), dtype=np.intp)
+    for joint in range(1, model.njoints):
+        size = extended[joint]
+        columns[first[joint] : first[joint] + size] = np.arange(places[joint], places[joint] + size)
     return columns

@@ -1,7 +1,7 @@
-"""What a URDF has no words for: the element ``<wholebody>``, written with our figures and read with them.
+"""An extension of URDF: the element ``<wholebody>``, which our figures write and read.
 
-Other programs skip it. With it a figure that is read from its file is the figure that was written: its pairs, postures,
-groups, chains, the frames to reach with, reach cones, collision groups and weights of effort. All of it is by name::
+Other programs ignore it. With it the figure that is read from a file equals the figure that was written: its pairs,
+postures, groups, chains, frames for goals, reach cones, collision groups and weights of effort. All parts are by name::
 
     <wholebody root="free" detail="capsules">
       <frames names="left_palm left_index_tip"/>
@@ -15,9 +15,9 @@ groups, chains, the frames to reach with, reach cones, collision groups and weig
       <effort joints="left_clavicle_elevation" weights="1000"/>
     </wholebody>
 
-A posture names the joints that are not at zero, in radians and metres, and where the root stands: x, y, z and the
-quaternion x, y, z, w. Pieces are called as their ``<collision>`` elements. All pairs that are not untested, and whose
-pieces are on different joints, are tested.
+A posture gives the joints that are not at zero, in radians and metres, and the placement of the root: x, y, z and the
+quaternion x, y, z, w. Pieces have the names of their ``<collision>`` elements. All pairs are tested except the untested
+ones and those whose pieces are on one joint.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from wholebody.figures.xml_reading import numbers
 
 
 def extension_text(figure: Figure) -> str:
-    """Return the element of a figure, indented to stand in its URDF."""
+    """Return the element of a figure, indented for its URDF."""
     known = figure.describe()
     made = Element("wholebody", root=figure.root, detail=figure.detail)
     SubElement(made, "frames", names=" ".join(figure.frames))
@@ -90,11 +90,11 @@ def extended_figure(
         element: the extension.
         name: of the figure.
         model: Pinocchio's model.
-        geometry: pieces, without pairs; the pairs are put in here.
-        notes: what had to be changed about the geometry.
+        geometry: pieces, without pairs; this function adds the pairs.
+        notes: changes of the geometry.
 
     Raises:
-        FileFormatError: a name that is not in the file, or numbers that do not fit.
+        FileFormatError: a name that is not in the file, or numbers of the wrong count or value.
     """
     return _Reader(path, element, model, geometry).figure(name, tuple(notes))
 

@@ -15,7 +15,7 @@ from wholebody.figures.urdf_file import read_urdf
 from wholebody.figures.urdf_model import urdf_model
 
 SAMPLES = 400
-"""Random postures by which the pairs that nothing parts are found."""
+"""Number of random postures for finding pairs that always overlap."""
 
 
 def urdf_figure(
@@ -30,18 +30,18 @@ def urdf_figure(
 
     Args:
         path: the file.
-        root: "fixed" to the world, or "free"; if left out, as the file says (see `urdf_extension`), or "fixed".
+        root: "fixed" to the world, or "free"; if left out, as in the file (see `urdf_extension`), or "fixed".
         package_dirs: folders in which ``package://`` names are looked up, before the file's own parents and those of
             ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
-        concavity: None for one convex hull for each mesh; or what convex pieces of meshes may leave, 0.01 (close) to 1,
+        concavity: None for one convex hull for each mesh; or the concavity of the pieces of meshes, 0.01 (close) to 1,
             as a share of a mesh's size; or a mapping from link to such a number, with hulls for the other links.
-        samples: random postures by which pairs that nothing parts are found.
+        samples: number of random postures for finding pairs that always overlap.
         seed: of those postures.
 
     Raises:
-        FileFormatError: a file that cannot be read, with the place and the mend.
-        InputError: another root, a concavity out of range, or more joints than memory suffices for.
-        UnknownNameError: `concavity` names a link that is not there.
+        FileFormatError: a file that cannot be read, with the place and the correction.
+        InputError: another root, a concavity out of range, or too many joints for the memory.
+        UnknownNameError: `concavity` names an unknown link.
     """
     if root not in (None, "fixed", "free"):
         raise InputError(f"root is {root!r}; give 'fixed' or 'free'")

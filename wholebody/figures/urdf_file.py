@@ -1,4 +1,4 @@
-"""Reading a URDF: all is checked in the file itself, so that an error names its place, before Pinocchio sees it."""
+"""Reading a URDF: the file itself is checked before Pinocchio reads it, so that an error names its place."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from wholebody.figures.xml_reading import bounded, numbers, placement, read_xml,
 from wholebody.geometry.pieces import LARGEST
 
 EXTENSION = "wholebody"
-"""Name of the element that says what a URDF has no words for; see `wholebody.figures.urdf_extension`."""
+"""Name of the element of our extension; see `wholebody.figures.urdf_extension`."""
 
 
 class UrdfFile(NamedTuple):
@@ -29,7 +29,7 @@ class UrdfFile(NamedTuple):
         joints: in the order of the file.
         shapes: collision shapes in the order of the file.
         extension: the element `EXTENSION`, or None.
-        notes: one sentence for each thing that is missing in the file and was filled in.
+        notes: one sentence for each missing part that was filled in.
     """
 
     path: Path
@@ -50,7 +50,7 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
         package_dirs: folders that hold the packages of ``package://<package>/...`` names; see `find_mesh`.
 
     Raises:
-        FileFormatError: one sentence with the place and the mend.
+        FileFormatError: one sentence with the place and the correction.
     """
     robot = read_xml(path, "URDF")
     if robot.tag != "robot":
@@ -81,7 +81,7 @@ def _links(robot: Element, path: Path) -> tuple[str, ...]:
 
 
 def _check_inertial(inertial: Element, place: str) -> None:
-    """Masses are checked and moments are only kept from being absurd: many robots' are not quite physical."""
+    """Check masses, and moments only against absurd values: many robots' moments are not quite physical."""
     mass = inertial.find("mass")
     if mass is None:
         raise FileFormatError(f"{place} has an <inertial> without <mass>; add it")

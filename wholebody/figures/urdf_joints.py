@@ -1,4 +1,4 @@
-"""The joints of a URDF, checked: a tree, with limits where a joint needs some, and followers that can be obeyed."""
+"""The joints of a URDF, checked: a tree, with limits if a joint needs them, and valid followers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "plan
 FOLLOWING = ("revolute", "continuous", "prismatic")
 
 UNLIMITED = 1e4
-"""Limits beyond this, radians or metres, are no limits: files write 1e16 for them."""
+"""Limits beyond this, radians or metres, count as no limits: some files write 1e16 for no limit."""
 
 
 class Mimic(NamedTuple):
@@ -41,8 +41,8 @@ class UrdfJoint(NamedTuple):
         axis: (3,) unit direction.
         lower: radians or metres; -inf without a limit.
         upper: inf without a limit.
-        velocity: largest speed, 1/s or m/s; inf where none is said.
-        effort: largest torque or force; inf where none is said.
+        velocity: largest velocity, 1/s or m/s; inf if the file gives none.
+        effort: largest torque or force; inf if the file gives none.
         mimic: the joint it follows.
     """
 
@@ -65,10 +65,10 @@ def read_joints(
     """Read and check all joints.
 
     Returns:
-        The joints, the root link, and one sentence for each thing that is missing and was filled in.
+        The joints, the root link, and one sentence for each missing part that was filled in.
 
     Raises:
-        FileFormatError: one sentence with the place and the mend.
+        FileFormatError: one sentence with the place and the correction.
     """
     elements = robot.findall("joint")
     unique_names(elements, "joint", path)
@@ -91,7 +91,7 @@ def read_joints(
 
 
 def _with_leaders(joints: list[UrdfJoint], notes: list[str]) -> list[UrdfJoint]:
-    """Let joints that mimic one which is not in the file move by themselves."""
+    """Make joints independent if they mimic a joint that is not in the file."""
     known = {joint.name for joint in joints}
     made = []
     for joint in joints:
@@ -133,7 +133,7 @@ def _joint(element: Element, links: frozenset[str], place: str, notes: list[str]
 
 
 def _limits(element: Element, kind: str, place: str, notes: list[str]) -> tuple[float, float, float, float]:
-    """Lower and upper limit, velocity and effort; infinite where there is none."""
+    """Lower and upper limit, velocity and effort; infinite for none."""
     free = (-np.inf, np.inf, np.inf, np.inf)
     if kind in ("fixed", "floating", "planar"):
         return free
@@ -167,7 +167,7 @@ def _limits(element: Element, kind: str, place: str, notes: list[str]) -> tuple[
 
 def _mimic(element: Element, kind: str, place: str) -> Mimic | None:
     mimic = element.find("mimic")
-    if mimic is None or kind not in FOLLOWING:  # on a fixed joint, as robots with locked hands have it, it says nothing
+    if mimic is None or kind not in FOLLOWING:  # it has no effect on a fixed joint, which robots with locked hands have
         return None
     multiplier = bounded(mimic, "multiplier", place, 1, "1")[0]
     return Mimic(mimic.get("joint", ""), multiplier, bounded(mimic, "offset", place, 1, "0", LARGEST)[0])

@@ -1,7 +1,8 @@
-"""From a checked URDF to Pinocchio's model, with joints that follow others (mimic).
+"""Pinocchio's model of a checked URDF, with joints that follow others (mimic).
 
-Pinocchio wants a follower to come after the joint it follows, in its own order. Of joints that move together the first
-in that order therefore carries the coordinate, and the others follow it; whichever of them the file calls the leader.
+Pinocchio requires that a follower comes after the followed joint in its own order. So the first of several joints that
+move together, in that order, carries the coordinate, and the others follow it, whichever of them the file calls the
+leader.
 """
 
 from __future__ import annotations
@@ -29,14 +30,14 @@ class _Law(NamedTuple):
 
 
 def urdf_model(urdf: UrdfFile, root: str) -> tuple[pin.Model, tuple[str, ...]]:
-    """Return Pinocchio's model and one sentence for each joint that could not be taken as it is.
+    """Return Pinocchio's model and one sentence for each joint that was changed.
 
     Args:
         urdf: the checked file.
         root: "fixed" or "free".
 
     Raises:
-        FileFormatError: what passed our checks and still fails in Pinocchio.
+        FileFormatError: a file that passed our checks but fails in Pinocchio.
     """
     joints, notes = _with_constant_followers(urdf.joints)
     model = _build(urdf, joints, root, mimic=False)
@@ -48,7 +49,7 @@ def urdf_model(urdf: UrdfFile, root: str) -> tuple[pin.Model, tuple[str, ...]]:
 
 
 def _laws(joints: tuple[UrdfJoint, ...]) -> dict[str, _Law]:
-    """The law of every joint that follows another, directly or over others."""
+    """The law of every joint that follows another, directly or through others."""
     by_name = {joint.name: joint for joint in joints}
     laws: dict[str, _Law] = {}
     for joint in joints:
@@ -81,7 +82,7 @@ def _with_constant_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJ
 
 
 def _led_by_the_first(joints: tuple[UrdfJoint, ...], order: dict[str, int]) -> tuple[UrdfJoint, ...]:
-    """Let the first joint of those that move together lead; its limits are those of the file's leader."""
+    """Make the first of joints that move together the leader; its limits are those of the file's leader."""
     laws, by_name = _laws(joints), {joint.name: joint for joint in joints}
     first: dict[str, str] = {}
     for name in sorted({*laws, *(law.leader for law in laws.values())}, key=order.__getitem__):
@@ -92,7 +93,7 @@ def _led_by_the_first(joints: tuple[UrdfJoint, ...], order: dict[str, int]) -> t
         if law.leader not in first:
             made.append(joint)
             continue
-        # a turning joint without limits would be a point on a circle, which nothing can follow
+        # a revolute joint without limits would be a point on a circle, which no joint can follow
         kind = "prismatic" if joint.kind == "prismatic" else "revolute"
         head = first[law.leader]
         if joint.name != head:
@@ -114,13 +115,13 @@ def _build(urdf: UrdfFile, joints: tuple[UrdfJoint, ...], root: str, mimic: bool
     base = [pin.JointModelFreeFlyer()] if root == "free" else []
     try:
         return pin.buildModelFromXML(_text(urdf, joints), *base, mimic=mimic)
-    except Exception as error:  # what passed our checks and still fails in urdfdom
+    except Exception as error:  # the file passed our checks but fails in urdfdom
         reason = " ".join(str(error).split())
         raise FileFormatError(f"{urdf.path}: Pinocchio cannot read it ({reason}); mend the file") from error
 
 
 def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:
-    """The links and joints as a URDF without shapes, each number as it was read."""
+    """The links and joints as a URDF without shapes, with exact numbers."""
     robot = Element("robot", name=urdf.name)
     for name in urdf.links:
         link = SubElement(robot, "link", name=name)
@@ -134,7 +135,7 @@ def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:
         SubElement(made, "origin", xyz=_numbers(joint.origin.translation), rpy=_numbers(angles))
         if joint.kind not in ("fixed", "floating"):
             SubElement(made, "axis", xyz=_numbers(joint.axis))
-        if joint.kind in ("revolute", "prismatic"):  # urdfdom asks for limits; the real ones are set afterwards
+        if joint.kind in ("revolute", "prismatic"):  # urdfdom requires limits; the real ones are set afterwards
             SubElement(made, "limit", lower="-1", upper="1", effort="1", velocity="1")
         if joint.mimic is not None:
             multiplier, offset = (repr(float(value)) for value in joint.mimic[1:])

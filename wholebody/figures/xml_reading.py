@@ -1,4 +1,4 @@
-"""XML files of robots: read whole, and their numbers with their place, refused where no robot has them."""
+"""Reading of XML files of robots, and of their numbers, with checks against impossible values."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from wholebody.errors import FileFormatError
 from wholebody.files import read_bytes
 
 MOST_BYTES = 64 * 2**20
-"""Largest file that is taken for a description of a robot."""
+"""Largest file that is accepted as a description of a robot."""
 
 
 MOST = 1e12
-"""Largest number that is taken for a mass, a length, a speed or an inertia in SI units; more is a mistake."""
+"""Largest number that is accepted as a mass, a length, a speed or an inertia in SI units."""
 
 
 def read_xml(path: Path, kind: str) -> Element:
@@ -28,7 +28,7 @@ def read_xml(path: Path, kind: str) -> Element:
 
     Args:
         path: the file.
-        kind: what it should be, for the error's sentence: "URDF".
+        kind: its kind, for messages: "URDF".
 
     Raises:
         FileFormatError: no file, too large, not text, an unknown encoding, or broken XML.
@@ -77,9 +77,9 @@ def numbers(element: Element, name: str, place: str, count: int, default: str | 
     Args:
         element: the element.
         name: of the attribute.
-        place: of the element in the file, for the error's sentence.
+        place: of the element in the file, for messages.
         count: how many numbers there must be.
-        default: what an attribute that is missing says; without it the attribute must be there.
+        default: value of a missing attribute; without it the attribute is required.
 
     Raises:
         FileFormatError: another count, not numbers, or not finite.
@@ -115,7 +115,7 @@ def placement(element: Element, place: str, most: float) -> pin.SE3:
     """Return the ``<origin>`` of an element; the identity without one.
 
     Raises:
-        FileFormatError: numbers that are not finite, or a place farther than `most` metres away.
+        FileFormatError: numbers that are not finite, or a position farther than `most` metres away.
     """
     origin = element.find("origin")
     if origin is None:

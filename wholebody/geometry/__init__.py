@@ -1,4 +1,4 @@
-"""How near things are: shapes, convex pieces, contacts, penetration, sweeps."""
+"""Geometry: shapes, convex pieces, contacts, penetration, sweeps."""
 
 from wholebody.geometry.guesses import settle_boxes
 

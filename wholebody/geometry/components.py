@@ -1,4 +1,4 @@
-"""The parts of a triangle mesh that hang together, and whether each is closed."""
+"""The connected components of a triangle mesh, and whether each is closed."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from wholebody.arrays import Array
 
 
 class Component(NamedTuple):
-    """One part of a mesh.
+    """One connected component of a mesh.
 
     Attributes:
-        vertices: (n, 3), only those the part uses.
-        faces: (m, 3), turned outwards where the part is closed.
-        closed: every edge has exactly two faces, which pass along it in opposite directions.
-        volume: enclosed volume; of a part that is not closed, meaningless.
+        vertices: (n, 3), only those of the component.
+        faces: (m, 3), oriented outwards if the component is closed.
+        closed: whether every edge has exactly two faces, which contain it in opposite directions.
+        volume: enclosed volume; meaningless if the component is not closed.
     """
 
     vertices: Array
@@ -27,14 +27,14 @@ class Component(NamedTuple):
 
 
 CLOSED = 1e-4
-"""Share of a surface's area, and of its volume, by which a closed one may miss the sums that vanish: files round."""
+"""Tolerance of the sums that vanish for a closed surface, as a share of its area and volume; files are rounded."""
 
 
 def enclosed_volume(vertices: Array, faces: NDArray[np.int64]) -> float | None:
-    """Volume inside a mesh, overlapping parts counted twice; None where its surface is not closed.
+    """Volume inside a mesh, overlapping parts counted twice; None if its surface is not closed.
 
-    Of a closed surface the area vectors sum to zero, and the volume is the flux of (x, 0, 0), of (0, y, 0) and of
-    (0, 0, z), all the same. It takes no table of edges: 10 ms for 100,000 triangles, `split_components` a second.
+    The area vectors of a closed surface sum to zero, and its volume is the flux of (x, 0, 0), of (0, y, 0) and of
+    (0, 0, z), all equal. This needs no table of edges: 10 ms for 100,000 triangles; `split_components` takes a second.
     """
     a, b, c = (vertices[faces[:, k]] - vertices.mean(axis=0) for k in range(3))
     area = 0.5 * np.cross(b - a, c - a)
@@ -48,8 +48,8 @@ def enclosed_volume(vertices: Array, faces: NDArray[np.int64]) -> float | None:
 def split_components(vertices: Array, faces: NDArray[np.int64]) -> list[Component]:
     """Split a mesh where triangles do not share an edge.
 
-    Vertices at the same place are merged first (STL and normals in OBJ tear them apart), degenerate and repeated
-    triangles are dropped. A closed part that is turned inside out within another one is a cavity of that one and stays
+    Vertices at the same position are merged first (STL and normals in OBJ duplicate them); degenerate and repeated
+    triangles are dropped. A closed component with inward faces inside another one is a cavity of that one and stays
     with it.
     """
     from scipy.sparse import coo_matrix
@@ -85,7 +85,7 @@ def _component(vertices: Array, faces: NDArray[np.int64]) -> Component:
 
 
 def _with_cavities(parts: list[Component]) -> list[Component]:
-    """Give cavities to the part around them, and turn the closed parts that are inside out."""
+    """Join cavities to the component around them, and orient other closed components outwards."""
     solid = [part for part in parts if not part.closed or part.volume > 0]
     for hollow in (part for part in parts if part.closed and part.volume <= 0):
         around = [

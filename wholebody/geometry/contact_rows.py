@@ -31,6 +31,8 @@ SAME_NORMAL = 1.0 - 5e-5  # cosine of 0.01 rad: nearer to a face's normal than t
 NORMAL_ROOM = 2.0 * COAL_ACCURACY  # m: by which a face's normal may part the pieces by less than coal's does
 MOST_ENDS = 8  # rows of one contact beside the witness row: a round face has dozens of corners; fewer rows rock more
 SHORTEST_LEVER = 8e-3  # m: rows nearer to the witness point than this say what the witness row says
+LENGTHS = np.array([LEVER_DISTANCE, BAND, INSET, SHORTEST_LEVER, SAME_NORMAL, NORMAL_ROOM])
+"""What the compiled loops take of the above."""
 
 
 class ContactRows(NamedTuple):
@@ -74,6 +76,11 @@ class ContactRowBuilder:
     def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
         """Rows of all contacts, at the placements they were found at.
 
+        Where coal's normal is that of a face but for rounding, it becomes the face's own, in `contacts` too. coal stops
+        within 1e-6 m of the distance, which at a few centimetres leaves its normal up to 6e-3 rad off: half a
+        millimetre at the end of a forearm that lies along a table. The face's own normal is right if it parts the
+        pieces by as much.
+
         Args:
             contacts: the near pairs of the same pieces.
             clearance: distance asked of each contact, (k,) or one for all, metres.
@@ -81,52 +88,41 @@ class ContactRowBuilder:
         Raises:
             InputError: contacts of other pieces.
         """
-        k = len(contacts.distance)
-        joint = self.table.joint
-        if len(contacts.placements) != len(joint):
+        if len(contacts.placements) != len(self.table.joint):
             raise InputError(
-                f"contacts among {len(contacts.placements)} pieces are not among these {len(joint)}; ask the scene "
-                "that they come from"
+                f"contacts among {len(contacts.placements)} pieces are not among these {len(self.table.joint)}; ask "
+                "the scene that they come from"
             )
-        wide = np.flatnonzero(self._extended[contacts.number] & (contacts.distance < clearance + LEVER_DISTANCE))
-        if len(wide):
-            self._snap(contacts, wide)
-        wrench = _wrenches(contacts.normal, contacts.point_a)
-        first, second = joint[contacts.pair[:, 0]], joint[contacts.pair[:, 1]]
-        index = np.arange(k)
-        if not len(wide):
-            return ContactRows(contacts.distance, wrench, index, first, second)
-        contact, point, gap = self._patch_ends(contacts, wide)
+        most = len(contacts.distance) * (1 + MOST_ENDS)
+        wrench, gap = np.empty((most, 6)), np.empty(most)
+        contact, joints = np.empty(most, dtype=np.intp), np.empty((most, 2), dtype=np.intp)
+        asked = np.broadcast_to(np.asarray(clearance, dtype=float), contacts.distance.shape)
+        count = self.write(contacts, np.ascontiguousarray(asked), wrench, gap, contact, joints)
         return ContactRows(
-            np.concatenate([contacts.distance, gap]),
-            np.vstack([wrench, _wrenches(contacts.normal[contact], point)]),
-            np.concatenate([index, contact]),
-            np.concatenate([first, first[contact]]),
-            np.concatenate([second, second[contact]]),
-        )
+            gap[:count].copy(), wrench[:count].copy(), contact[:count].copy(), joints[:count, 0].copy(),
+            joints[:count, 1].copy(),
+        )  # fmt: skip
 
-    def _snap(self, contacts: Contacts, wide: Indices) -> None:
-        """Put the exact normal of a face where coal's is that normal but for rounding.
+    def write(
+        self, contacts: Contacts, clearance: Array, wrench: Array, gap: Array, contact: Indices, joints: Indices
+    ) -> int:
+        """Write the rows of all contacts into arrays with room for ``k * (1 + MOST_ENDS)`` rows; how many there are.
 
-        coal stops within 1e-6 m of the distance, which at a few centimetres leaves its normal up to 6e-3 rad off: half
-        a millimetre at the end of a forearm that lies along a table. The face's own normal is right if it parts the
-        pieces by as much.
+        Args:
+            contacts: the near pairs of the same pieces.
+            clearance: (k,) distance asked of each, metres.
+            wrench: (rows, 6) room.
+            gap: (rows,) room.
+            contact: (rows,) room for the contact that a row belongs to.
+            joints: (rows, 2) room for the joints of its first and second piece.
         """
-        self._kernel.snap_normals(
-            wide, contacts.pair, contacts.distance, contacts.normal, contacts.placements, self._points,
-            self._point_start, self._point_count, self._faces, self._face_start, self._face_count, self._radius,
-            SAME_NORMAL, NORMAL_ROOM,
+        count: int = self._kernel.contact_rows(
+            contacts.pair, contacts.distance, contacts.normal, contacts.point_a, contacts.point_b, contacts.number,
+            contacts.placements, clearance, self._extended, self.table.joint, self._points, self._point_start,
+            self._point_count, self._faces, self._face_start, self._face_count, self._radius, self._axis,
+            self._is_capsule, LENGTHS, MOST_ENDS, wrench, gap, contact, joints,
         )  # fmt: skip
-
-    def _patch_ends(self, contacts: Contacts, wide: Indices) -> tuple[Indices, Array, Array]:
-        """Ends of the contact patches: contact, point (m, 3) and gap of each."""
-        contact, point, gap = self._kernel.patch_ends(
-            wide, contacts.pair, contacts.distance, contacts.normal, contacts.point_a, contacts.point_b,
-            contacts.placements, self._points, self._point_start, self._point_count, self._faces,
-            self._face_start, self._face_count, self._radius, self._axis, self._is_capsule, BAND, INSET, SHORTEST_LEVER,
-            MOST_ENDS,
-        )  # fmt: skip
-        return contact, point, gap
+        return count
 
 
 @lru_cache(maxsize=1)
@@ -134,29 +130,11 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.geometry import patch_kernel
 
-    none, points, table = np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros((2, 10))
-    pair, faces, placement = np.zeros((2, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros((2, 4, 3))
-    patch_kernel.snap_normals(
-        none, pair, table[:, 0], table[:, 1:4], placement, points, none, none, faces, none, none, np.zeros(0),
-        SAME_NORMAL, NORMAL_ROOM,
-    )  # fmt: skip
-    patch_kernel.patch_ends(
-        none, pair, table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], placement, points, none, none, faces,
-        none, none, np.zeros(0), points, np.zeros(0, dtype=bool), BAND, INSET, SHORTEST_LEVER,
-        MOST_ENDS,
+    none, points, table = np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros((0, 10))
+    pair, faces, placement = np.zeros((0, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros((0, 4, 3))
+    patch_kernel.contact_rows(
+        pair, table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], none, placement, np.zeros(0),
+        np.zeros(0, dtype=bool), none, points, none, none, faces, none, none, np.zeros(0), points,
+        np.zeros(0, dtype=bool), LENGTHS, MOST_ENDS, np.zeros((0, 6)), np.zeros(0), none, pair,
     )  # fmt: skip
     return patch_kernel
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Row-wise cross product, written out (np.cross takes 15 us more)."""
-    out = np.empty_like(a)
-    out[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
-    out[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
-    out[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return out
-
-
-def _wrenches(normal: Array, point: Array) -> Array:
-    """Rows [n, x cross n] of shape (m, 6)."""
-    return np.hstack([normal, _cross(point, normal)])

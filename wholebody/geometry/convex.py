@@ -1,4 +1,4 @@
-"""Meshes as unions of convex pieces: one hull for a whole mesh, or a decomposition that keeps its hollows."""
+"""Meshes as unions of convex pieces: one hull for a whole mesh, or a decomposition that keeps concavities."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 from wholebody.geometry.simplified_hull import simplified_hull
 
 CONVEX_VOLUME = 1e-4
-"""A closed part is taken as convex when its hull adds at most this share of its volume: float32 files round by less."""
+"""A closed part counts as convex if its hull adds at most this share of its volume; float32 rounding is smaller."""
 
 HULL_VERTICES = (64, 48)
 """A hull of a whole mesh with more vertices than the first number gets as many as the second. With 32 the hulls of real
@@ -30,7 +30,7 @@ robots have 12 % more volume than with all their vertices, with 48 they have 6 %
 have more rows with more vertices."""
 
 TOLD_VOLUME = 0.01
-"""Share of added volume from which on it is told."""
+"""Share of added volume from which a note reports it."""
 
 DECOMPOSED_AT_MOST = 64
 """Decompositions kept in memory: the same chair ten times in a scene is decomposed once."""
@@ -43,21 +43,21 @@ def convex_pieces(
 ) -> ConvexPieces:
     """Split a triangle mesh into convex pieces.
 
-    Parts that hang together are found first. A convex part is kept as it is, with all its vertices; another closed part
-    is decomposed by CoACD (Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware
-    concavity and tree search"), and its pieces are simplified outwards, so that none of the surface is left
-    uncovered; a part with holes in its surface has no inside, so its hull is taken; and a flat part is thickened to
-    twice `SMALLEST`. `notes` says which.
+    The mesh is split into connected parts. A convex part is kept as it is, with all its vertices. CoACD decomposes
+    another closed part (Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware concavity
+    and tree search"), and its pieces are simplified outwards, so that they cover the whole surface. A part with holes
+    in its surface has no inside, so its hull is used. A flat part is thickened to twice `SMALLEST`. `notes` reports
+    this.
 
     Args:
         vertices: (n, 3), metres.
         faces: (m, 3) vertex indices.
         max_vertices: most vertices of a piece that comes out of a decomposition, 8 to 256.
-        threshold: concavity left in the pieces, as a share of the part's size, 0.01 to 1: CoACD's own measure.
-        what: what the mesh is, for the error's sentence.
+        threshold: concavity of the pieces, as a share of the part's size, 0.01 to 1: CoACD's own measure.
+        what: name of the mesh, for messages.
 
     Raises:
-        InputError: bad arrays or options, or nothing solid in the mesh.
+        InputError: invalid arrays or options, or nothing solid in the mesh.
         MissingPackageError: a part needs decomposing and coacd is not installed.
     """
     cloud, triangles = check_mesh(vertices, faces, what)
@@ -70,18 +70,18 @@ def convex_pieces(
 
 
 def mesh_hull(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> ConvexPieces:
-    """The convex hull of a whole triangle mesh, as one piece that holds all of it.
+    """The convex hull of a whole triangle mesh, as one piece that contains the mesh.
 
-    A hull of many vertices is replaced by one around it that has fewer (`HULL_VERTICES`), and a mesh that is too thin
-    to be solid is thickened. `notes` says what volume was added.
+    A hull of many vertices is replaced by one around it with fewer (`HULL_VERTICES`), and a mesh that is too thin
+    to be solid is thickened. `notes` gives the added volume.
 
     Args:
         vertices: (n, 3), metres.
         faces: (m, 3) vertex indices.
-        what: what the mesh is, for the error's sentence.
+        what: name of the mesh, for messages.
 
     Raises:
-        InputError: bad arrays.
+        InputError: invalid arrays.
     """
     cloud, triangles = check_mesh(vertices, faces, what)
     points = cloud[np.unique(triangles)]
@@ -210,7 +210,7 @@ with os.fdopen(out, "wb") as answer:
 """
 _MEND = "mend the mesh where it passes through itself, or place its hull with wb.Hull"
 MOST_SECONDS = 40.0
-"""How long CoACD may take for one part; the largest of real robots took a fraction of it."""
+"""Time limit of CoACD for one part, seconds; the largest of real robots took a fraction of it."""
 
 
 def _coacd(part: Component, max_vertices: int, threshold: float, name: str) -> list[Array]:
@@ -219,7 +219,7 @@ def _coacd(part: Component, max_vertices: int, threshold: float, name: str) -> l
     _log.info("decomposing %s (%d triangles) into convex pieces", name, len(part.faces))
     # CoACD's own cap on vertices (decimate) leaves parts of the surface outside; its re-meshing (preprocess) inflates
     # thin parts by half, and a closed manifold does not need it.
-    # In a process of its own: meshes that pass through themselves crash it or keep it for ever.
+    # In a child process: self-intersecting meshes make it crash or run for ever.
     asked = pickle.dumps((np.asarray(part.vertices), part.faces.astype(np.int32), threshold))
     try:
         done = subprocess.run([sys.executable, "-c", _RUN], input=asked, capture_output=True, timeout=MOST_SECONDS)

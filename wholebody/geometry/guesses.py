@@ -1,11 +1,11 @@
-"""What coal remembers from query to query: for each pair, where its search for the nearest points last ended.
+"""coal's cached guesses: for each pair, the end of its last search for the nearest points.
 
-A search that begins there is a fifth faster, and ends within 1e-6 m of where any other would, but not at the same
-number. Whoever must give the same answer to the same question forgets these guesses first.
+A search that begins there is a fifth faster. It ends within 1e-6 m of the result of any other search, but not at
+exactly the same number. Code that must be repeatable clears these guesses first.
 
-One thing coal remembers for the whole process: whether boxes are as large as they say, or 1 + 1e-10 times that. The
-first box that it looks at decides it, by whether the direction it looks in has a zero (coal 3.0.2, a static variable
-of its support functions of boxes: one for half-spaces, another for GJK). `settle_boxes` is that first look of each.
+coal also keeps one decision for the whole process: whether boxes have their exact size, or 1 + 1e-10 times that. The
+first query of a box decides it, by whether its direction has a zero component (coal 3.0.2, a static variable of its
+support functions of boxes: one for half-spaces, another for GJK). `settle_boxes` makes that first query for each.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ FIRST_DIRECTION = (1.0, 0.0, 0.0)  # coal's own guess for a pair it has not seen
 
 
 class Guesses:
-    """The guesses of all pairs of a pin.GeometryData, as arrays where they are laid out in memory as expected."""
+    """The guesses of all pairs of a pin.GeometryData, as arrays if their layout in memory is as expected."""
 
     def __init__(self, results: Any) -> None:
-        """Lay views over the guesses; they own nothing, so the data is kept."""
+        """Make views of the guesses; the views do not own the memory, so a reference to the data is kept."""
         self._requests = results.distanceRequests
         self._views = _views(self._requests)
 
     def forget(self) -> None:
-        """Guess for every pair what coal guesses for one it has not seen."""
+        """Reset the guess of every pair to coal's initial guess."""
         if self._views is not None:
             directions, vertices = self._views
             directions[:] = FIRST_DIRECTION
@@ -43,7 +43,7 @@ class Guesses:
 
 
 def settle_boxes() -> None:
-    """Have coal take boxes as large as they say in this process, whatever is asked of it later."""
+    """Make coal use the exact size of boxes in this process, whatever queries follow."""
     direction = np.full(3, 3.0**-0.5)
     turned = coal.Transform3s(pin.exp3(direction), np.full(3, 3.0))
     here, box = coal.Transform3s(), coal.Box(1.0, 1.0, 1.0)
@@ -52,7 +52,7 @@ def settle_boxes() -> None:
 
 
 def _views(requests: Any) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
-    """Views (n, 3) of the directions and (n, 2) of the vertices; None where memory is not laid out as expected."""
+    """Views (n, 3) of the directions and (n, 2) of the vertices; None if the layout in memory is not as expected."""
     count = len(requests)
     if count == 0:
         return np.zeros((0, 3)), np.zeros((0, 2), dtype=np.int32)

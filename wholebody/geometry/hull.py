@@ -1,7 +1,7 @@
-"""Convex hulls that coal can be trusted with.
+"""Convex hulls for which coal is reliable.
 
-coal's own ``ConvexBase.convexHull`` crashes the process on flat or collinear points and takes NaN without a word, so
-hulls are computed by qhull through scipy and everything is checked before coal sees it.
+coal's own ``ConvexBase.convexHull`` crashes the process on flat or collinear points and accepts NaN silently. So qhull
+computes the hulls through scipy, and everything is checked before coal gets it.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 from wholebody.geometry.simplified_hull import simplified_hull
 
 MOST_NEIGHBOURS = 255
-"""Edges at one vertex that coal can count."""
+"""Most edges at one vertex that coal can represent."""
 
 FEW = 1000
-"""Points up to which duplicates are dropped before their hull is made: qhull drops those of many by itself."""
+"""Number of points up to which duplicates are dropped before the hull is made; of more points qhull drops them."""
 
 MOST_LOOKED_AT = 1000
-"""Faces across which the width of a hull is measured, those nearest to its middle."""
+"""Number of faces, those nearest to the middle, along whose normals the width of a hull is measured."""
 
 MANY_EDGES = 128
-"""Vertices of the hull around one that has more edges at a vertex than coal can count."""
+"""Vertices of the hull that replaces one with too many edges at a vertex."""
 
 
 def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] | None = None) -> Piece:
@@ -36,7 +36,7 @@ def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] 
 
     Args:
         points: (n, 3), metres, n >= 4; duplicates and inner points are dropped.
-        what: what the points are, for the error's sentence.
+        what: name of the points, for messages.
         vertices: (most, few): a hull with more than `most` vertices is replaced by one around it that has no more than
             `few`, at least 8. Without it only a hull that coal cannot take, with more than `MOST_NEIGHBOURS` edges at a
             vertex, is replaced.
@@ -110,7 +110,7 @@ def _finite_points(points: ArrayLike, what: str) -> Array:
 
 
 def _solid_hull(cloud: Array, what: str) -> Any:
-    """Hull of a cloud that is solid, by qhull: a thin one never reaches qhull, nor coal."""
+    """Hull of a solid cloud by qhull; a thin cloud is refused before."""
     from scipy.spatial import ConvexHull, QhullError
 
     if len(cloud) < 4:
@@ -130,7 +130,7 @@ def _solid_hull(cloud: Array, what: str) -> Any:
         ) from None
     corners = cloud[hull.vertices]
     inside = -(hull.equations[:, :3] @ corners.mean(axis=0) + hull.equations[:, 3])
-    if inside.min() < SMALLEST:  # no ball of that size is known to be inside: the width itself is asked for
+    if inside.min() < SMALLEST:  # no ball of that size is known to be inside: compute the width itself
         thin = np.argsort(inside)[:MOST_LOOKED_AT]
         width = -(corners @ hull.equations[thin, :3].T + hull.equations[thin, 3]).min(axis=0)
         if width.min() < SMALLEST:
@@ -139,10 +139,10 @@ def _solid_hull(cloud: Array, what: str) -> Any:
 
 
 def enclosing_ball(points: Array) -> tuple[Array, float]:
-    """Smallest ball that holds points (n, 3): centre (3,) and radius.
+    """Smallest ball that contains points (n, 3): centre (3,) and radius.
 
-    An exchange of bases: the ball of at most four points on its surface is enlarged by the farthest point outside until
-    there is none. The radius grows with each exchange, so it ends (Welzl 1991 has the theory; this is a pivoting form).
+    Exchange of bases: the farthest point outside enlarges the ball of at most four points on its surface until
+    no point is outside. The radius grows with each exchange, so this terminates (a pivoting form of Welzl 1991).
     """
     scale = float(np.ptp(points, axis=0).max()) or 1.0
     basis = [int(((points - points.mean(axis=0)) ** 2).sum(axis=1).argmax())]
@@ -157,7 +157,7 @@ def enclosing_ball(points: Array) -> tuple[Array, float]:
 
 
 def _smallest_basis(points: Array, candidates: list[int], scale: float) -> tuple[list[int], Array, float]:
-    """Of all balls through one to four of at most five points, the smallest that holds the five."""
+    """Of all balls through one to four of at most five points, the smallest that contains the five."""
     best: tuple[list[int], Array, float] | None = None
     for size in range(1, min(4, len(candidates)) + 1):
         for chosen in combinations(candidates, size):
@@ -168,7 +168,7 @@ def _smallest_basis(points: Array, candidates: list[int], scale: float) -> tuple
             inside = np.linalg.norm(points[candidates] - centre, axis=1).max() <= radius + 1e-10 * scale
             if inside and (best is None or radius < best[2]):
                 best = (list(chosen), centre, radius)
-    if best is None:  # rounding among nearly concyclic points: any ball that holds them will do
+    if best is None:  # rounding among nearly concyclic points: use any ball that contains them
         centre = points[candidates].mean(axis=0)
         best = (candidates[-4:], centre, float(np.linalg.norm(points[candidates] - centre, axis=1).max()))
     return best

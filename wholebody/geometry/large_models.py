@@ -1,7 +1,8 @@
 """Geometry models of thousands of pieces.
 
-Pinocchio keeps an n x n table of pair numbers and copies it whenever a piece comes: 1000 pieces take 0.6 s, 5000 more
-than a minute. A model of n empty places can be read from text in one go and filled afterwards: under a second for 5000.
+Pinocchio keeps an n x n table of pair numbers and copies it whenever a piece is added: 1000 pieces take 0.6 s, 5000
+more than a minute. A model of n empty entries can be read from text at once and filled afterwards: under a second for
+5000.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from collections.abc import Sequence
 
 import pinocchio as pin
 
-MANY = 300  # pieces from which on places are made at once; as many are added one by one in 20 ms
+MANY = 300  # number of pieces from which entries are made at once; as many are added one by one in 20 ms
 
 
 def geometry_model(pieces: Sequence[pin.GeometryObject]) -> pin.GeometryModel:
@@ -37,9 +38,9 @@ def _one_by_one(pieces: Sequence[pin.GeometryObject]) -> pin.GeometryModel:
 
 
 def _places(count: int) -> pin.GeometryModel | None:
-    """A model of empty places; None if this Pinocchio writes its models in another way.
+    """A model of empty entries; None if this Pinocchio serialises its models in another way.
 
-    What a second piece adds to the text of a model with one, a third adds again; only two counts change.
+    Each further piece adds the same text to a model's text; only two counts change.
     """
     one, two = _tokens(1), _tokens(2)
     added = len(two) - len(one)
@@ -59,7 +60,7 @@ def _places(count: int) -> pin.GeometryModel | None:
 
 
 def _tokens(count: int) -> list[str]:
-    """Words of the text of a model with empty places, without the table at its end."""
+    """Words of the text of a model with empty entries, without the table at its end."""
     empty = [pin.GeometryObject("ab"[k], 0, 0, pin.SE3.Identity(), None) for k in range(count)]
     words: list[str] = _one_by_one(empty).saveToString().rstrip("\n").split(" ")
     return words[: -2 - count**2]

@@ -1,7 +1,7 @@
-"""Numpy views over Pinocchio's own vectors, so that hundreds of results are read without a Python loop.
+"""Numpy views of Pinocchio's own vectors, which read hundreds of results without a Python loop.
 
 Reading `distanceResults[k].min_distance` for 760 pairs one by one takes 205 us; through the view it takes 5 us.
-Both layouts are checked entry by entry when a view is made; where a check fails (another build of Pinocchio), the
+Both layouts are checked entry by entry when a view is made. If a check fails (another build of Pinocchio), the
 caller gets None and reads through the official getters instead.
 """
 
@@ -16,7 +16,7 @@ from wholebody.arrays import Array
 
 SE3_STRIDE = 96  # bytes: rotation (9 doubles, column major), translation (3 doubles)
 RESULT_STRIDE = 160  # bytes of a coal.DistanceResult
-RESULT_NORMAL = 64  # offset of its normal; the distance stands in the 8 bytes before it
+RESULT_NORMAL = 64  # offset of its normal; the distance is in the 8 bytes before it
 RESULT_FIELDS = 10  # distance, normal, nearest point of the first, nearest point of the second
 
 
@@ -27,8 +27,8 @@ def _address(array: Array) -> int:
 def placement_view(placements: Any) -> Array | None:
     """View of a StdVec_SE3 as (n, 4, 3): [i, :3] holds the columns of the rotation, [i, 3] the translation.
 
-    A point x of frame i stands in the world at ``x @ view[i, :3] + view[i, 3]``. The view owns nothing: keep the
-    Pinocchio data it came from alive. Returns None where the memory is not laid out as expected.
+    A point x of frame i is in the world at ``x @ view[i, :3] + view[i, 3]``. The view does not own the memory: keep the
+    Pinocchio data alive. Returns None if the layout in memory is not as expected.
     """
     count = len(placements)
     if count == 0:
@@ -47,8 +47,8 @@ def placement_view(placements: Any) -> Array | None:
 def distance_view(results: Any) -> Array | None:
     """View of a StdVec_DistanceResult as (n, 10): distance, normal, point on the first, point on the second.
 
-    Call it after every pair was computed once, so that the contents can be checked. Returns None where the memory is
-    not laid out as expected.
+    Call it after every pair was computed once, so that the contents can be checked. Returns None if the layout in
+    memory is not as expected.
     """
     count = len(results)
     if count == 0:

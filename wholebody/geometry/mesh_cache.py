@@ -1,8 +1,8 @@
-"""Convex pieces of meshes kept on disk: what took seconds the first time takes milliseconds afterwards.
+"""Cache of convex pieces of meshes on disk: loading an entry takes milliseconds, making it takes seconds.
 
-An entry is one file, named after the content it was made from and the settings. It is written beside its place and
-moved there whole, so that any number of processes may read and write at once; it begins with its own checksum, and one
-that does not match is thrown away. Where the folder cannot be written, nothing is kept.
+An entry is one file, named by a hash of the mesh and the settings. It is written under a temporary name and renamed, so
+any number of processes may read and write at once. It begins with its checksum; an entry whose checksum does not match
+is discarded. If the folder is not writable, nothing is cached.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ VARIABLE = "WHOLEBODY_CACHE"
 """Environment variable that names another folder for the cache."""
 
 LARGEST_CACHE = 256 * 2**20
-"""Bytes that are kept; a mesh as hull takes 3 kB, a decomposition 20 kB."""
+"""Largest size of the cache, bytes; a mesh as hull takes 3 kB, a decomposition 20 kB."""
 
 LEFT_AFTER_EVICTION = 0.75
-"""Share of `LARGEST_CACHE` that is left when entries are thrown away: those that were not used for longest go first."""
+"""Share of `LARGEST_CACHE` that remains after eviction; the least recently used entries are removed first."""
 
 LOOKED_AT_EVERY = 64
-"""Writes of a process after which it looks at the size of the cache, and at its first."""
+"""Number of writes of a process between checks of the cache's size; the first write checks it too."""
 
 TOUCHED_EVERY = 3600.0
-"""Seconds after which a read marks its entry as used again."""
+"""Least seconds between two updates of an entry's time of use."""
 
 STALE = 600.0
-"""Seconds after which a file that a killed process left half-written is removed."""
+"""Seconds after which the temporary file of a killed process is removed."""
 
 _FORMAT = "1"
 _SUFFIX = ".pieces"
@@ -123,7 +123,7 @@ def cache_state() -> CacheState:
 
 
 def clear_cache() -> CacheState:
-    """Throw all entries away; return what there was."""
+    """Remove all entries; return the state before."""
     state = cache_state()
     for file in [*state.folder.glob(f"*{_SUFFIX}"), *state.folder.glob(f"*{_PART}")]:
         file.unlink(missing_ok=True)
@@ -139,7 +139,7 @@ def _read(path: Path) -> ConvexPieces | None:
         if hashlib.sha256(data[_CHECKSUM:]).digest() != data[:_CHECKSUM]:
             raise ValueError("the checksum does not match")
         found = _unpacked(data[_CHECKSUM:])
-    except Exception:  # another program's file, or a disk that failed: made anew
+    except Exception:  # another program's file, or a faulty disk: make the pieces anew
         path.unlink(missing_ok=True)
         return None
     try:
@@ -160,7 +160,7 @@ def _write(path: Path, pieces: ConvexPieces) -> None:
             part = file.name
             file.write(hashlib.sha256(packed).digest() + packed)
         os.replace(part, path)
-    except OSError:  # a read-only or full disk: nothing is kept
+    except OSError:  # a read-only or full disk: nothing is cached
         if part is not None:
             Path(part).unlink(missing_ok=True)
         return
@@ -170,7 +170,7 @@ def _write(path: Path, pieces: ConvexPieces) -> None:
 
 
 def _evict(folder: Path) -> None:
-    """Throw away what was not used for longest, where there is too much, and what killed processes left."""
+    """Remove the least recently used entries if the cache is too large, and the files of killed processes."""
     for file in folder.glob(f"*{_PART}"):
         try:
             if time.time() - file.stat().st_mtime > STALE:

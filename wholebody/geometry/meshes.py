@@ -17,7 +17,7 @@ from wholebody.geometry.convex import check_mesh
 SUFFIXES = (".obj", ".stl", ".gltf", ".glb", ".dae")
 
 Y_UP: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""Turns a file whose y points up (glTF by its standard, and most modelling programs): a quarter turn about x."""
+"""Rotation for files whose y points up (glTF by its standard, and most modelling programs): a quarter turn about x."""
 
 
 class EmptyMeshError(FileFormatError):
@@ -25,14 +25,14 @@ class EmptyMeshError(FileFormatError):
 
 
 def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
-    """Read all triangles of a file, every object of it in its place.
+    """Read all triangles of a file, every object at its placement.
 
     Args:
         path: an OBJ, STL, glTF, GLB or COLLADA (.dae) file; polygons are cut into triangles.
 
     Returns:
-        vertices (n, 3) in the file's units and axes, faces (m, 3). A COLLADA file that names its unit is turned into
-        metres, and the axis that it calls up is not looked at, as in the tools of ROS.
+        vertices (n, 3) in the file's units and axes, faces (m, 3). A COLLADA file that names its unit is converted to
+        metres, and its up axis is ignored, as in the tools of ROS.
 
     Raises:
         FileFormatError: missing, empty, of another kind, damaged, without triangles, or not finite.
@@ -61,7 +61,7 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
         vertices, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces)
         if path.suffix.lower() == ".dae":
             vertices *= _metres(scene.units)
-    except Exception as error:  # trimesh's readers raise whatever they stumble over
+    except Exception as error:  # trimesh's readers raise many kinds of errors
         raise FileFormatError(
             f"mesh {path}: it cannot be read ({type(error).__name__}: {error}); export it again"
         ) from error

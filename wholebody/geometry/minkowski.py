@@ -1,8 +1,8 @@
-"""Where one union of convex pieces overlaps another, as a function of a translation of the first.
+"""Overlap of two unions of convex pieces as a function of a translation of the first.
 
-Piece i of A, moved by t, overlaps piece j of B while t lies inside O_ij = B_j - A_i (Minkowski difference), a convex
-set. A side of it is a unit normal n out of O_ij with the offset h(n) = max over O_ij of n . x: every t with n . t >=
-h(n) takes the pair apart.
+Piece i of A, moved by t, overlaps piece j of B while t is inside O_ij = B_j - A_i (Minkowski difference), a convex set.
+A side of it is an outward unit normal n of O_ij with the offset h(n) = max over O_ij of n . x: every t with n . t >=
+h(n) separates the pair.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.geometry.swept_points import SweptPoints, swept_points
 
 Placed: TypeAlias = tuple[Any, pin.SE3]
-"""A coal geometry and where it is in the world."""
+"""A coal geometry and its placement in the world."""
 
 MOST_POINTS = 20_000
-"""Vertices of a Minkowski difference above which its sides are sampled and no longer enumerated."""
+"""Number of vertices of a Minkowski difference above which its sides are sampled instead of enumerated."""
 
 
 OVERLAP = 2.0 * COAL_ACCURACY
@@ -71,7 +71,7 @@ class ObjectPair:
     def __init__(
         self, pieces_a: Sequence[Placed], pieces_b: Sequence[Placed], allowed: NDArray[np.bool_] | None = None
     ) -> None:
-        """Read the pieces once; `allowed` (n, m) says which pairs count."""
+        """Read the pieces once; `allowed` (n, m) selects the pairs that count."""
         import coal
 
         self.a, self.b = [_Body(p) for p in pieces_a], [_Body(p) for p in pieces_b]
@@ -110,7 +110,7 @@ class ObjectPair:
         normal = -np.array(self._result.normal)
         if (
             not normal @ normal > 0.25
-        ):  # swept points that cross exactly (capsule axes, concentric spheres): coal has no normal
+        ):  # swept points that coincide exactly (capsule axes, concentric spheres): coal has no normal
             normal = np.cross(a.axis, b.axis)
             if np.linalg.norm(normal) < 1e-9:
                 along = a.axis if a.axis.any() else b.axis if b.axis.any() else np.array([1.0, 0.0, 0.0])
@@ -119,13 +119,13 @@ class ObjectPair:
         return -float(distance), normal
 
     def between(self, translation: Array) -> Sides | None:
-        """A plane between each pair that a shorter translation can bring to overlap; None if one overlaps."""
+        """A plane between each pair that a shorter translation can make overlap; None if one overlaps."""
         reach = float(np.linalg.norm(translation))
         normals, offsets = [], []
         for i, j in np.argwhere(np.linalg.norm(self._centers, axis=2) - reach < self._reach):
             depth, normal = self.measure(int(i), int(j), translation)
             side = self.rows(int(i), int(j), normal[None])
-            if not len(side.offsets):  # a half-space has one side, and coal's normal is off it by rounding
+            if not len(side.offsets):  # a half-space has one side, and coal's normal differs from it by rounding
                 side = self.sides(int(i), int(j))
             slack = side.normals @ translation - side.offsets
             best = int(np.argmax(slack))
@@ -136,13 +136,13 @@ class ObjectPair:
         return Sides(np.array(normals), np.array(offsets)) if normals else None
 
     def sides(self, i: int, j: int) -> Sides:
-        """Every side of O_ij where it is a polytope, a net of sides where it is round."""
+        """Every side of O_ij if it is a polytope, a sample of sides if it is round."""
         if (i, j) not in self._sides:
             self._sides[i, j] = self.rows(i, j, self._normals(self.a[i], self.b[j]))
         return self._sides[i, j]
 
     def rows(self, i: int, j: int, normals: Array) -> Sides:
-        """Sides of O_ij with these normals (k, 3); those where it has no end are left out."""
+        """Sides of O_ij with these normals (k, 3); those in whose direction it is unbounded are left out."""
         offsets = self.b[j].support(normals) + self.a[i].support(-normals)
         finite = np.isfinite(offsets)
         return Sides(normals[finite], offsets[finite])
@@ -158,7 +158,7 @@ class ObjectPair:
             corners = (b.points[:, None] - a.points).reshape(-1, 3)
             try:
                 found.append(ConvexHull(corners - corners.mean(axis=0)).equations[:, :3])
-            except QhullError:  # what is swept are points, segments or parallel plates: the rounding decides, see _net
+            except QhullError:  # the difference is a point, a segment or flat: the radius decides
                 crossed = np.cross(a.axis, b.axis)
                 if np.linalg.norm(crossed) > 1e-9:
                     found.append(np.array([crossed, -crossed]) / np.linalg.norm(crossed))
@@ -166,7 +166,7 @@ class ObjectPair:
         return normals[np.unique(np.round(normals, 9), axis=0, return_index=True)[1]]
 
     def escapes(self) -> Array:
-        """Translations (k, 3) that take the hull of A out of that of B, one for each of many directions."""
+        """Translations (k, 3) that move the hull of A out of that of B, one for each of many directions."""
         planes = [x.plane for x in self.b if x.plane is not None] + [-x.plane for x in self.a if x.plane is not None]
         normals = np.vstack([_net(), *[plane[None] for plane in planes]])
         ahead = np.max([x.support(normals) for x in self.b], axis=0)

@@ -213,3 +213,76 @@ def _farthest_first(place: Array, gap: Array, witness: Array, count: int) -> Non
             for k in range(3):
                 square += (place[row, k] - place[chosen, k]) ** 2
             away[row] = square if chosen == 0 else min(away[row], square)
+
+
+@compiled()
+def contact_rows(
+    pair: Indices,
+    distance: Array,
+    normal: Array,
+    point_a: Array,
+    point_b: Array,
+    number: Indices,
+    placement: Array,
+    clearance: Array,
+    extended: NDArray[np.bool_],
+    joint: Indices,
+    points: Array,
+    point_start: Indices,
+    point_count: Indices,
+    faces: Array,
+    face_start: Indices,
+    face_count: Indices,
+    radius: Array,
+    axis: Array,
+    is_capsule: NDArray[np.bool_],
+    lengths: Array,
+    most_ends: int,
+    wrench: Array,
+    gap: Array,
+    contact: Indices,
+    joints: Indices,
+) -> int:
+    """Write the rows of all contacts, as `ContactRowBuilder.write` does; how many there are.
+
+    `lengths` holds the lever distance, band, inset, shortest lever, cosine of the same normal and room for it; the
+    other arguments are as in `ContactRowBuilder` and `Contacts`.
+    """
+    count = len(distance)
+    wide = np.empty(count, dtype=np.intp)
+    found = 0
+    for c in range(count):
+        if extended[number[c]] and distance[c] < clearance[c] + lengths[0]:
+            wide[found] = c
+            found += 1
+    wide = wide[:found]
+    if found:
+        snap_normals(
+            wide, pair, distance, normal, placement, points, point_start, point_count, faces, face_start, face_count,
+            radius, lengths[4], lengths[5],
+        )  # fmt: skip
+    for c in range(count):
+        gap[c], contact[c] = distance[c], c
+        joints[c, 0], joints[c, 1] = joint[pair[c, 0]], joint[pair[c, 1]]
+        _wrench(normal[c], point_a[c], wrench[c])
+    if not found:
+        return count
+    owner, place, open_by = patch_ends(
+        wide, pair, distance, normal, point_a, point_b, placement, points, point_start, point_count, faces, face_start,
+        face_count, radius, axis, is_capsule, lengths[1], lengths[2], lengths[3], most_ends,
+    )  # fmt: skip
+    for e in range(len(owner)):
+        c, row = owner[e], count + e
+        gap[row], contact[row] = open_by[e], c
+        joints[row, 0], joints[row, 1] = joints[c, 0], joints[c, 1]
+        _wrench(normal[c], place[e], wrench[row])
+    return count + len(owner)
+
+
+@compiled()
+def _wrench(normal: Array, point: Array, wrench: Array) -> None:
+    """[n, x cross n]."""
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        wrench[k] = normal[k]
+        wrench[3 + k] = point[i] * normal[j] - point[j] * normal[i]

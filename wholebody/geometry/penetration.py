@@ -1,4 +1,4 @@
-"""How deep one object is in another: the global penetration of unions of convex pieces, and the way out."""
+"""Penetration of two objects: the global penetration depth of unions of convex pieces, and the least separation."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class ObjectPenetration(NamedTuple):
         a: name of the first object.
         b: name of the second.
         global_depth: (3,) PD_g, metres, out of B into A: the estimate of `global_depth`.
-        separation: (3,) least translation of A that takes all pairs of pieces apart, metres.
-        separated: the translation does take them apart (coal was asked again); false where none can.
-        least: it is proven that no shorter translation exists; see `wholebody.geometry.separation.Separation`.
+        separation: (3,) least translation of A that separates all pairs of pieces, metres.
+        separated: whether the translation separates them (verified by coal); false if none can.
+        least: whether no shorter translation exists, proven; see `wholebody.geometry.separation.Separation`.
         pairs: number of overlapping pairs of pieces.
     """
 
@@ -41,8 +41,8 @@ def global_depth(depths: Array, normals: Array) -> Array:
     """Global penetration of two objects from their overlapping convex pairs.
 
     PD_g = sum(pd_i^2 n_i) / sum(pd_i), equation 1 of Schmidl and Lin, "Real-time physically-based interaction between
-    avatars and virtual environments". It is a quick estimate: A moves by it, or A by half of it and B by minus half,
-    and the overlap is asked for again. Opposed normals cancel (their figure 4b), and then it is near zero however
+    avatars and virtual environments". It is a fast estimate: A moves by it, or A by half of it and B by minus half,
+    and the overlap is computed again. Opposed normals cancel (their figure 4b), and then it is near zero however
     deep the overlap.
 
     Args:
@@ -79,8 +79,8 @@ def object_penetration(
         b: name of the second.
         pieces_a: its n pieces, each a coal geometry and its placement in the world.
         pieces_b: the m of the second.
-        allowed: (n, m) which pairs of pieces count; all by default.
-        tolerance: depth of a pair that counts as touching only, metres: coal's own accuracy by default.
+        allowed: (n, m) the pairs of pieces that count; all by default.
+        tolerance: depth up to which a pair only touches, metres: coal's own accuracy by default.
 
     Returns:
         None if no pair overlaps.
@@ -96,11 +96,11 @@ def object_penetration(
 def object_penetrations(
     geometry: pin.GeometryModel, placements: Array, owners: Sequence[str], pairs: NDArray[np.intp]
 ) -> list[ObjectPenetration]:
-    """Every two owners of pieces that overlap, those that need the longest way out first.
+    """Every two owners of pieces that overlap, those with the longest separation first.
 
     Args:
         geometry: all pieces; its collision pairs say which of them can touch.
-        placements: (n, 4, 3) where they are, as `Contacts.placements` says it.
+        placements: (n, 4, 3) their placements, in the format of `Contacts.placements`.
         owners: the owner of each piece; the one that comes first in this list is the A of its pair.
         pairs: (k, 2) pieces that overlap.
     """

@@ -1,4 +1,4 @@
-"""A convex piece: the unit that coal measures distances between, and the sizes that it can be trusted with."""
+"""Convex pieces, between which coal computes distances, and the sizes for which coal is reliable."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Piece(NamedTuple):
     Attributes:
         geometry: coal's Box, Sphere, Capsule, Ellipsoid, Convex or Halfspace; its origin is the centre of
             its bounding sphere.
-        placement: where the geometry's origin is in the shape.
+        placement: of the geometry's origin in the shape.
         volume: cubic metres; infinite for a half-space.
     """
 

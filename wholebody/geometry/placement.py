@@ -1,4 +1,4 @@
-"""Where something stands: every way of writing a placement, checked and turned into Pinocchio's."""
+"""Placements: every way of writing one, checked and converted to Pinocchio's."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ PlacementLike: TypeAlias = Sequence[float] | NDArray[np.float64] | pin.SE3
 """(x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 homogeneous matrix, or a ``pinocchio.SE3``."""
 
 FARTHEST = 1e6
-"""Metres from the origin beyond which nothing stands: what is placed there loses more than coal's accuracy."""
+"""Largest distance of a placement from the origin, metres; beyond it rounding exceeds coal's accuracy."""
 
 ROUNDING = 1e-3
-"""How far a rotation may be from exact: numbers typed with four digits are repaired, anything worse is refused."""
+"""Largest error of a rotation: numbers with four digits are repaired, larger errors are refused."""
 
 
 def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
     """Read a placement, metres; the quaternion is x, y, z, w.
 
-    coal reads a NaN placement as touching and takes any matrix for a rotation, so both are refused here.
+    coal treats a NaN placement as touching and accepts any matrix as a rotation, so both are refused here.
 
     Args:
         at: (3,) position, (7,) position and unit quaternion, (4, 4) homogeneous matrix, or ``pin.SE3``.
-        what: what is being placed, for the error's sentence.
+        what: name of the placed object, for messages.
 
     Returns:
         A fresh ``pin.SE3`` whose rotation is orthonormal to machine precision.

@@ -6,11 +6,11 @@ About 24 us for 760 pairs of which 47 survive, against 207 us for coal on every 
 from __future__ import annotations
 
 import time
-from typing import Any, NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from wholebody.arrays import Array, Indices
 from wholebody.geometry.guesses import Guesses
@@ -19,10 +19,6 @@ from wholebody.geometry.swept_points import SweptPoints, swept_points
 
 COAL_ACCURACY = 1e-6  # m: of coal's distances
 PENETRATION = 1e-5  # m: deeper than this a pair is called inside of each other; what touches is solved to it
-
-MANY = 60
-"""Pairs that survive their spheres from which on their boxes are asked too: long walls have large spheres. It costs as
-much as thirty pairs in coal."""
 
 SINGLY = 3000
 """Pairs of a scene from which on those that survive are asked one by one: to tell Pinocchio which of all pairs to ask
@@ -103,13 +99,20 @@ class PairTable:
         self.points_meet = np.where(
             (radius[self.pairs] > 0.0).all(axis=1), COAL_ACCURACY - radius[self.pairs].sum(axis=1), -np.inf
         )
-        rows = self.pairs[:, 0]
-        self.rows = int(rows.max()) + 1 if len(rows) else 0
-        pair_of = np.full((self.rows, geometry.ngeoms), -1, dtype=np.intp)
-        pair_of[rows, self.pairs[:, 1]] = np.arange(len(self.pairs))
-        self.pair_flat = pair_of.ravel()
-        self.has_pair = pair_of >= 0
-        self.sum_reach = np.where(self.has_pair, self.reach[: self.rows, None] + self.reach[None, :], 0.0)
+
+
+class Kinematics(Protocol):
+    """What knows where the joints of a model are, such as `figures.state.State`."""
+
+    @property
+    def data(self) -> Any:
+        """Pinocchio's data, with the joints' placements."""
+
+
+class Joints(NamedTuple):
+    """Where the joints of a model are: Pinocchio's data after its forward kinematics."""
+
+    data: Any
 
 
 class Proximity:
@@ -120,7 +123,8 @@ class Proximity:
     Attributes:
         table: the pieces and pairs.
         geometry: the geometry model with the pieces' own placements.
-        seconds: what all calls of `near` have taken together.
+        seconds: what all queries have taken together.
+        asked: how many distances coal was asked for.
     """
 
     def __init__(self, table: PairTable) -> None:
@@ -128,16 +132,24 @@ class Proximity:
         self.table = table
         self.geometry = table.geometry.copy()  # shapes are shared
         self.seconds = 0.0
+        self.asked = 0
         self.results = pin.GeometryData(self.geometry)
         self._guesses = Guesses(self.results)
-        self._threshold: tuple[float, Array] = (np.nan, np.zeros((0, 0)))
-        count = self.geometry.ngeoms
-        self._active = np.zeros((count, count) if len(table.pairs) < SINGLY else (0, 0), dtype=bool, order="F")
+        self._kernel = compiled_kernel()
+        count, pairs = self.geometry.ngeoms, len(table.pairs)
+        self._singly = pairs >= SINGLY
+        self._active = np.zeros((0, 0) if self._singly else (count, count), dtype=bool, order="F")
+        self._index = np.zeros(pairs, dtype=np.intp)
+        self._marked = self._index[:0]
+        self._travelled, self._bound = np.zeros(count), np.full(pairs, -np.inf)
+        self._last, self._extent = np.zeros((count, 4, 3)), np.zeros((count, 3))
         self._lay_views()
 
     def forget(self) -> None:
-        """Forget where coal last ended for each pair: the same queries from here on give the same answers."""
+        """Forget how near each pair was and where coal ended for it: the same queries give the same answers again."""
         self._guesses.forget()
+        self._travelled[:] = 0.0
+        self._bound[:] = -np.inf
 
     def place_piece(self, index: int, placement: pin.SE3) -> None:
         """Place a piece anew in its joint's frame."""
@@ -149,85 +161,67 @@ class Proximity:
         pin.computeDistances(self.geometry, self.results)
         self._distances = distance_view(self.results.distanceResults)
         self._placements = placement_view(self.results.oMg)
+        self.results.deactivateAllCollisionPairs()
         self.forget()
 
-    def placements(self, data: Any) -> Array:
-        """Placements (n, 4, 3) of the pieces with the joints as in `data`; see `Contacts.placements`."""
-        pin.updateGeometryPlacements(self.table.model, data, self.geometry, self.results)
-        return self._placed()
-
-    def _placed(self) -> Array:
+    def placements(self, state: Kinematics) -> Array:
+        """Placements (n, 4, 3) of the pieces with the joints as in `state`; see `Contacts.placements`."""
+        pin.updateGeometryPlacements(self.table.model, state.data, self.geometry, self.results)
         if self._placements is not None:
             return np.array(self._placements)
         return np.array([[*M.rotation.T, M.translation] for M in self.results.oMg], dtype=float).reshape(-1, 4, 3)
 
-    def near(self, data: Any, within: float) -> Contacts:
-        """Every pair nearer than `within` metres with the joints as in `data`, in the order of the pairs.
+    def query(self, state: Kinematics, within: float) -> Contacts:
+        """Every pair nearer than `within` metres with the joints as in `state`, in the order of the pairs.
 
         Pairs farther apart are left out; nothing else is. Results of pairs that were culled are never read: coal
         leaves old numbers in them.
         """
         began = time.perf_counter()
-        placements = self.placements(data)
-        index = self._cull(placements, within)
+        placements = self.placements(state)
+        index = self._asked(placements, within)
         contacts = self._gather(placements, index, within)
         self.seconds += time.perf_counter() - began
         return contacts
 
-    def _cull(self, placements: Array, within: float) -> Indices:
-        """Compute with coal all pairs whose bounding spheres are nearer than `within`; their indices."""
-        table = self.table
-        if not table.rows:
-            return np.zeros(0, dtype=np.intp)
-        if self._threshold[0] != within:
-            reach = table.sum_reach + within  # pieces inside of each other are asked for where it is negative
-            bound = np.where(table.has_pair & (reach > 0.0), reach**2, -1.0)
-            self._threshold = (within, bound)
-        centers = placements[:, 3]
-        first = centers[: table.rows]
-        squares = np.einsum("ij,ij->i", centers, centers)
-        gap = first @ centers.T
-        gap *= -2.0
-        gap += squares
-        gap += squares[: table.rows, None]
-        near = gap < self._threshold[1]
-        kept = np.flatnonzero(near)
-        if len(kept) > MANY:
-            boxed = self._boxes_near(placements, table.pair_flat[kept], within)
-            near.ravel()[kept[~boxed]] = False
-            kept = kept[boxed]
-        index = table.pair_flat[kept]
-        if len(table.pairs) < SINGLY:
-            self._active[: table.rows] = near
-            self.results.setActiveCollisionPairs(self.geometry, self._active, True)
-            pin.computeDistances(self.geometry, self.results)
-        else:
+    def _asked(self, placements: Array, within: float) -> Indices:
+        """Compute with coal the distances of all pairs that can be nearer than `within`; their indices."""
+        table, kernel = self.table, self._kernel
+        kernel.travel(placements, self._last, table.reach, self._travelled)
+        count = kernel.cull(
+            placements, table.pairs, table.reach, table.half, self._travelled, self._bound, self._extent, within,
+            self._index,
+        )  # fmt: skip
+        index = self._index[:count]
+        self.asked += count
+        if count == 0:
+            return index
+        if self._singly:
             for number in index.tolist():
                 pin.computeDistance(self.geometry, self.results, number)
+            return index
+        kernel.mark(self._active, table.pairs, self._marked, index)
+        self._marked = index.copy()
+        self.results.setActiveCollisionPairs(self.geometry, self._active, True)
+        pin.computeDistances(self.geometry, self.results)
         return index
 
-    def _boxes_near(self, placements: Array, index: Indices, within: float) -> NDArray[np.bool_]:
-        """Which pairs have boxes along the world's axes that are nearer than `within`; a bound in penetration too."""
-        half = np.einsum("ijk,ij->ik", np.abs(placements[:, :3]), self.table.half)
-        first, second = self.table.pairs[index, 0], self.table.pairs[index, 1]
-        gap = np.abs(placements[first, 3] - placements[second, 3])
-        gap -= half[first]
-        gap -= half[second]
-        return np.asarray((gap < within).all(axis=1))
-
     def _gather(self, placements: Array, index: Indices, within: float) -> Contacts:
-        if self._distances is not None:
-            table = self._distances[index]
-        else:
-            table = np.array([read_result(self.results.distanceResults[int(k)]) for k in index]).reshape(-1, 10)
-        keep = np.flatnonzero(table[:, 0] < within)
-        table, index = table[keep], index[keep]
-        normal = table[:, 1:4]
-        pair = self.table.pairs[index]
-        broken = table[:, 0] <= self.table.points_meet[index]
-        if broken.any():
-            self._repair_normals(placements, table, pair, np.flatnonzero(broken))
-        return Contacts(pair, table[:, 0], normal, table[:, 4:7], table[:, 7:10], index, placements)
+        results, known = self._distances, self.table
+        if results is None:
+            results = np.zeros((len(known.pairs), 10))
+            for number in index.tolist():
+                results[number] = read_result(self.results.distanceResults[number])
+        table = np.empty((len(index), 10))
+        number, pair = np.empty(len(index), dtype=np.intp), np.empty((len(index), 2), dtype=np.intp)
+        count, broken = self._kernel.gather(
+            results, index, known.pairs, known.points_meet, self._travelled, self._bound, 10.0 * COAL_ACCURACY, within,
+            table, number, pair,
+        )  # fmt: skip
+        table, number, pair = table[:count], number[:count], pair[:count]
+        if broken:
+            self._repair_normals(placements, table, pair, np.flatnonzero(table[:, 0] <= known.points_meet[number]))
+        return Contacts(pair, table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], number, placements)
 
     def _repair_normals(self, placements: Array, table: Array, pair: Indices, rows: Indices) -> None:
         """Give a normal to pairs where coal has none: capsule axes that cross exactly, concentric spheres."""
@@ -243,3 +237,20 @@ class Proximity:
             center = 0.5 * (table[row, 4:7] + table[row, 7:10])
             depth = -0.5 * table[row, 0] * normal
             table[row, 1:4], table[row, 4:7], table[row, 7:10] = normal, center + depth, center - depth
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody.geometry import proximity_kernel
+
+    placement, one, none = np.zeros((1, 4, 3)), np.zeros(1), np.zeros(0)
+    index, pairs = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
+    proximity_kernel.travel(placement, placement.copy(), one, one.copy())
+    proximity_kernel.cull(placement, pairs, one, np.zeros((1, 3)), one, none, np.zeros((1, 3)), 0.0, index)
+    proximity_kernel.gather(
+        np.zeros((0, 20))[:, :10], index, pairs, none, one, none, 0.0, 0.0, np.zeros((0, 10)), index,
+        pairs,
+    )  # fmt: skip
+    proximity_kernel.mark(np.zeros((1, 1), dtype=bool, order="F"), pairs, index, index)
+    return proximity_kernel

@@ -1,10 +1,10 @@
-"""The least translation that takes two unions of convex pieces apart.
+"""The least translation that separates two unions of convex pieces.
 
 It is the point nearest to the origin outside the union of the Minkowski differences of all pairs (see
-`wholebody.geometry.minkowski`): not a convex problem, because each pair may be left on any side. It is solved by branch
-and bound. A node fixes for some pairs the side they are left on, n . t >= h(n), and its bound is the QP  min |t|^2
-under these rows. If another pair overlaps at the QP's answer, the node branches over the sides of that pair. Nodes
-are taken in the order of their bounds, so the first one without overlap is the least.
+`wholebody.geometry.minkowski`). The problem is not convex, because each pair may separate on any side. It is solved by
+branch and bound. A node fixes the side of separation of some pairs, n . t >= h(n), and its bound is the QP  min |t|^2
+under these rows. If another pair overlaps at the QP's answer, the node branches over the sides of that pair. Nodes are
+processed in the order of their bounds, so the first one without overlap is the least.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ TOUCHING = 1e-7
 """Overlap that counts as none in the search, metres; the answer is verified to `OVERLAP`."""
 
 MOST_NODES = 400
-"""Nodes branched before the best translation known is returned: time, about a millisecond a node, against proof."""
+"""Nodes branched before the best known translation is returned: time, about a millisecond a node, against proof."""
 
 
 MOST_DESCENTS, MOST_ROWS = 30, 40
-"""Rounds of a local search, and rows of its QP; both end far earlier unless rounding lets them turn in circles."""
+"""Most rounds of a local search, and rows of its QP; both are far fewer unless rounding causes cycles."""
 
 DETOUR = 1.5
-"""How much longer than the best known a start of a local search may be: it gets shorter on the way."""
+"""Largest length of a start of a local search, relative to the best known: the search shortens it."""
 
 SHORTEST = 2e-4
-"""Least step of a march along a ray, metres: free gaps that are narrower are not looked for."""
+"""Least step of a march along a ray, metres; narrower free gaps may be missed."""
 
 
 class Separation(NamedTuple):
@@ -42,9 +42,9 @@ class Separation(NamedTuple):
 
     Attributes:
         translation: (3,) metres.
-        separated: coal finds no pair overlapping after it.
-        least: it is proven that no shorter one exists. With several overlapping pairs of round pieces, whose sides are
-            sampled and then refined, that is seldom so: there the translation is the best of many local searches.
+        separated: whether coal finds no overlap after it.
+        least: whether no shorter one exists, proven. With several overlapping pairs of round pieces, whose sides are
+            sampled and then refined, there is seldom a proof: then the translation is the best of many local searches.
     """
 
     translation: Array
@@ -66,11 +66,11 @@ def least_separation(
     Args:
         pieces_a: the pieces of A, each a coal geometry and its placement in the world.
         pieces_b: those of B.
-        allowed: (n, m) which pairs of pieces count; all by default.
+        allowed: (n, m) the pairs of pieces that count; all by default.
 
     Returns:
-        The zero translation if nothing overlaps, and also, with ``separated=False``, if no translation takes the
-        objects apart (a piece between two half-spaces).
+        The zero translation if nothing overlaps, and also, with ``separated=False``, if no translation separates the
+        objects (a piece between two half-spaces).
     """
     pairs = ObjectPair(pieces_a, pieces_b, allowed)
     escapes = pairs.escapes()
@@ -99,7 +99,7 @@ def _shorter(first: Array | None, second: Array | None) -> Array | None:
 
 
 def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:
-    """Branch and bound: the best translation without overlap, and whether none can be shorter."""
+    """Branch and bound: the best translation without overlap, and whether it is proven to be the least."""
     limit = np.inf if best is None else float(best @ best)
     queue: list[tuple[float, int, _Node]] = [(0.0, 0, _ROOT)]
     made = 0
@@ -152,7 +152,7 @@ def _children(
 def _nearest_on_rows(new: Sides, normals: Array, offsets: Array) -> Array:
     """Least t under the old rows and each new row, which the old answer violates: (k, 3), NaN where none exists.
 
-    The new row is then active, with at most two old ones beside it: all such sets are tried, for all new rows at once.
+    The new row is then active, with at most two old ones: all such sets are tried, for all new rows at once.
     """
     count = len(new.offsets)
     best, answers = np.full(count, np.inf), np.full((count, 3), np.nan)
@@ -173,7 +173,7 @@ def _nearest_on_rows(new: Sides, normals: Array, offsets: Array) -> Array:
 
 
 def _descents(pairs: ObjectPair, best: Array, escapes: Array) -> Array:
-    """Local searches from the first free place along many directions; what `_search` cannot enumerate or finish."""
+    """Local searches from the first free position along many directions, for problems that `_search` cannot finish."""
     best = _descent(pairs, best)
     lengths = np.linalg.norm(escapes, axis=1)
     for escape, length in zip(escapes, lengths, strict=True):
@@ -186,7 +186,7 @@ def _descents(pairs: ObjectPair, best: Array, escapes: Array) -> Array:
 
 
 def _first_free(pairs: ObjectPair, direction: Array, reach: float) -> Array | None:
-    """March along a ray to the first place without overlap: within its depth, a pair cannot end."""
+    """March along a ray to the first position without overlap; a pair overlaps at least for its depth."""
     length = 0.0
     while length <= reach:
         found, depths, _ = pairs.overlapping(length * direction, TOUCHING)
@@ -197,7 +197,7 @@ def _first_free(pairs: ObjectPair, direction: Array, reach: float) -> Array | No
 
 
 def _descent(pairs: ObjectPair, translation: Array) -> Array:
-    """Shorten a translation that separates, with every pair kept on the side of the plane that now lies between it.
+    """Shorten a translation that separates, keeping every pair on its sides of the plane that now separates it.
 
     Each such plane is a sufficient condition, so the QP under all of them always has an answer, never a longer one, and
     its answer separates again.
@@ -216,7 +216,7 @@ def _descent(pairs: ObjectPair, translation: Array) -> Array:
 
 
 def _least_under(sides: Sides) -> Array | None:
-    """The QP  min |t|^2,  normals t >= offsets: the worst row is taken up until none is violated."""
+    """The QP  min |t|^2,  normals t >= offsets: the most violated row is added until none is violated."""
     answer, normals, offsets = np.zeros(3), np.zeros((0, 3)), np.zeros(0)
     for _ in range(MOST_ROWS):
         slack = sides.normals @ answer - sides.offsets

@@ -1,4 +1,4 @@
-"""The shapes people put around a figure: immutable, checked when they are made, each a union of convex pieces."""
+"""Shapes of things: immutable, checked when they are made, each a union of convex pieces."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class Capsule(Shape):
 
 @dataclass(frozen=True)
 class Ellipsoid(Shape):
-    """An ellipsoid, centred at its origin. Its distances are right to 1e-6 m and 1e-5 of its size.
+    """An ellipsoid, centred at its origin. Its distances are accurate to 1e-6 m and 1e-5 of its size.
 
     Attributes:
         semi_axes: half lengths along x, y and z, metres.
@@ -138,7 +138,7 @@ class HalfSpace(Shape):
     """Everything on one side of a plane: the points x with normal . x <= offset are solid.
 
     Attributes:
-        normal: out of the solid; made a unit vector.
+        normal: outward normal; converted to a unit vector.
         offset: distance of the plane from the origin along the normal, metres.
     """
 
@@ -186,16 +186,16 @@ class Hull(Shape):
 
 @dataclass(frozen=True, eq=False)
 class Mesh(Shape):
-    """A triangle mesh, split into convex pieces when they are first asked for.
+    """A triangle mesh, split into convex pieces when they are first needed.
 
     Attributes:
         source: path of an OBJ, STL, glTF, GLB or COLLADA file, or a pair of arrays (vertices (n, 3), faces (m, 3)).
         scale: metres for each unit of the file: 0.001 for millimetres.
-        up: axis of the file that points up; "y" is turned so that it points along z, and the file's z along -y.
-        max_vertices: most vertices of a piece that comes out of a decomposition; convex parts keep all of theirs.
-        threshold: concavity that a decomposition may leave, as a share of the part's size: smaller is closer, with
+        up: axis of the file that points up; with "y" the mesh is rotated: y to z, and the file's z to -y.
+        max_vertices: most vertices of a piece of a decomposition; convex parts keep all of theirs.
+        threshold: concavity of the pieces of a decomposition, as a share of the part's size: smaller is closer, with
             more pieces.
-        vertices: (n, 3) scaled and turned, read-only.
+        vertices: (n, 3) scaled and rotated, read-only.
         faces: (m, 3), read-only.
     """
 
@@ -224,7 +224,7 @@ class Mesh(Shape):
             raise InputError(
                 f"Mesh source is {shown(self.source)}; give the path of a file, or a pair of arrays (vertices, faces)"
             )
-        with np.errstate(over="ignore"):  # what overflows is refused as not finite
+        with np.errstate(over="ignore"):  # overflowed values are refused as not finite
             vertices = vertices * scale
         vertices, faces = check_mesh(vertices, faces, self._name())
         vertices = vertices @ Y_UP.T if self.up == "y" else vertices.copy()

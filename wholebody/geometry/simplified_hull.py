@@ -1,4 +1,4 @@
-"""Fewer vertices for a hull without losing any of it: a simpler hull around it.
+"""A simpler hull around a hull, with fewer vertices.
 
 Dropping vertices would leave parts of the surface uncovered, and a posture could be free of contact and still inside.
 """
@@ -11,17 +11,17 @@ from wholebody.arrays import Array
 from wholebody.geometry.pieces import SMALLEST
 
 MANY_FACES = 1000
-"""Faces from which on not all of them are tried."""
+"""Number of faces above which only some are tried."""
 
 SAME_NORMAL = 0.02
-"""Radians: of faces whose normals differ by less, one is tried."""
+"""Radians: of faces whose normals differ by less, only one is tried."""
 
 
 def simplified_hull(points: Array, max_vertices: int) -> Array:
-    """Vertices of a convex polytope that holds points and has few vertices.
+    """Vertices of a convex polytope that contains points and has few vertices.
 
-    The polytope is cut out by planes of the points' own hull: first a box about their principal axes, then again and
-    again the plane that cuts off most of the vertex that sticks out farthest, as long as the vertices stay few enough.
+    The polytope begins as a box along the points' principal axes. Planes of the points' own hull then cut it: each time
+    the plane that cuts most off the farthest protruding vertex, as long as the number of vertices allows.
 
     Args:
         points: (n, 3), enclosing a volume.
@@ -50,7 +50,7 @@ def simplified_hull(points: Array, max_vertices: int) -> Array:
         planes = np.vstack([planes, faces[plane]])
         try:
             trial = _vertices(planes, inside)
-        except QhullError:  # planes that all but coincide: what is there already holds the points
+        except QhullError:  # nearly coincident planes: the present polytope already contains the points
             break
         if len(trial) > max_vertices:
             break

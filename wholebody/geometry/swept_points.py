@@ -1,8 +1,8 @@
 """A convex piece as swept points: points plus a radius (a swept sphere), and the flat faces between them.
 
-A sphere is one point with a radius, a capsule two, a box eight points without, a hull its vertices. Distances between
-pieces are coal's; the swept points say which places of a piece can touch next when a posture changes, which one witness
-point cannot (see `wholebody.geometry.contact_rows`).
+A sphere is one point with a radius, a capsule two points with a radius; a box is eight points and a hull its vertices,
+without a radius. coal computes the distances between pieces. The swept points show which parts of a piece can touch
+next when the posture changes; one witness point cannot show that (see `wholebody.geometry.contact_rows`).
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ class SweptPoints(NamedTuple):
     """One piece as swept points, in the piece's own frame.
 
     Attributes:
-        points: (m, 3) swept points; empty where one witness point says everything (ellipsoid, half-space).
-        radius: what is added around the points, metres.
+        points: (m, 3) swept points; empty if one witness point is sufficient (ellipsoid, half-space).
+        radius: radius around the points, metres.
         faces: (f, 4) rows [n, b] with n . x <= b inside; for a capsule only the two caps' planes.
         reach: radius about the piece's origin that contains the piece; inf for a half-space.
         axis: unit direction of a capsule, zero for everything else.
-        width: least distance between two parallel planes that hold the piece; inf for a half-space.
+        width: least distance between two parallel planes that enclose the piece; inf for a half-space.
     """
 
     points: Array

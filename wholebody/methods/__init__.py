@@ -1,4 +1,4 @@
-"""How a posture is found: one module or folder a method."""
+"""The methods that find postures: one module or folder a method."""
 
 from importlib.util import find_spec
 
@@ -6,9 +6,9 @@ METHODS = ("qp", "ccd", "newton", "placo", "dls")
 """Names of all methods, the same in Python, in task files and on the command line."""
 
 EXTRAS = {"placo": "placo"}
-"""Methods whose package an extra installs -> the package, after which the extra is called."""
+"""Methods whose package an extra installs -> the package; the extra has the same name."""
 
 
 def installed_methods() -> tuple[str, ...]:
-    """Names of the methods that can be used here: all, but those whose package is not installed."""
+    """Names of the methods that can be used here: all except those whose package is not installed."""
     return tuple(name for name in METHODS if name not in EXTRAS or find_spec(EXTRAS[name]) is not None)

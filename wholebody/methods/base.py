@@ -1,6 +1,6 @@
-"""What every method is: the protocols of methods, trackers and steps, and what several methods share.
+"""The protocols of methods, trackers and steps, and functions that several methods share.
 
-A comparison, a drag or a path uses a method by these alone, so a method of one's own takes part in them too.
+Comparisons, drags and paths use methods only through these protocols, so they work with your own methods too.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from wholebody.workspace import Workspace
 
 
 class Step(Protocol):
-    """Answer of one step or frame of a tracker; what else there is depends on the method."""
+    """Answer of one step or frame of a tracker; further attributes depend on the method."""
 
     @property
     def q(self) -> Array:
@@ -30,72 +30,72 @@ class Step(Protocol):
 
     @property
     def iterations(self) -> int:
-        """Iterations that it took."""
+        """Number of iterations."""
 
 
 class Tracker(Protocol):
-    """Follows the goals of one problem, which may move from call to call. For one figure and one thread at a time."""
+    """Follows the goals of one problem, which may move from call to call. It serves one thread at a time."""
 
     @property
     def problem(self) -> Problem:
-        """Whose goals are followed."""
+        """The problem whose goals it follows."""
 
     @property
     def workspace(self) -> Workspace:
-        """Its own; between calls it may be moved."""
+        """Its own workspace; between calls others may move it."""
 
     @property
     def unswept(self) -> float:
-        """Radians and metres: a frame's way up to this goes into nothing, without anybody else having to look.
+        """Length of motion, radians and metres, up to which a frame needs no sweep, because the tracker tested it.
 
-        Infinite where that is so for every frame, 0 where nobody looks after any.
+        Infinite if the tracker tests every frame, 0 if it tests none.
         """
 
     @property
     def leaves_overlap(self) -> bool:
-        """Whether its steps lead out of what came into the figure."""
+        """Whether its steps lead out of a thing that was moved into the figure."""
 
     def step(self, q: Array) -> Step:
-        """One step from the posture q (nq,) towards the goals, within the bounds on speeds."""
+        """One step from the posture q (nq,) towards the goals, within the velocity bounds."""
 
     def frame(self, q: Array, tolerance: float | None = None) -> Step:
-        """One frame of a motion: as many steps from q (nq,) as bring the goals within a tolerance, if they soon do.
+        """One frame of a motion: a few steps from q (nq,) until the goals are within a tolerance.
 
         Args:
-            q: where the frame begins.
-            tolerance: of the goals, metres and radians; None for one that serves on the way to a goal.
+            q: posture at the beginning of the frame.
+            tolerance: of the goals, metres and radians; None for the tracker's tolerance during a motion.
         """
 
     def solve(self, q: Array) -> Solution:
-        """The method's full answer for the present goals, begun at the posture q (nq,)."""
+        """The method's full answer for the present goals, from the start q (nq,)."""
 
     def nearest(self, q: Array) -> Solution:
-        """The same with measures that count from q, so that the nearest answer is sought."""
+        """The same with measures relative to q, which gives the nearest answer."""
 
     def ways_out(self, q: Array) -> Sequence[Array]:
-        """Postures (nq,) that lead out of what came into the figure at q, where no step does; there may be none."""
+        """Postures (nq,) that lead out of a thing in the figure at q, if no step does; there may be none."""
 
 
 class Method(Protocol):
-    """A way to solve a problem."""
+    """An algorithm that solves problems."""
 
     @property
     def name(self) -> str:
         """Name for tables."""
 
     def accepts(self, problem: Problem) -> str | None:
-        """None for a problem that the method can take; else the sentence that names what it cannot, and the mend.
+        """None if the method can take the problem; otherwise a sentence with the unsupported terms and the correction.
 
-        `solve` and `tracker` refuse with an `UnsupportedTermError` of this sentence, before anything is computed.
+        `solve` and `tracker` raise an `UnsupportedTermError` with this sentence before anything is computed.
         """
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture."""
 
     def tracker(self, problem: Problem, dt: float) -> Tracker:
-        """What follows the goals of a problem that move from call to call, in steps of `dt` seconds.
+        """A tracker that follows goals which move from call to call, in steps of `dt` seconds.
 
-        A method that cannot track returns a `SolvingTracker`, which solves every step anew.
+        A method that cannot track returns a `SolvingTracker`, which solves the problem anew at every step.
         """
 
 
@@ -103,7 +103,7 @@ class UnsupportedTermError(InputError):
     """A method cannot take some terms of a problem.
 
     Attributes:
-        terms: one text for each term: what it is and why it cannot be taken.
+        terms: one text for each term: its name and the reason.
     """
 
     def __init__(self, method: str, terms: Sequence[str]) -> None:
@@ -118,7 +118,7 @@ class UnsupportedTermError(InputError):
 
 
 def refusal(method: str, terms: Sequence[str]) -> str | None:
-    """What `Method.accepts` returns: None where there is nothing that the method cannot take, else the sentence.
+    """The return value of `Method.accepts`: None without unsupported terms, otherwise the sentence.
 
     Args:
         method: its name.
@@ -128,7 +128,7 @@ def refusal(method: str, terms: Sequence[str]) -> str | None:
 
 
 def named_terms(problem: Problem) -> list[tuple[str, object]]:
-    """All terms of a problem, each with its place and kind, such as "constraints[1], Balance"."""
+    """All terms of a problem, each with its index and class, such as "constraints[1], Balance"."""
     groups: tuple[tuple[str, Sequence[object]], ...] = (
         ("goals", problem.goals),
         ("constraints", problem.constraints),
@@ -157,13 +157,13 @@ class SolvedStep(NamedTuple):
 
 
 class SolvingTracker:
-    """Follows goals by solving every step anew from the posture at hand; bounds on speeds do not hold.
+    """Follows goals by solving the problem anew at every step from the present posture, without velocity bounds.
 
     Attributes:
-        problem: whose goals are followed.
+        problem: the problem whose goals it follows.
         dt: seconds a step.
-        workspace: its own; between calls it may be moved.
-        unswept: 0: nobody has looked at the way of a step.
+        workspace: its own workspace; between calls others may move it.
+        unswept: 0: no step is tested for passing through things.
         leaves_overlap: False.
     """
 
@@ -174,46 +174,46 @@ class SolvingTracker:
         """Set up.
 
         Args:
-            method: that solves.
-            problem: what is asked.
+            method: solves the steps.
+            problem: the problem.
             dt: seconds a step.
-            rough: that solves frames on the way to a goal; the method itself where None.
+            rough: solves frames during a motion; None for the method itself.
 
         Raises:
-            InputError: dt is not a positive finite number, the scene changed after the problem was stated, or the
+            InputError: dt is not a positive finite number, the scene changed after the problem was made, or the
                 method cannot take the problem.
         """
         self.problem, self.dt = check_problem(problem, "tracker: problem"), time_step(dt, "dt")
         self.workspace = problem.workspace()
         self._method, self._rough = method, method if rough is None else rough
-        self._asked = copy.copy(problem)  # one for all steps: what a method builds for it serves again
+        self._asked = copy.copy(problem)  # one for all steps, so that methods can reuse what they build for it
 
     def step(self, q: Array) -> SolvedStep:
         """A whole solve from the posture q (nq,)."""
         return self.frame(q)
 
     def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
-        """A whole solve from the posture q (nq,), as exact as the method is set; rough without a tolerance."""
+        """A whole solve from the posture q (nq,): by the method, or without a tolerance by the rough method."""
         if tolerance is not None:
             number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
         solution = (self._rough if tolerance is None else self._method).solve(self._begun(q))
         return SolvedStep(np.asarray(solution.q, dtype=float), solution.iterations, solution.assessment.seconds)
 
     def solve(self, q: Array) -> Solution:
-        """The method's answer for the present goals, begun at the posture q (nq,)."""
+        """The method's answer for the present goals, from the start q (nq,)."""
         return self._method.solve(self._begun(q))
 
     def nearest(self, q: Array) -> Solution:
-        """The same with measures that count from q."""
+        """The same with measures relative to q."""
         return self._method.solve(nearest_to(self.problem, q))
 
     def ways_out(self, q: Array) -> Sequence[Array]:
-        """None."""
+        """No postures."""
         posture(q, self.workspace.model.nq)
         return ()
 
     def _begun(self, q: Array) -> Problem:
-        """The problem as it is now, begun at the posture q (nq,)."""
+        """The present problem with the start q (nq,)."""
         now, asked = self.problem, self._asked
         asked.start = posture(q, now.scene.model.nq)
         asked.goals, asked.constraints, asked.bounds, asked.measures = (
@@ -224,13 +224,13 @@ class SolvingTracker:
 
 
 def nearest_to(problem: Problem, q: Array) -> Problem:
-    """The problem begun at the posture q (nq,), with measures that count from there too, such as effort."""
+    """The problem with the start q (nq,), and with measures such as effort relative to q."""
     result = problem.with_start(q)
     result.measures = tuple(term.resolve(problem.scene, result.start) for term in problem.measures)
     return result
 
 
 def goal_error(problem: Problem, workspace: Workspace, q: Array) -> float:
-    """What is left to the goals at a posture (nq,), metres or radians, the largest norm."""
+    """Largest norm of a goal's error at a posture (nq,), metres or radians."""
     state = workspace.state.update(q)
     return max((float(np.linalg.norm(goal.error(state))) for goal in problem.goals), default=0.0)

@@ -1,4 +1,4 @@
-"""From where a search ended to a solution: the one place that says a status and a message."""
+"""Makes the solution from the end of a search; only this module decides status and message."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from wholebody.methods.control import Control
 from wholebody.problem import Problem
 from wholebody.solution import Solution, Status, TraceEntry
 
-SLACK = 1.05  # times the tolerance: an assessment measures with other arithmetic
+SLACK = 1.05  # factor on the tolerance: an assessment computes with other rounding
 COAL_ACCURACY = 1e-6  # m
 
 
 @dataclass(frozen=True)
 class Ending:
-    """Where a search ended, and what the solution is to say of it.
+    """The end of a search.
 
     Attributes:
         q: (nq,) the posture.
-        settled: whether it ended because nothing better is near, rather than out of iterations or time.
+        settled: whether the search converged, rather than ran out of iterations or time.
         iterations: of the method.
         trace: one entry an iteration.
-        how: what follows "solved".
-        unit: what a method that is not settled ran out of.
-        failure: why it could not go on, in words; "" where it could.
-        caveat: what is said where something that must hold does not.
-        remark: what is said in any case.
-        contradictions: what the search found the problem to contradict itself in; None where it did not look.
-        judgement: of the posture, where the search has made it already.
+        how: text after "solved" in the message.
+        unit: name of what a method that did not converge ran out of.
+        failure: why the method could not continue, in words; "" if it could.
+        caveat: text of the message if a constraint is violated.
+        remark: text at the end of every message.
+        contradictions: contradictions of the problem that the search found; None if it did not look for any.
+        judgement: the assessment of the posture, if the search has made it already.
     """
 
     q: Array
@@ -51,7 +51,7 @@ class Ending:
 
 
 def counted(tolerance: float) -> float:
-    """Error [m, rad] up to which an assessment counts as good for a method that meets everything to a tolerance."""
+    """Error [m, rad] up to which an assessment counts as good for a method with a tolerance."""
     return SLACK * tolerance + COAL_ACCURACY
 
 
@@ -61,12 +61,12 @@ def concluded(
     """The solution.
 
     Args:
-        problem: what was asked.
-        ending: where the search ended.
-        method: name of the method and of what it used.
+        problem: the problem.
+        ending: the end of the search.
+        method: name of the method and of its solver.
         tolerance: metres and radians to which the method meets goals and constraints.
-        control: that watched over the search.
-        began: when the call began, by `time.perf_counter`.
+        control: the control of the search.
+        began: `time.perf_counter` at the beginning of the call.
     """
     judgement = assess(problem, ending.q) if ending.judgement is None else ending.judgement
     status = _status(judgement, ending, counted(tolerance), bool(control.reason))
@@ -115,7 +115,7 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
 
 
 def _worst(problem: Problem, judgement: Assessment, q: Array) -> tuple[str, float]:
-    """What is farthest from holding, and by how much."""
+    """The most violated constraint, and its violation."""
     worst = max(
         ("the clearance of a pair", max(judgement.clearance_violation, judgement.penetration)),
         ("a joint limit", judgement.limit_violation),

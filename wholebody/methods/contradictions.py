@@ -1,11 +1,12 @@
-"""What a problem asks that no posture can give, found before anything is searched.
+"""Contradictions: infeasibility of a problem that is proven before any search.
 
-Joints that cannot turn make rigid groups of segments; a hold of a frame tells where its whole group is. Two tellings
-that differ, a group that is held inside of something that does not move, and a goal that is elsewhere on a group whose
-place is told, contradict each other whatever the other joints do.
+Joints that cannot turn join segments into rigid groups, and a hold of a frame fixes the placement of its whole group.
+Three kinds of contradictions hold for all values of the other joints: two holds that fix one group at different
+placements; a fixed group that penetrates something that does not move; and a goal for a point of a fixed group at a
+different position.
 
-So do a goal inside of something that does not move and the part that is to be there: where a piece of that part holds
-the point that is to reach the goal, the point stays outside by the clearance, and the goal's depth is left as well.
+A goal inside of something that does not move is unreachable if the point that is to reach it lies inside a piece: then
+the point stays outside by the clearance, and the error is at least the clearance plus the goal's depth.
 """
 
 from __future__ import annotations
@@ -27,18 +28,18 @@ from wholebody.tasks.inputs import find_place
 from wholebody.tasks.point import Point
 from wholebody.workspace import Workspace
 
-CLEAR = 1e-4  # m, rad: what differs by less is left to the search
-NEAREST = 1.02  # times the least that can be left of the goals, up to which a posture is taken for the nearest
-ON_SURFACE = 2e-6  # m: a point that is outside of a piece by less, coal's accuracy twice, is on its surface
+CLEAR = 1e-4  # m, rad: smaller differences are left to the search
+NEAREST = 1.02  # factor on the least possible goal error, up to which a posture counts as the nearest
+ON_SURFACE = 2e-6  # m: a point outside of a piece by less (twice coal's accuracy) is on its surface
 
 
 class Contradiction(NamedTuple):
-    """Two things that cannot both be.
+    """Two requirements that exclude each other.
 
     Attributes:
-        status: what an answer can be at best: "infeasible", or "unreachable" where a goal is one of the two.
-        text: both, and how far apart they are.
-        least: by how much, metres, any posture misses the goal, where it matters which posture it is; else zero.
+        status: the best possible status: "infeasible", or "unreachable" if one of the two is a goal.
+        text: both, and their difference.
+        least: lower bound of the goal's error, metres, if the error depends on the posture; otherwise zero.
     """
 
     status: Literal["infeasible", "unreachable"]
@@ -47,17 +48,17 @@ class Contradiction(NamedTuple):
 
 
 class _Told(NamedTuple):
-    """Where a rigid group is, and who says so."""
+    """The placement of a rigid group, and the term that fixes it."""
 
     placement: pin.SE3
     by: str
 
 
 def contradictions(problem: Problem, workspace: Workspace) -> tuple[Contradiction, ...]:
-    """Everything that contradicts itself, what must hold first.
+    """All contradictions, those of constraints first.
 
     Args:
-        problem: what is asked.
+        problem: the problem.
         workspace: of the run; its state is left at the problem's start.
     """
     finder = _Finder(problem, workspace)
@@ -69,7 +70,7 @@ def contradictions(problem: Problem, workspace: Workspace) -> tuple[Contradictio
 
 
 class _Finder:
-    """The rigid groups of one problem, and where they are told to be."""
+    """The rigid groups of one problem, and their fixed placements."""
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
         self._problem, self._workspace = problem, workspace
@@ -88,7 +89,7 @@ class _Finder:
         self._told: dict[int, _Told] = {0: _Told(pin.SE3.Identity(), "the world")}
 
     def holds(self) -> None:
-        """Note where holds tell groups to be; those that differ contradict each other."""
+        """Collect the placements of groups that holds fix; different ones contradict each other."""
         for number, term in enumerate(self._problem.constraints):
             if not isinstance(term, Hold) or term.relative_to is not None:
                 continue
@@ -101,7 +102,7 @@ class _Finder:
                 self._told[group] = _Told(term.kept_at * local.inverse(), name)
 
     def pairs(self) -> None:
-        """Find pieces that cannot move and overlap, or come nearer than is asked."""
+        """Find pieces that cannot move and are nearer than their clearance."""
         table, geometry = self._workspace.table, self._workspace.geometry
         group = np.array([self._group[joint] for joint in table.joint.tolist()], dtype=np.intp)
         told = np.isin(group, list(self._told))
@@ -124,7 +125,7 @@ class _Finder:
                 return  # one is enough: such parts mostly overlap in many pieces
 
     def goals(self) -> None:
-        """Find goals that are elsewhere than their group is told to be, or than another goal on the same group."""
+        """Find goals that contradict the placement of their group, or another goal on the same group."""
         points: list[tuple[int, Array, Array, str]] = []
         for number, goal in enumerate(self._problem.goals):
             if not isinstance(goal, (Point, Frame, Orientation)):
@@ -150,7 +151,7 @@ class _Finder:
                 points.append((group, place, wanted, name))
 
     def goals_inside(self) -> None:
-        """Find points that are to be inside of things which their own piece may not enter."""
+        """Find goals for points inside of things that the points' own piece must not penetrate."""
         table, geometry = self._workspace.table, self._workspace.geometry
         for number, goal in enumerate(self._problem.goals):
             if not isinstance(goal, (Point, Frame)):
@@ -178,7 +179,7 @@ class _Finder:
                 self.found.append(Contradiction("unreachable", text, deepest))
 
     def _depth(self, index: int, point: Array) -> float:
-        """How deep a point (3,) is inside a piece, metres, both in the frame of the piece's joint."""
+        """Depth of a point (3,) inside a piece, metres, both in the frame of the piece's joint."""
         body = self._workspace.geometry.geometryObjects[index]
         at = coal.Transform3s(body.placement.rotation, body.placement.translation)
         there = coal.Transform3s(np.eye(3), np.asarray(point, dtype=float))
@@ -186,7 +187,7 @@ class _Finder:
         return -float(coal.distance(body.geometry, at, coal.Sphere(ON_SURFACE), there, ask, answer)) - ON_SURFACE
 
     def _centers(self, group: NDArray[np.intp]) -> Array:
-        """Origins (n, 3) of the pieces, of told groups where they are told to be."""
+        """Origins (n, 3) of the pieces; those of fixed groups at their fixed placements."""
         center: Array = self._workspace.near(self._problem.start, 0.0).placements[:, 3].copy()
         for told, (at, _) in self._told.items():
             moved = at * self._start.oMi[told].inverse()
@@ -195,21 +196,21 @@ class _Finder:
         return center
 
     def _local(self, joint: int) -> pin.SE3:
-        """Where a joint is in its group."""
+        """Placement of a joint in its group."""
         return self._start.oMi[self._group[joint]].actInv(self._start.oMi[joint])
 
     def _frame(self, name: str) -> tuple[int, pin.SE3]:
-        """The group that carries a frame, and where the frame is in it."""
+        """The group that carries a frame, and the frame's placement in it."""
         place = find_place(self._problem.scene, name, "")
         frame = self._problem.scene.model.frames[place.frame]
         return self._group[place.joint], self._local(place.joint) * frame.placement
 
     def _at(self, group: int, local: pin.SE3) -> pin.SE3 | None:
-        """Where something of a group is in the world, if that is told."""
+        """Placement in the world of a local placement of a group, if the group is fixed."""
         return self._told[group].placement * local if group in self._told else None
 
     def _piece(self, index: int, joint: int) -> pin.SE3:
-        """Where a piece is: in the world if that is told, else in its group."""
+        """Placement of a piece: in the world if its group is fixed, otherwise in its group."""
         local = self._local(joint) * self._workspace.geometry.geometryObjects[index].placement
         here = self._at(self._group[joint], local)
         return local if here is None else here
@@ -241,22 +242,22 @@ def in_words(found: tuple[Contradiction, ...]) -> str:
 
 
 def least_left(found: tuple[Contradiction, ...]) -> float | None:
-    """Norm of the goals' errors that every posture leaves at least, metres; None where no search can serve."""
+    """Lower bound of the norm of the goals' errors, metres; None if no search can succeed."""
     if not all(each.least for each in found):
         return None
     return float(np.linalg.norm([each.least for each in found]))
 
 
 def proven(status: Status, found: tuple[Contradiction, ...]) -> Status:
-    """The status of an answer to a problem that contradicts itself: more iterations would not have served."""
+    """The status of an answer to a contradictory problem, which more iterations would not change."""
     return found[0].status if found and status == "stalled" else status
 
 
 def explanation(problem: Problem) -> str:
-    """One sentence about what a problem asks that no posture can give; empty where nothing is found.
+    """One sentence about the contradictions of a problem; empty if there are none.
 
     Raises:
-        InputError: objects came to or left the scene after the problem was stated.
+        InputError: objects were added to or removed from the scene after the problem was made.
     """
     with problem.lend() as workspace:
         return in_words(contradictions(problem, workspace))

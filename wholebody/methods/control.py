@@ -1,4 +1,4 @@
-"""What ends a solve before it has finished: a time limit, the caller's progress function, Ctrl-C."""
+"""Early end of a solve: by a time limit, the caller's progress function, or Ctrl-C."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ from wholebody.errors import InputError
 from wholebody.solution import TraceEntry
 
 LONGEST = 4.0
-"""Seconds of processor time that a solve may take where no time limit is given. Few come near it, and how loaded the
-machine is does not change their answers."""
+"""Default time limit of a solve, seconds of processor time. Few solves take as long. The load of the machine does not
+change it."""
 
 LIMITS = (1e-9, 1e9)
 """Least and greatest time limit, seconds."""
 
 Progress = Callable[[TraceEntry], Any]
-"""Called after every iteration with its entry of the trace; where it returns True, the solve ends."""
+"""Called after every iteration with its entry of the trace; if it returns True, the solve ends."""
 
 
 class Control:
-    """Watches over one solve; methods ask it once an iteration.
+    """Decides when one solve ends early; methods call it once an iteration.
 
     A context manager: inside it, in the main thread, a first Ctrl-C ends the solve, which then answers with the best
     posture so far. A second one raises KeyboardInterrupt as usual.
 
     Attributes:
-        reason: why the solve was ended, for its message; empty while it was not.
+        reason: why the solve was ended, for its message; empty before.
     """
 
     def __init__(self, time_limit: float | None = None, progress: Progress | None = None) -> None:
-        """Begin to count.
+        """Start the clock.
 
         Args:
             time_limit: seconds on the clock; None for `LONGEST` of processor time, infinity for no limit.
@@ -65,14 +65,14 @@ class Control:
 
     @property
     def spent(self) -> float:
-        """Share of the time limit that is over."""
+        """Share of the time limit that has passed."""
         return (self._now() - self._began) / (LONGEST if self._time_limit is None else self._time_limit)
 
     def _now(self) -> float:
         return time.thread_time() - compile_seconds() if self._time_limit is None else time.monotonic()
 
     def message(self, judgement: Assessment) -> str:
-        """Why the solve was ended and what is left then; empty where it was not ended."""
+        """Why the solve was ended, and the remaining errors; empty if it was not ended."""
         if not self.reason:
             return ""
         left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
@@ -80,12 +80,12 @@ class Control:
         return f"{self.reason}: {left}" + (f", and what must hold is missed by {broken:.3g} m or rad" * (broken > 1e-4))
 
     def tell(self, entry: TraceEntry) -> None:
-        """Tell the caller of an iteration."""
+        """Report an iteration to the caller."""
         if self._progress is not None and self._progress(entry) is True and not self.reason:
             self.reason = "progress ended it"
 
     def __enter__(self) -> Control:
-        """Take Ctrl-C over, where it would raise KeyboardInterrupt."""
+        """Install the handler of Ctrl-C, if Ctrl-C would raise KeyboardInterrupt."""
         main = threading.current_thread() is threading.main_thread()
         if main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             self._handler = signal.signal(signal.SIGINT, self._interrupt)
@@ -94,7 +94,7 @@ class Control:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Give Ctrl-C back."""
+        """Restore the handler of Ctrl-C."""
         if self._handler is not None:
             signal.signal(signal.SIGINT, self._handler)
             self._handler = None

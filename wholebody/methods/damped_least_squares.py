@@ -1,15 +1,15 @@
-"""Damped least squares: the textbook baseline, which knows no contacts.
+"""Damped least squares: the textbook baseline, which ignores contacts.
 
 The step is that of Wampler 1986 ("Manipulator inverse kinematic solutions based on vector formulations and damped
 least-squares methods") and Nakamura and Hanafusa 1986, ``dq = J' (J J' + lambda^2 I)^-1 e``, with the damping of
 Sugihara 2011 ("Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", eq. 19),
-``lambda^2 = e'e / 2 + damping^2``, which vanishes as the goals are met and stays where they cannot be. It bounds every
+``lambda^2 = e'e / 2 + damping^2``: small where the goals are met, and large where they cannot be. It bounds every
 step: ``|dq| <= |e| / (2 lambda) < 0.71``.
 
-Equalities that must hold come first and the goals within what they leave (Nakamura, Hanafusa and Yoshikawa 1987,
+Equality constraints have priority, and goals act in their null space (Nakamura, Hanafusa and Yoshikawa 1987,
 "Task-priority based redundancy control"): with the projector N on the null space of the equalities,
 ``dq = J1# e1 + (J2 N)# (e2 - J2 J1# e1)``. The pseudoinverses are damped, the projector is not, so that a goal out of
-reach does not pull on what is held (Baerlocher and Boulic 2004). A joint that a step would take over its limit stops at
+reach does not violate a hold (Baerlocher and Boulic 2004). A joint that a step would move over its limit stops at
 it, and the step is computed again without that joint.
 """
 
@@ -32,23 +32,23 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution, TraceEntry
 from wholebody.tasks.base import Constraint, Goal
 
-SHARE = 0.5  # of the tolerance: to what goals and equalities are met, so that the judge, who rounds otherwise, agrees
-REST = 1e-2  # share of the tolerance: a step smaller than this has come to rest
-RANK = 1e-8  # squared singular values below this share of the largest are taken for zero
+SHARE = 0.5  # of the tolerance, to which goals and equalities are met: the assessment rounds differently
+REST = 1e-2  # share of the tolerance: a smaller step counts as convergence
+RANK = 1e-8  # squared singular values below this share of the largest count as zero
 
 
 @dataclass(frozen=True)
 class DampedLeastSquares:
-    """Damped least squares, the textbook method: goals and equalities, limits by clamping, and no contacts at all.
+    """Damped least squares, the textbook method: goals and equalities, limits by clamping, without contacts.
 
     Takes every goal, and constraints that are equalities (`Hold`, `Plane` with side "on"); bounds such as `Freeze` too.
     Inequalities (`Balance`, `ReachCones`, `Plane` with side "above") are refused by name. Measures are reported, not
-    minimised: each step is the least motion, and there is one start. It may end inside of things, and then says so.
+    minimised: each step is the least motion, and there is one start. It may end in penetration, and then reports it.
 
     Attributes:
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most steps.
-        damping: damping that is left when the goals are met [m, rad]; more is steadier near singular postures, less
+        damping: remaining damping when the goals are met [m, rad]; more is steadier near singular postures, less
             converges faster.
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
             ends after four seconds of processor time.
@@ -74,18 +74,18 @@ class DampedLeastSquares:
         return "dls"
 
     def accepts(self, problem: Problem) -> str | None:
-        """None where all constraints are equalities; else the sentence that names the others."""
+        """None if all constraints are equalities; otherwise the sentence that names the others."""
         return refusal(self.name, _unsupported(check_problem(problem, "DampedLeastSquares.accepts: problem")))
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture. Goals out of reach are answers, not errors; contacts are not seen.
+        """Find a posture. Goals out of reach are answers, not errors; contacts are ignored.
 
         Args:
-            problem: what is asked.
+            problem: the problem.
             progress: see `wholebody.methods.control.Progress`.
 
         Raises:
-            InputError: the problem has a constraint that is not an equality, or its scene changed after it was stated.
+            InputError: the problem has a constraint that is not an equality, or its scene changed after it was made.
         """
         check_problem(problem, "DampedLeastSquares.solve: problem")
         began = time.perf_counter()
@@ -104,16 +104,16 @@ class DampedLeastSquares:
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
-        """What follows the goals of a problem by solving every step anew; contacts are not seen.
+        """A tracker that solves the problem anew at every step; contacts are ignored.
 
         Raises:
-            InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
+            InputError: dt is not a positive finite number, or the scene changed after the problem was made.
         """
         return SolvingTracker(self, problem, dt)
 
 
 class _Descent:
-    """One descent: the best posture so far, and the way there."""
+    """One descent: the best posture so far, and its trace."""
 
     def __init__(self, problem: Problem, method: DampedLeastSquares, state: State, control: Control) -> None:
         refused = _unsupported(problem)
@@ -126,7 +126,7 @@ class _Descent:
         self.steps = 0
 
     def run(self) -> bool:
-        """Descend; true where it came to rest or the goals are met, false where the iterations ran out."""
+        """Descend; true if it converged or the goals are met, false if the iterations ran out."""
         problem, method = self._problem, self._method
         enough = SHARE * method.tolerance
         q, step, best = self.best, 0.0, (np.inf, np.inf)
@@ -153,16 +153,16 @@ class _Descent:
         return False
 
     def _held(self) -> Array:
-        """What is missing of every equality."""
+        """Errors of all equalities."""
         return _joined([term.lower - np.atleast_1d(term.value(self._state)) for term in self._problem.constraints])
 
     def _wanted(self) -> Array:
-        """What is missing of every goal, by the root of its weight."""
+        """Errors of all goals, multiplied by the roots of their weights."""
         goals = self._problem.goals
         return _joined([-(goal.weight**0.5) * np.atleast_1d(goal.error(self._state)) for goal in goals])
 
     def _largest_error(self) -> float:
-        """As the assessment measures it: the longest error of a goal, metres or radians."""
+        """The largest norm of a goal's error, metres or radians, as in the assessment."""
         lengths = [0.0]
         for goal in self._problem.goals:
             error = np.atleast_1d(goal.error(self._state))
@@ -183,7 +183,7 @@ class _Descent:
             lower, upper = np.maximum(lower, low), np.minimum(upper, high)
         dq, free = np.zeros(state.model.nv), upper > lower
         stopped = np.zeros(state.model.nv)
-        while True:  # every round stops a joint more, so it ends
+        while True:  # every round stops one more joint, so the loop ends
             dq = _prioritised(
                 of_held[:, free],
                 held - of_held @ stopped,
@@ -201,7 +201,7 @@ class _Descent:
 
 
 def _prioritised(of_held: Array, held: Array, of_wanted: Array, wanted: Array, method: DampedLeastSquares) -> Array:
-    """Least motion (n,) that makes up for what is held first, and for what is wanted within what that leaves."""
+    """Least motion (n,) that corrects the equalities, and then the goals in the null space of the equalities."""
     if not len(held):
         return _damped(of_wanted, wanted, method.damping)
     first = _damped(of_held, held, method.damping)
@@ -237,7 +237,7 @@ def _joined(parts: list[Array]) -> Array:
 
 
 def _unsupported(problem: Problem) -> list[str]:
-    """Constraints that are no equalities."""
+    """Constraints that are not equalities."""
     return [
         f"constraints[{number}], {type(term).__name__} (it is no equality)"
         for number, term in enumerate(problem.constraints)

@@ -1,4 +1,4 @@
-"""Dragging with any method: a goal that moves, followed frame by frame.
+"""Dragging with any method: following a moving goal frame by frame.
 
 After Choi and Cremer 1999, section 3: a stream of nearby goals, each met with moderate accuracy and the last one with
 high.
@@ -25,8 +25,8 @@ from wholebody.solution import Solution
 from wholebody.tasks import Frame, Point, StepLimit
 from wholebody.workspace import Workspace
 
-FRAME = 1.0 / 60.0  # s: a frame of a screen
-LEGS = (np.inf, 0.01, 0.002)  # m, rad: how far the goal is followed in a frame, in turn where a longer way is not free
+FRAME = 1.0 / 60.0  # s: frame time of a screen
+LEGS = (np.inf, 0.01, 0.002)  # m, rad: distances by which the goal moves in a frame, tried until the motion is free
 
 
 class DragFrame(NamedTuple):
@@ -34,7 +34,7 @@ class DragFrame(NamedTuple):
 
     Attributes:
         q: (nq,) the posture.
-        error: what is left to the goals, metres or radians, the larger.
+        error: largest remaining goal error, metres or radians.
         iterations: iterations of the method.
         seconds: wall time.
     """
@@ -48,25 +48,25 @@ class DragFrame(NamedTuple):
 class Drag:
     """Follows a goal that is moved from frame to frame.
 
-    "qp" makes one quadratic program a frame, seldom up to three, "newton" a few Newton steps; other methods solve every
-    frame anew from the posture at hand, "ccd" to a millimetre. No method restarts elsewhere. Where the way to a posture
-    goes into something, the goal is followed by a shorter leg, or not in that frame. Where something came into the
-    figure, getting out of it comes first.
+    "qp" solves one quadratic program a frame, seldom up to three; "newton" takes a few Newton steps. Other methods
+    solve every frame anew from the present posture, "ccd" to a millimetre. No method restarts from other postures. If
+    the motion to a posture penetrates something, the goal moves by a shorter distance, or not in that frame. If a thing
+    was moved into the figure, the figure first leaves it.
 
     Attributes:
-        problem: what is asked; its goals are replaced as they move.
+        problem: the problem; its goals are replaced as they move.
         q: (nq,) the present posture.
-        tracker: the method's own for these goals.
+        tracker: the method's tracker of these goals.
     """
 
     def __init__(self, problem: Problem, method: str | Method = "qp", *, goal: int = 0, dt: float = FRAME) -> None:
-        """Take hold.
+        """Begin a drag at the problem's start.
 
         Args:
             problem: with the goal that will move, a `Point` or a `Frame`.
-            method: "qp", "ccd", "newton" or another by name, which is set for 1e-5 at the end and not to restart; or a
-                configured method, which is taken as it is.
-            goal: which of the problem's goals moves.
+            method: "qp", "ccd", "newton" or another by name, with a tolerance of 1e-5 at the end and no restarts; or a
+                configured method, which is used as it is.
+            goal: index of the goal that moves.
             dt: seconds a frame.
 
         Raises:
@@ -84,7 +84,7 @@ class Drag:
         self.q: Array = problem.scene.figure.clamp(problem.start)
 
     def to(self, target: Any) -> DragFrame:
-        """Move the goal to a place (or a placement, for a `Frame`), and make one frame towards it.
+        """Move the goal to a position (or a placement, for a `Frame`), and make one frame towards it.
 
         Raises:
             InputError: the target is not one.
@@ -102,16 +102,16 @@ class Drag:
             return DragFrame(self.q, error, iterations, time.perf_counter() - began)
 
     def finish(self) -> Solution:
-        """Meet the goal where it is now with the method's full accuracy, and judge the posture."""
+        """Meet the present goal with the method's full accuracy, and assess the posture."""
         with self._alone:
             solution = warm_started(self.problem, self.tracker, self.q)
             self.q = solution.q
             return solution
 
     def _followed(self) -> int:
-        """Move to a posture whose way is free, nearer to the goal by as long a leg as goes; the iterations it took.
+        """Move by the longest of `LEGS` towards the goal for which the motion is free; returns the iterations.
 
-        Where something came into the figure, out of it.
+        If a thing was moved into the figure, move out of it.
         """
         goal, deep = moving_goal(self.problem, self._number), self._came_in()
         try:
@@ -127,7 +127,7 @@ class Drag:
             if leg < error:
                 retarget(self.problem, self._number, interpolated_target(goal, left, leg / error))
             elif np.isfinite(leg):
-                continue  # the goal is no farther than that, and was asked for already
+                continue  # the goal is nearer than that, and was tried already
             step = self.tracker.frame(self.q)
             spent, q = spent + step.iterations, self._bounded(step.q)
             if is_free(self._workspace, self.q, q, self.tracker.unswept) and (
@@ -142,7 +142,7 @@ class Drag:
         return spent
 
     def _bounded(self, q: Array) -> Array:
-        """As far towards the posture q (nq,) as bounds on speeds let a frame go."""
+        """The motion towards the posture q (nq,), as far as the velocity bounds allow in a frame."""
         limits = [bound for bound in self.problem.bounds if isinstance(bound, StepLimit)]
         if not limits:
             return q
@@ -155,15 +155,15 @@ class Drag:
         return q if share >= 1.0 else np.asarray(pin.integrate(model, self.q, share * way))
 
     def _came_in(self) -> float:
-        """How deep something is in the figure, metres; 0 for little, and where the tracker sees to that by itself."""
+        """Depth of overlap of the figure, metres; 0 if it is small, or if the tracker itself leads out."""
         deep = 0.0 if self.tracker.leaves_overlap else _depth(self._workspace, self.q)
         return deep if deep > GRAZE else 0.0
 
     def _leave(self, tried: list[Array], deep: float) -> None:
-        """Out of what came in by `deep` metres, where no way that was tried is free and leads out.
+        """Move out of an overlap of `deep` metres, after no motion that was tried was free and led out.
 
-        Of the method's own ways out and the postures (nq,) that were tried, a free way is better than one that gets
-        deeper first, and then the less deep end.
+        The candidates are the tracker's ways out and the postures (nq,) that were tried. A free motion is better than
+        one that gets deeper first; among these the shallower end is better.
         """
         ends = [*(self._bounded(q) for q in self.tracker.ways_out(self.q)), *tried]
         depths = [_depth(self._workspace, q) for q in ends]

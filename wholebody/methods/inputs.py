@@ -1,4 +1,4 @@
-"""What methods take: the range of each setting, for the classes and for task files alike, and problems."""
+"""Checks of settings and problems; classes and task files share the ranges."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from wholebody.problem import Problem
 
 
 class Range(NamedTuple):
-    """Numbers that a setting may have, both ends included.
+    """Range of a setting, both ends included.
 
     Attributes:
         low: the least.
         high: the greatest.
-        whole: whether it is a whole number.
+        whole: whether the setting is a whole number.
     """
 
     low: float
@@ -22,7 +22,7 @@ class Range(NamedTuple):
     whole: bool = False
 
     def check(self, value: object, name: str) -> None:
-        """Raise InputError if a setting's value is none of these."""
+        """Raise InputError if a value is not in the range."""
         if self.whole:
             whole(value, name, int(self.low), int(self.high))
         else:
@@ -30,10 +30,10 @@ class Range(NamedTuple):
 
 
 TOLERANCE = Range(1e-10, 0.1)
-"""Metres and radians to which goals are met: finer is lost in rounding, coarser meets nothing."""
+"""Metres and radians to which goals are met: smaller ones are below rounding, larger ones are meaningless."""
 
 CCD_TOLERANCE = Range(1e-6, 0.1)
-"""The same for cyclic coordinate descent, which comes near slowly."""
+"""The same for cyclic coordinate descent, which converges slowly."""
 
 ITERATIONS = Range(1, 100_000, whole=True)
 BUDGET = Range(0, 1_000_000, whole=True)

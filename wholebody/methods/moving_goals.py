@@ -1,4 +1,4 @@
-"""Problems whose goals are moved, or that are begun elsewhere, without moving the caller's."""
+"""Copies of problems with moving goals or other starts, which leave the caller's problem unchanged."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from wholebody.tasks.base import Goal
 
 
 def copied(problem: Problem) -> Problem:
-    """A copy whose goals can be moved without moving the caller's.
+    """A copy whose goals can be moved without changing the caller's problem.
 
     Raises:
-        InputError: it is no problem, or objects came to or left its scene.
+        InputError: it is no problem, or objects were added to or removed from its scene.
     """
     check_problem(problem, "problem")
     problem.check_fresh()
@@ -30,7 +30,7 @@ def copied(problem: Problem) -> Problem:
 
 
 def refuse_assembly(problem: object, what: str) -> None:
-    """Refuse an assembly where a problem is taken: its goals have no numbers, and its bodies no shapes.
+    """Refuse an assembly in place of a problem: its goals have no indices, and its bodies no shapes.
 
     Raises:
         InputError: it is an assembly.
@@ -43,7 +43,7 @@ def refuse_assembly(problem: object, what: str) -> None:
 
 
 def moving_goal(problem: Problem, number: int) -> Point | Frame:
-    """The goal of this number, which can be moved.
+    """The goal of this index, which must be a `Point` or a `Frame`.
 
     Raises:
         InputError: there is no such goal, or it is of another kind.
@@ -69,7 +69,7 @@ def retarget(problem: Problem, number: int, target: Any) -> None:
 
 
 def interpolated_target(goal: Point | Frame, error: Array, share: float) -> Any:
-    """A target on the way of a goal's frame from where it has this error: a share of what is left."""
+    """A target between the frame, which has this error, and the goal: at a share of the distance."""
     if isinstance(goal, Point):
         return goal.resolved_target + (1.0 - share) * error
     target = goal.resolved_target

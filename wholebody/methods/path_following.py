@@ -1,4 +1,4 @@
-"""Path following with any method: a goal is brought along a path, from one intermediate goal to the next.
+"""Path following with any method: a goal moves along a path, from one intermediate goal to the next.
 
 After Choi and Cremer 1999, section 3: the intermediate goals are evenly spaced, and the last is the first that cannot
 be reached, or the end.
@@ -24,29 +24,29 @@ from wholebody.solution import Solution
 from wholebody.tasks import Point
 from wholebody.tasks.inputs import FARTHEST, point
 
-SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from nearer
+SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from a nearer start
 CLOSEST = 1e-6  # m: least spacing
 MOST_GOALS = 10_000
-FRAME = 1.0 / 60.0  # s: of the tracker, of which only whole solves are asked here
+FRAME = 1.0 / 60.0  # s: time step of the tracker, which makes only whole solves here
 
 
 def follow_path(
     problem: Problem, path: ArrayLike, method: str | Method = "newton", *, goal: int = 0, spacing: float = SPACING
 ) -> tuple[Solution, ...]:
-    """Bring a goal along a path, through evenly spaced intermediate goals.
+    """Move a goal along a path, through evenly spaced intermediate goals.
 
-    The first corner is gone to as `solve` would. Each goal after it is solved from the posture before; one whose
-    posture lies beyond something in the way counts as not reached.
+    `solve` finds the posture for the first corner. Each later goal is solved from the posture before. If the motion to
+    its posture is blocked, the goal counts as not reached.
 
     Args:
         problem: with the goal that moves, a `Point`.
-        path: (k, 3) corners of the path, metres; the first one is where the goal is met first.
-        method: by name, set for 1e-5 and not to restart, or a configured method.
-        goal: which of the problem's goals moves.
+        path: (k, 3) corners of the path, metres; the first one is the first target.
+        method: by name, with a tolerance of 1e-5 and no restarts, or a configured method.
+        goal: index of the goal that moves.
         spacing: metres between intermediate goals, at most.
 
     Returns:
-        A solution for each intermediate goal; the last one is the first that was not reached, or the end of the path.
+        A solution for each intermediate goal, up to the first that was not reached or the end of the path.
 
     Raises:
         InputError: the path is not one, the spacing is not positive, or the goal is not a `Point`.
@@ -70,7 +70,7 @@ def follow_path(
 
 
 def _spaced(path: ArrayLike, spacing: float) -> Sequence[Array]:
-    """Places (3,) along the corners of a path, its own among them."""
+    """Positions (3,) along a path, including its corners."""
     corners = checks.array(path, "path", "corners of shape (k, 3), metres")
     if corners.ndim != 2 or corners.shape[1] != 3 or len(corners) < 1:
         raise InputError(f"path has shape {corners.shape}; give corners of shape (k, 3), metres")

@@ -11,14 +11,14 @@ from wholebody.methods.inputs import check_problem
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
-AT_THE_END = 1e-5  # m, rad: to which a motion meets its goals at its end
+AT_THE_END = 1e-5  # m, rad: tolerance of the goals at the end of a motion
 
 
 def method_named(name: str) -> Method:
     """A method with its default settings.
 
     Raises:
-        UnknownNameError: there is none of this name.
+        UnknownNameError: there is no such method.
     """
     if name == "qp":
         from wholebody.methods.qp.method import QP
@@ -47,7 +47,7 @@ def as_method(given: object) -> Method:
     """A method from its name, or a configured one as it is.
 
     Raises:
-        UnknownNameError: there is none of this name.
+        UnknownNameError: there is no such method.
         InputError: it is neither.
     """
     if isinstance(given, str):
@@ -59,7 +59,7 @@ def as_method(given: object) -> Method:
 
 
 def method_for_motions(given: object) -> Method:
-    """A method for motions: given by name, it is set for 1e-5 and not to restart; a configured one is taken as it is.
+    """A method for motions: by name, with a tolerance of 1e-5 and no restarts; a configured one is used as it is.
 
     Raises:
         UnknownNameError: there is no such method.
@@ -79,15 +79,15 @@ def method_for_motions(given: object) -> Method:
 
 
 def solve(problem: Problem, method: str | Method = "qp", progress: Progress | None = None) -> Solution:
-    """Find a posture that fits a problem.
+    """Find a posture that solves a problem.
 
-    Ctrl-C ends it with the best posture so far, whose status is then "stalled".
+    Ctrl-C ends the solve with the best posture so far, whose status is then "stalled".
 
     Args:
-        problem: what is asked.
+        problem: the problem.
         method: "qp", "ccd", "newton", "placo", "dls", or a configured method such as
             `QP(solver="daqp", time_limit=0.1)`.
-        progress: called after every iteration with its entry of the trace (see `TraceEntry`); the solve ends where it
+        progress: called after every iteration with its entry of the trace (see `TraceEntry`); the solve ends if it
             returns True.
 
     Returns:
@@ -96,7 +96,7 @@ def solve(problem: Problem, method: str | Method = "qp", progress: Progress | No
 
     Raises:
         UnknownNameError: there is no such method.
-        InputError: the scene changed after the problem was stated, or the method cannot take some of its terms.
+        InputError: the scene changed after the problem was made, or the method cannot take some of its terms.
     """
     check_problem(problem, "solve: problem")
     return as_method(method).solve(problem, function(progress, "progress"))

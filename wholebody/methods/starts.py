@@ -1,4 +1,4 @@
-"""Other postures to begin from when the first start leads to a local minimum, and when enough of them were tried."""
+"""Other starts for when the first one leads to a local minimum, and a rule for when enough were tried."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.problem import Problem
 
-SPREADS = (0.3, 0.6, 1.0)  # share of each joint's range that a start may leave the first one by, in turn
-AT_LIMIT = 0.02  # rad: nearer to its limit than this a joint counts as at it
-BEND = 0.3  # rad: by which it is then moved off
-SAME_MINIMUM = 0.01  # share by which the values of one minimum differ at most; 0.05 takes neighbours for one
+SPREADS = (0.3, 0.6, 1.0)  # largest distance from the first start, as a share of each joint's range, in turn
+AT_LIMIT = 0.02  # rad: a joint nearer to its limit than this counts as at it
+BEND = 0.3  # rad: distance by which such a joint is moved off its limit
+SAME_MINIMUM = 0.01  # largest relative difference of values of one minimum; 0.05 merges neighbouring minima
 ROOT_SPREAD = 0.2  # m and rad, for joints without limits
 
 
 def bent(problem: Problem, state: State, start: Array) -> Array | None:
-    """The start, shape (nq,), with every joint that rests at a limit moved off it; None where there is none.
+    """The start, shape (nq,), with every joint at a limit moved off it; None if no joint is at a limit.
 
     Args:
-        problem: whose bounds are kept.
+        problem: its bounds are kept.
         state: of the run; it is moved.
         start: (nq,).
     """
@@ -43,15 +43,15 @@ def restarts(
     count: int,
     spreads: Sequence[float] = (),
 ) -> Iterator[Array]:
-    """Postures within limits, shape (nq,); farther and farther from the start as the spreads say, in turn.
+    """Random postures within limits, shape (nq,), at distances from the start that the spreads give in turn.
 
     Args:
-        problem: whose bounds are kept: frozen joints stay where they are.
+        problem: its bounds are kept: frozen joints stay where they are.
         state: of the run; it is moved.
         start: (nq,).
-        rng: where the randomness comes from.
+        rng: the random generator.
         count: how many.
-        spreads: share of each joint's range that each of them may leave the start by; `SPREADS` where empty.
+        spreads: largest distances from the start as shares of each joint's range; `SPREADS` if empty.
     """
     lower, upper = problem.scene.figure.tangent_bounds(start)
     span = np.where(np.isfinite(upper - lower), upper - lower, ROOT_SPREAD)
@@ -62,10 +62,10 @@ def restarts(
 
 
 class Minima:
-    """Local minima that descents from random starts ended in, and whether there are likely to be more.
+    """Local minima that descents from random starts found, and whether more are likely.
 
     With w different minima after n descents, the number of minima to expect is w (n - 1) / (n - w - 2) under a uniform
-    prior; where that is nearer to w than to w + 1, all are taken for found (C. G. E. Boender, A. H. G. Rinnooy Kan,
+    prior; if that is nearer to w than to w + 1, all count as found (C. G. E. Boender, A. H. G. Rinnooy Kan,
     "Bayesian stopping rules for multistart global optimization methods", Mathematical Programming 37, 1987).
     """
 
@@ -75,14 +75,14 @@ class Minima:
         self._count = 0
 
     def add(self, value: float, converged: bool) -> None:
-        """Note where a descent ended; one that did not converge is no minimum that others may be alike."""
+        """Add the end of a descent; the end of one that did not converge is no minimum with which others can agree."""
         self._count += 1
         if not any(abs(value - known) <= SAME_MINIMUM * value for known in self._values):
             self._values.append(value if converged else np.inf)
 
     @property
     def complete(self) -> bool:
-        """Whether all minima are taken for found."""
+        """Whether all minima count as found."""
         found, count = len(self._values), self._count
         return count > found + 2 and found * (count - 1) <= (found + 0.5) * (count - found - 2)
 

@@ -1,4 +1,4 @@
-"""Warm starts: solutions from the posture at hand, whose way from it is free; what motions are made of."""
+"""Warm starts for motions: solutions from the present posture to which the motion is free."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from wholebody.methods.base import Tracker
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
-WITHIN = 0.06  # m: pairs nearer than this are measured when a way is judged; larger = dearer, fewer left to a sweep
-PASSING = 1e-3  # m: a solution whose way goes in deeper gives way to a nearer one
+WITHIN = 0.06  # m: query distance when a motion is tested; larger = more distances and fewer sweeps
+PASSING = 1e-3  # m: if the motion to a solution gets deeper, a nearer solution is tried
 
 
 def warm_started(problem: Problem, tracker: Tracker, q: Array) -> Solution:
-    """Solve from the posture q (nq,); it is kept where the way from it passes through something.
+    """Solve from the posture q (nq,); the posture is kept if the motion to the solution passes through something.
 
-    Where the way to the best answer goes into something, the nearest answer is preferred; where the goal is not met
-    either way, the posture is kept too.
+    If the motion to the best answer penetrates something, the nearest answer is preferred; if neither meets the goal,
+    the posture is kept too.
 
     Args:
-        problem: what is asked.
+        problem: the problem.
         tracker: of a method for this problem.
-        q: the posture at hand.
+        q: the present posture.
     """
     solution = tracker.solve(q)
     if problem.scene.sweep(q, solution.q, PASSING) is None:
@@ -41,7 +41,7 @@ def warm_started(problem: Problem, tracker: Tracker, q: Array) -> Solution:
 
 
 def _passes_through(problem: Problem, before: Array, after: Array) -> bool:
-    """Whether something is passed through on the way between two postures (nq,)."""
+    """Whether the motion between two postures (nq,) passes through something."""
     with problem.lend() as workspace:
         first, last = (Placed(workspace.near(q, WITHIN), WITHIN) for q in (before, after))
         return passes_through(workspace, first, last, before, after)

@@ -1,4 +1,4 @@
-"""Kinds of values in a task file: what each accepts, how it says so, and what it says to a wrong one."""
+"""Kinds of values in a task file: the accepted values, their description, and the message about a wrong one."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from wholebody.taskfile.where import Where
 from wholebody.tasks.inputs import FARTHEST
 
 FAR = 1e15
-"""Beyond this no slip of units is guessed."""
+"""Values beyond this get no hint at a wrong unit."""
 
 _SLIPS = {
     "m": ((0.01, "centimetres"), (0.001, "millimetres")),
     "rad": ((math.pi / 180.0, "degrees"),),
     "kg": ((0.001, "grams"),),
 }
-"""Unit -> the units that people write by mistake, with what a number in them is worth."""
+"""Unit -> the units that people write by mistake, with their size in the unit."""
 
 
 class Kind(ABC):
-    """What a key accepts."""
+    """The values that a key accepts."""
 
     @property
     @abstractmethod
     def words(self) -> str:
-        """What it accepts, for the documentation and for errors."""
+        """The accepted values in words, for the documentation and for errors."""
 
     @abstractmethod
     def read(self, value: Any, where: Where) -> Any:
-        """Return the value as Python wants it.
+        """Return the value in the form that Python code takes.
 
         Raises:
-            FileFormatError: it is of another kind or out of range.
+            FileFormatError: the value is of another kind or out of range.
         """
 
     def names(self, value: Any, figure: Figure, where: Where) -> None:  # noqa: B027 - most kinds name nothing
@@ -178,7 +178,7 @@ class Name(Text):
 
     @property
     def words(self) -> str:
-        """What is named."""
+        """The kind of object that is named."""
         return f"name of a {self.noun}"
 
     def names(self, value: Any, figure: Figure, where: Where) -> None:
@@ -198,7 +198,7 @@ class Several(Kind):
 
     @property
     def words(self) -> str:
-        """What there are several of."""
+        """The list and its entries."""
         if self.example:
             return f"list such as {self.example}"
         return f"list, each a {self.kind.words}" if isinstance(self.kind, Text) else f"list, each {self.kind.words}"

@@ -1,4 +1,4 @@
-"""The documentation of task files, written from the same tables that the reader follows.
+"""The documentation of task files, written from the tables that the reader uses.
 
 ``python -m wholebody.taskfile.page`` prints it; docs/taskfile.md is its output.
 """
@@ -15,13 +15,13 @@ INTRODUCTION = """\
 
 <!-- Written by `python -m wholebody.taskfile.page`; change the tables in wholebody/taskfile, not this page. -->
 
-A task file states one problem in [TOML](https://toml.io): who is posed, what stands around, what to reach, what must
-hold and what to keep small. `wholebody pose TASK.toml` solves it, `wholebody show TASK.toml` shows it before, and
+A task file states one problem in [TOML](https://toml.io): the figure, the things around it, goals, constraints and
+measures. `wholebody pose TASK.toml` solves it, `wholebody show TASK.toml` shows its start, and
 `wholebody.read_task("TASK.toml")` gives the same problem to a script.
 
-Metres, radians, kilograms, seconds; z up, x forward, y left; quaternions x, y, z, w. Paths are relative to the task
-file. An unknown key, a name that the figure does not have, or a value out of range is refused with file, line, key and
-mend, before anything is computed.
+Units are metres, radians, kilograms and seconds; z is up, x forward, y left; quaternions are x, y, z, w. Paths are
+relative to the task file. An unknown key, a name that the figure does not have, or a value out of range is refused
+before anything is computed. The message names file, line, key and the correction.
 
 ```toml
 title = "Touch a point over a table"
@@ -76,7 +76,7 @@ def _chooser(table: Table) -> str:
         return ""
     implied = "".join(f"; may be left out beside `{key}`" for key, _ in table.implied)
     options = ", ".join(f'`"{name}"`' for name in table.forms)
-    return f"| `{table.chooser}` | {options} | which of the types below{implied} | yes |\n"
+    return f"| `{table.chooser}` | {options} | one of the types below{implied} | yes |\n"
 
 
 def _form(chooser: str, name: str, form: Form) -> str:

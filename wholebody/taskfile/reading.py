@@ -1,4 +1,4 @@
-"""From TOML to checked values: nothing is computed before every key of the file is known to be in order."""
+"""Reading of TOML into checked values: all keys of the file are checked before anything is computed."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from wholebody.taskfile.tables import Form, Key, Table
 from wholebody.taskfile.where import Where
 
 DEEPEST = 20
-"""Parts of a dotted key beyond which a file is no task."""
+"""Largest number of parts of a dotted key."""
 
 LONGEST = 300
-"""Characters of what the reader of TOML says that a sentence repeats."""
+"""Largest number of characters of a message of the TOML reader that our message quotes."""
 
 _DEEP_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST}}}""")
 _LONG_NUMBER = re.compile(r"[\d_]{4000}")
@@ -31,10 +31,10 @@ class Entry(NamedTuple):
 
     Attributes:
         where: its place.
-        form: its type, None where the table has none.
+        form: its type; None if the table has no types.
         name: name of the type.
-        keys: what can stand in it.
-        values: what does.
+        keys: the keys that it can have.
+        values: the values of the keys that it has.
     """
 
     where: Where
@@ -56,7 +56,7 @@ class Entry(NamedTuple):
         """Make the object of this type.
 
         Raises:
-            FileFormatError: the values are in order one by one but not together.
+            FileFormatError: the values contradict each other.
         """
         assert self.form is not None
         assert self.form.make is not None
@@ -82,7 +82,7 @@ def read_contents(path: Path) -> Contents:
     """Read a task file and check every table, key and value.
 
     Raises:
-        FileFormatError: with file, line, key and mend.
+        FileFormatError: with file, line, key and correction.
         UnknownNameError: a table, key or type that does not exist, with the nearest ones.
     """
     text = _text(path)

@@ -1,4 +1,4 @@
-"""What a table of a task file is: keys, each of a kind, and types with keys of their own."""
+"""The tables of a task file: keys, each of a kind, and types with keys of their own."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ class Key:
     """One key of a table.
 
     Attributes:
-        name: as it is written in the file; also the argument it becomes.
-        kind: what it accepts.
-        says: what it is for.
-        required: whether it must be there.
+        name: its name in the file; also the name of the argument.
+        kind: the accepted values.
+        says: its meaning, for the documentation.
+        required: whether the table must have it.
     """
 
     name: str
@@ -31,9 +31,9 @@ class Form:
     """One type of a table, such as a goal of type "point".
 
     Attributes:
-        says: what it is.
-        keys: its own keys, beside those of the table.
-        make: makes the object from the keys; None where the builder of the whole does it.
+        says: its meaning, for the documentation.
+        keys: its own keys, in addition to those of the table.
+        make: makes the object from the keys; None if the caller makes it.
     """
 
     says: str
@@ -46,11 +46,11 @@ class Table:
     """A table of the file.
 
     Attributes:
-        says: what it is for.
+        says: its meaning, for the documentation.
         keys: keys of every type.
-        many: whether there can be several, written in double brackets.
-        chooser: key that names the type; empty where there are no types.
-        implied: keys that only one type has and that stand for naming it: (key, type).
+        many: whether the file can have several, written in double brackets.
+        chooser: key that names the type; empty if there are no types.
+        implied: keys that only one type has and that imply it: (key, type).
         forms: types by name.
     """
 

@@ -1,4 +1,4 @@
-"""A task: the problem that a task file states, and the method it asks for."""
+"""A task: the problem that a task file states, and the method that it names."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ _T = TypeVar("_T")
 
 
 class View(NamedTuple):
-    """How a picture of the task is taken.
+    """The camera of a picture of the task.
 
     Attributes:
-        eye: where the camera is, metres; None where it finds its own place.
-        target: what is in the middle of the picture, metres; given with the eye.
+        eye: position of the camera, metres; None for an automatic one.
+        target: the point in the middle of the picture, metres; given with the eye.
         see_through: names of things drawn transparent.
     """
 
@@ -44,15 +44,15 @@ class View(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """What a task file says.
+    """The content of a task file.
 
     Attributes:
         path: the file.
         title: its title, or its name.
         problem: the problem, ready to be solved.
-        method: the method it asks for, with its settings.
-        goal_names: what each goal is called in tables: its type and what it moves.
-        view: how a picture of it is taken.
+        method: the method that it names, with its settings.
+        goal_names: the name of each goal in tables: its type and its frame.
+        view: the camera of a picture.
     """
 
     path: Path
@@ -73,7 +73,7 @@ def read_task(path: str | PathLike[str]) -> Task:
         FileFormatError: a file that cannot be read, or a value of the wrong kind or out of range; file, key and mend
             are named.
         UnknownNameError: an unknown key, type, joint, frame or posture, or a missing file, with the nearest names.
-        InputError: values that are in order one by one but cannot go together.
+        InputError: values that contradict each other.
     """
     file = checked_path(path, "path")
     contents = read_contents(file)
@@ -214,7 +214,7 @@ def _goal_name(entry: Entry) -> str:
 
 
 def _said(where: Where, call: Callable[[], _T]) -> _T:
-    """Call, and let what goes wrong name the place in the file."""
+    """Call, and add the place in the file to an error."""
     try:
         return call()
     except UnknownNameError as error:

@@ -8,22 +8,22 @@ from wholebody.taskfile.kinds import DIRECTION, LENGTH, POSITION, Number
 from wholebody.taskfile.tables import Form, Key
 
 _STATURE = Key("stature", Number(1.3, 2.2, "m"), "the median of the sex if left out")
-_MASS = Key("mass", Number(25.0, 250.0, "kg"), "what goes with sex and stature if left out")
+_MASS = Key("mass", Number(25.0, 250.0, "kg"), "the usual mass for sex and stature if left out")
 _SEX = Key("sex", kinds.Choice(("male", "female")), "male if left out")
 _DETAIL = Key("detail", kinds.Choice(("spheres", "capsules", "hulls")), "of its geometry; capsules if left out")
 _BODY = (_SEX, _STATURE, _MASS)
 
 FIGURES = {
-    "human": Form("A person of 55 degrees of freedom.", (*_BODY, _DETAIL)),
+    "human": Form("A person with 55 degrees of freedom.", (*_BODY, _DETAIL)),
     "avatar": Form("A person with a stiff torso: arms, legs and neck.", (*_BODY, _DETAIL)),
     "hand": Form("One hand.", (Key("side", kinds.Choice(("left", "right")), "right if left out"), *_BODY)),
     "urdf": Form(
         "Any URDF or MJCF, with its own collision geometry.",
         (
             Key("path", kinds.Text(), "the file, relative to the task file", True),
-            Key("root", kinds.Choice(("fixed", "free")), "as the file says if left out, else fixed"),
+            Key("root", kinds.Choice(("fixed", "free")), "as in the file if left out, otherwise fixed"),
             Key("package_dirs", kinds.Several(kinds.Text()), "folders for package:// names, relative to the task file"),
-            Key("concavity", Number(0.01, 1.0), "left in the pieces of meshes, of their size; hulls if left out"),
+            Key("concavity", Number(0.01, 1.0), "of the pieces of meshes, relative to their size; hulls if left out"),
         ),
     ),
 }
@@ -40,7 +40,7 @@ SHAPES = {
         "An ellipsoid, centred.", (Key("semi_axes", kinds.Vector(3, LENGTH), "half lengths", True),), shapes.Ellipsoid
     ),
     "halfspace": Form(
-        "All that lies below a plane, such as the ground.",
+        "The half-space below a plane, such as the ground.",
         (
             Key("normal", DIRECTION, "out of the solid; up if left out"),
             Key("offset", Number(-100.0, 100.0, "m"), "of the plane along the normal; 0 if left out"),
@@ -54,8 +54,8 @@ SHAPES = {
             Key("path", kinds.Text(), "relative to the task file", True),
             Key("scale", Number(1e-6, 1e3), "metres to one unit of the file; 1 if left out"),
             Key("up", kinds.Choice(("z", "y")), "axis of the file that points up; z if left out"),
-            Key("max_vertices", Number(8, 256, whole=True), "of a piece where the file is not convex; 32 if left out"),
-            Key("threshold", Number(0.01, 1.0), "concavity left in a piece, of its size; 0.05 if left out"),
+            Key("max_vertices", Number(8, 256, whole=True), "of a piece if the mesh is not convex; 32 if left out"),
+            Key("threshold", Number(0.01, 1.0), "concavity of a piece, relative to its size; 0.05 if left out"),
         ),
     ),
 }

@@ -1,4 +1,4 @@
-"""The place in a task file that an error speaks of."""
+"""The place in a task file that an error names."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class Where:
 
     Attributes:
         file: the task file.
-        text: what it says; used to find lines.
+        text: its text, used to find lines.
         table: name of the table; empty at the top of the file.
-        number: which of the tables of that name, from 1; 0 where there can be one only.
+        number: number of the table among those of its name, from 1; 0 if there can be only one.
         key: key in the table; empty for the table as a whole.
     """
 
@@ -43,7 +43,7 @@ class Where:
         return FileFormatError(f"{self}: {sentence}")
 
     def __str__(self) -> str:
-        """Return file, line where it is known, table and key."""
+        """Return file, line if known, table and key."""
         line = self._line()
         table = f"{self.table} {self.number}" if self.number else self.table
         file, key = one_line(self.file.name), one_line(self.key)
@@ -51,7 +51,7 @@ class Where:
         return ", ".join(part for part in parts if part)
 
     def _line(self) -> int | None:
-        """Line of the key if it is written on a line of its own, else of its table's header."""
+        """Line of the key if it is on a line of its own, otherwise of its table's header."""
         header: int | None = None if self.table else 0
         seen = 0
         key = self.key.split(".")[0].split("[")[0]

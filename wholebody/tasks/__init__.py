@@ -1,4 +1,4 @@
-"""What can be asked of a posture: goals, constraints, bounds and measures, one small class each."""
+"""Goals, constraints, bounds and measures, one small class each."""
 
 from wholebody.tasks.axis import Axis
 from wholebody.tasks.balance import Balance

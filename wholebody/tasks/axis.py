@@ -1,10 +1,10 @@
-"""A direction of the figure along a direction or towards a place: gaze, palm, the barrel of a tool.
+"""Goal: an axis of a frame along a direction or towards a point, such as a gaze, a palm, or the barrel of a tool.
 
-Let t1 and t2 be two directions at right angles to the axis a, all turning with the frame, and d the direction asked
-for. With x = (t1 . d, t2 . d), s its length, c = a . d and theta = atan2(s, c), the error is theta x / s: the angle,
-spread over the two directions in which it can be made smaller. This is the azimuthal equidistant projection of the
-sphere (Snyder 1987, "Map Projections: A Working Manual", chapter 25). Its derivative along the error is 1 at every
-angle, so none is a trap; across the error it is theta / s.
+Let t1 and t2 be two directions perpendicular to the axis a, all fixed to the frame, and d the target direction. With x
+= (t1 . d, t2 . d), s its length, c = a . d and theta = atan2(s, c), the error is theta x / s: the angle, resolved along
+t1 and t2. This is the azimuthal equidistant projection of the sphere (Snyder 1987, "Map Projections: A Working Manual",
+chapter 25). Its derivative along the error is 1 at every angle, so no angle is stationary; across the error it is theta
+/ s.
 """
 
 from __future__ import annotations
@@ -27,32 +27,32 @@ from wholebody.tasks.base import Goal, Surroundings, filled
 STEEPEST = pi / sin(pi / 180.0)
 """Largest derivative across the error, reached one degree before the opposite direction.
 
-The exact one is infinite at the opposite direction, where a step of any size can go any way round. Capping it keeps the
-rows in a range that QP solvers handle, and leaves the gradient of the squared error exact, which has no part across.
+The exact derivative is infinite at the opposite direction. The cap keeps the rows in a range that QP solvers handle.
+The gradient of the squared error stays exact, because it has no component across the error.
 """
 
 NO_ANGLE = 1e-12
 """Sine below which the error has no direction of its own, so the first of the two is taken."""
 
 TOUCHING = 1e-6
-"""Distance [m] below which a place has no direction from the frame; the goal then counts as met."""
+"""Distance [m] below which a point has no direction from the frame; the goal then counts as met."""
 
 
 @dataclass(frozen=True, eq=False)
 class Axis(Goal):
-    """Turn an axis of a frame into a direction, or point it towards a place; turning about the axis is free.
+    """Turn an axis of a frame into a direction, or point it towards a point; rotation about the axis is free.
 
-    The error has two rows whose length is the angle between the two, from 0 to pi [rad]. From the exactly opposite
-    direction the figure turns about a fixed direction of the frame.
+    The error has two rows; its norm is the angle between the axis and the target direction, from 0 to pi [rad]. If the
+    axis has exactly the opposite direction, the figure turns about a fixed direction of the frame.
 
     Attributes:
         frame: name of the frame, segment or joint.
         axis: (3,) the axis in the frame, such as (1, 0, 0); any length.
-        direction: (3,) where it should point in the world; any length.
-        toward: (3,) the place in the world it should point to, seen from the frame's origin [m].
+        direction: (3,) its target direction in the world; any length.
+        toward: (3,) the point in the world to which it should point from the frame's origin [m].
         weight: factor on the squared error [1/rad^2].
         place: the frame and the joint that carries it, once resolved.
-        basis: (3, 3) rows in the frame: two directions at right angles to the axis, and the axis, each of length 1.
+        basis: (3, 3) rows in the frame: two directions perpendicular to the axis, and the axis, each of length 1.
         resolved_target: (3,) `direction` as a unit vector, or `toward` [m].
 
     Raises:
@@ -92,7 +92,7 @@ class Axis(Goal):
         return np.ones(2, dtype=bool)
 
     def error(self, state: State) -> Array:
-        """(2,) the angle along the two directions at right angles to the axis [rad]."""
+        """(2,) the angle along the two directions perpendicular to the axis [rad]."""
         frame = state.frame(self.place.frame)
         direction, distance = self._way(frame)
         if distance < TOUCHING:
@@ -106,7 +106,7 @@ class Axis(Goal):
         return np.array((x, y)) * (angle / sine)
 
     def jacobian(self, state: State) -> Wrench:
-        """Two rows: moments, and forces where the direction depends on where the frame is."""
+        """Two rows: moments, and also forces if the direction depends on the frame's position."""
         frame = state.frame(self.place.frame)
         direction, distance = self._way(frame)
         if distance < TOUCHING:
@@ -130,7 +130,7 @@ class Axis(Goal):
         return Wrench(rows, self.place.joint)
 
     def _way(self, frame: Any) -> tuple[Array, float]:
-        """Unit vector asked for, and how far away the place is that it points to; inf for a direction."""
+        """Target direction as a unit vector, and the distance of the target point; inf for a direction."""
         if self.toward is None:
             return self.resolved_target, np.inf
         way = self.resolved_target - frame.translation
@@ -146,7 +146,7 @@ class Axis(Goal):
 
 
 def _frame_about(axis: Array) -> Array:
-    """(3, 3) rows: two directions at right angles to a unit vector, and the vector itself."""
+    """(3, 3) rows: two directions perpendicular to a unit vector, and the vector itself."""
     helper = np.zeros(3)
     helper[int(np.argmin(np.abs(axis)))] = 1.0
     first = np.cross(axis, helper)

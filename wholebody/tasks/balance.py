@@ -1,4 +1,4 @@
-"""The centre of mass over the feet."""
+"""Constraint: the centre of mass above the support polygon of the feet."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from wholebody.tasks.support import convex_polygon, edges, shrunk, standing_poin
 
 @dataclass(frozen=True, eq=False)
 class Balance(Constraint):
-    """Keep the centre of mass over the support polygon of the feet, so that the figure can stand still.
+    """Keep the centre of mass above the support polygon of the feet, so that the figure can stand still.
 
-    The polygon is the convex hull of the places where the feet stand at the start; hold the feet there. A row for each
-    edge: the distance of the centre of mass from it, seen from above, positive inside [m].
+    The polygon is the convex hull of the points on which the feet stand at the start; hold the feet there. There is a
+    row for each edge: the horizontal distance of the centre of mass from it, positive inside [m].
 
     Attributes:
-        feet: names of the segments that carry the figure, with what hangs on them, such as toes.
+        feet: names of the segments that carry the figure, including their child segments, such as toes.
         margin: least distance from the edges [m].
         normals: (m, 2) unit normals of the edges of the support polygon, inward; once resolved.
         offsets: (m,) of the edges: inside, normals @ x >= offsets [m]; once resolved.
@@ -48,12 +48,12 @@ class Balance(Constraint):
         object.__setattr__(self, "margin", number(self.margin, "Balance: margin", 0.0, inputs.FARTHEST, "m"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Balance:
-        """Find where the feet stand.
+        """Compute the support polygon at the start.
 
         Raises:
             UnknownNameError: the figure has no such foot.
-            InputError: the feet have no pieces, stand on a line, or leave no room for the margin; or nothing that moves
-                has mass.
+            InputError: the feet have no pieces, stand on a line, or the polygon is smaller than the margin; or no
+                moving part has mass.
         """
         inputs.check_mass(scene, "Balance")
         corners = convex_polygon(standing_points(scene, start, self.feet)[:, :2])

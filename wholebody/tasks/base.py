@@ -1,7 +1,7 @@
-"""What every goal, constraint, bound and measure has in common.
+"""Base classes of goals, constraints, bounds and measures.
 
-A term is immutable and knows its figure only by names. `resolve` turns the names into indices and fills in what
-depends on the posture at the start; methods and the assessment use the resolved copy.
+A term is immutable and refers to its figure only by names. `resolve` returns a copy in which the names are indices and
+values that depend on the start are filled in; methods and the assessment use the resolved copy.
 
 All derivatives are taken with respect to the tangent displacement dq of the posture, ``pin.integrate(model, q, dq)``,
 of shape (nv,). A Jacobian is either dense, or a `Wrench` when its rows are wrenches between two joints: all wrenches of
@@ -27,11 +27,11 @@ _T = TypeVar("_T")
 
 
 class Surroundings(Protocol):
-    """What a term needs to know of a scene."""
+    """The part of a scene that a term uses."""
 
     @property
     def figure(self) -> Figure:
-        """What moves."""
+        """The figure."""
 
     @property
     def model(self) -> Any:
@@ -51,14 +51,14 @@ def filled(term: _T, **values: object) -> _T:
 
 
 class Term:
-    """Anything that can be asked of a posture."""
+    """Base of goals, constraints, bounds and measures."""
 
     def resolve(self: _T, scene: Surroundings, start: Array) -> _T:
         """Copy of the term that is ready to be evaluated on the scene.
 
         Args:
-            scene: the figure and what stands around it.
-            start: (nq,) posture that the problem starts from.
+            scene: the figure and the things around it.
+            start: (nq,) start posture of the problem.
 
         Raises:
             UnknownNameError: the term names a frame, joint or group that the figure does not have.
@@ -68,11 +68,11 @@ class Term:
 
 
 class Goal(Term, ABC):
-    """Something to reach: an equality, met if it can be."""
+    """An equality that is met if possible: ``error(state) = 0``."""
 
     @property
     def weight(self) -> float:
-        """Positive factor on the squared error [1/m^2 or 1/rad^2]; says which goal gives way when two conflict."""
+        """Positive factor on the squared error [1/m^2 or 1/rad^2]; it decides which of two goals gives way."""
         return 1.0
 
     @property
@@ -82,7 +82,7 @@ class Goal(Term, ABC):
 
     @abstractmethod
     def error(self, state: State) -> Array:
-        """(m,) what is left to do, in metres and radians; zero when the goal is met."""
+        """(m,) remaining error, in metres and radians; zero when the goal is met."""
 
     @abstractmethod
     def jacobian(self, state: State) -> Wrench | Array:
@@ -90,16 +90,16 @@ class Goal(Term, ABC):
 
 
 class Constraint(Term, ABC):
-    """Something that must hold always: ``lower <= value(state) <= upper``."""
+    """An equality or inequality that always holds: ``lower <= value(state) <= upper``."""
 
     @property
     def lower(self) -> Array:
-        """(m,) least allowed values, or one for all rows; -inf where there is none. The default asks for value >= 0."""
+        """(m,) least allowed values, or one for all rows; -inf for no bound. The default requires value >= 0."""
         return np.zeros(())
 
     @property
     def upper(self) -> Array:
-        """(m,) greatest allowed values, or one for all rows; inf where there is none, `lower` for an equality."""
+        """(m,) greatest allowed values, or one for all rows; inf for no bound, `lower` for an equality."""
         return np.full((), np.inf)
 
     @property
@@ -124,16 +124,16 @@ class Bound(Term, ABC):
         """Bounds on the tangent displacement from this state.
 
         Args:
-            state: where the figure is.
-            dt: length of the step in seconds, or None when a whole solve is not tied to time.
+            state: the present state.
+            dt: time step in seconds, or None for a whole solve, which has no time step.
 
         Returns:
-            Lower and upper bounds, each (nv,), in radians and metres; -inf and inf where there is none.
+            Lower and upper bounds, each (nv,), in radians and metres; -inf and inf for no bound.
         """
 
 
 class Measure(Term, ABC):
-    """Something to minimise. Value, gradient and curvature come without the weight; the problem multiplies by it."""
+    """A cost to minimise. Value, gradient and curvature are without the weight; the problem multiplies them by it."""
 
     @property
     def weight(self) -> float:
@@ -142,12 +142,12 @@ class Measure(Term, ABC):
 
     @abstractmethod
     def value(self, state: State) -> float:
-        """The measure itself."""
+        """The value of the measure."""
 
     @abstractmethod
     def gradient(self, state: State) -> Array:
         """(nv,) derivative of the value."""
 
     def curvature(self, state: State) -> Array:
-        """(nv,) positive diagonal that stands for the second derivative."""
+        """(nv,) positive diagonal that approximates the second derivative."""
         return np.ones(state.model.nv)

@@ -1,4 +1,4 @@
-"""Bounds on how far the joints move: those that do not move at all, and those that move only so fast."""
+"""Bounds on the displacement of joints: frozen joints and velocity limits."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Bound, Surroundings, filled
 
-SLOWEST, FASTEST = 1e-9, 1e9  # rad/s, m/s: what is slower is frozen, what is faster is not bounded
+SLOWEST, FASTEST = 1e-9, 1e9  # rad/s, m/s: least and greatest velocity limit
 
 
 class Freeze(Bound):
     """Keep joints as they are at the start, such as the lower body while the upper body works.
 
     Attributes:
-        joints: names of joints and groups; "root" for the figure's place in the world.
+        joints: names of joints and groups; "root" for the figure's placement in the world.
     """
 
     _lower: Array
     _upper: Array
 
     def __init__(self, *joints: str) -> None:
-        """Name what does not move.
+        """Name the frozen joints.
 
         Raises:
             InputError: nothing is named, or a name is not a string.
@@ -48,19 +48,19 @@ class Freeze(Bound):
         return filled(self, _upper=upper, _lower=-upper)
 
     def bounds(self, state: State, dt: float | None) -> tuple[Array, Array]:
-        """Zero for what is frozen."""
+        """Zero for frozen joints."""
         return self._lower, self._upper
 
 
 @dataclass(frozen=True, eq=False)
 class StepLimit(Bound):
-    """Bound how far a step of length dt moves: velocity times dt. A solve without a time step is not bounded.
+    """Bound the displacement of a step by velocity times dt. It does not bound a solve without a time step.
 
     Attributes:
-        velocity: of the joints [rad/s; m/s for sliding joints].
-        joints: other velocities for joints and groups, by name; a later name overrides an earlier one.
-        root_velocity: of the figure's place in the world, along each of its own axes [m/s].
-        root_turn: of its orientation, about each of its own axes [rad/s].
+        velocity: limit of the joints [rad/s; m/s for prismatic joints].
+        joints: other limits for joints and groups, by name; a later name overrides an earlier one.
+        root_velocity: limit of the root's translation, along each of its own axes [m/s].
+        root_turn: limit of the root's rotation, about each of its own axes [rad/s].
 
     Raises:
         InputError: a velocity is not a positive number.
@@ -99,7 +99,7 @@ class StepLimit(Bound):
         return filled(self, _velocity=velocity)
 
     def bounds(self, state: State, dt: float | None) -> tuple[Array, Array]:
-        """Velocity times dt to either side; none where dt is None."""
+        """Plus and minus velocity times dt; no bounds if dt is None."""
         reach = np.full_like(self._velocity, np.inf) if dt is None else self._velocity * dt
         return -reach, reach
 

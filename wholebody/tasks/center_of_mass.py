@@ -1,4 +1,4 @@
-"""The centre of mass at a place."""
+"""Goal: the centre of mass at a position."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from wholebody.tasks.base import Goal, Surroundings
 
 @dataclass(frozen=True, eq=False)
 class CenterOfMass(Goal):
-    """Bring the figure's centre of mass to a place, or above one.
+    """Move the figure's centre of mass to a position, or above one.
 
     The error is the centre of mass minus the target, in world axes [m].
 
     Attributes:
-        target: (3,) place in the world [m].
+        target: (3,) position in the world [m].
         axes: "xyz", or "xy" to leave the height free.
         weight: factor on the squared error [1/m^2].
-        resolved_target: (2,) or (3,) the part of `target` that counts [m].
+        resolved_target: (2,) or (3,) the components of `target` along `axes` [m].
 
     Raises:
         InputError: the target is not in metres, or the axes are others.
@@ -48,7 +48,7 @@ class CenterOfMass(Goal):
         """Return the goal itself.
 
         Raises:
-            InputError: nothing that moves has mass.
+            InputError: no moving part has mass.
         """
         inputs.check_mass(scene, "CenterOfMass")
         return self

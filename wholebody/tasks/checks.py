@@ -1,4 +1,4 @@
-"""Whether a term that somebody wrote says what it must: rows that fit together and numbers that are finite."""
+"""Checks of users' terms: shapes of rows that fit together, and finite numbers."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def check_rows(where: str, term: object, values: Any, jacobian: Any, state: Stat
     Args:
         where: its place, such as "goals[1]".
         term: the term.
-        values: what its `error` or `value` returned.
-        jacobian: what its `jacobian` returned.
-        state: where it was evaluated.
+        values: the return value of its `error` or `value`.
+        jacobian: the return value of its `jacobian`.
+        state: the state at which it was evaluated.
 
     Raises:
         InputError: shapes that do not fit, or a value that is not finite.

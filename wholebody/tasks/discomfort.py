@@ -1,4 +1,4 @@
-"""Discomfort: away from neutral, and close to the limits."""
+"""Measure: discomfort, the distance of joints from neutral and their nearness to limits."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ POWER = 200
 """Twice the exponent in eq. 3.14: the penalty is 1 at the limit, 0.2 at 5 % of the range from it and 0.002 at 10 %."""
 
 
-class _Joints(NamedTuple):
+class LimitedJoints(NamedTuple):
     """The n joints that have two limits.
 
     Attributes:
-        idx_q: (n,) places in the posture.
-        idx_v: (n,) places in the tangent.
+        idx_q: (n,) indices in the posture.
+        idx_v: (n,) indices in the tangent vector.
         neutral: (n,) values in the neutral posture.
         weights: (n,) g over the squared range.
         limits: (2, n) upper, then lower limits.
@@ -52,21 +52,22 @@ class Discomfort(Measure):
     ``(sin(5 r + 1.571) / 2 + 1)^100`` is 4e17 at a limit, whereas the text says it goes from 0 to 1. And g
     are the figure's `effort_weights`, which rank the joints as table 3.3 does, over the greatest of them, in place of
     weights of 1 to 1e8 over 1e6: the stiffest joint over its whole range weighs as much as a joint at its limit. Beyond
-    a limit P stays 1, with no slope.
+    a limit P stays 1, with zero slope.
 
     Attributes:
         weight: factor on the measure.
+        limited: the joints that have two limits, once resolved.
     """
 
     weight: float = 1.0
-    _joints: _Joints = field(init=False, repr=False)
+    limited: LimitedJoints = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the value."""
         object.__setattr__(self, "weight", inputs.weight(self.weight, "Discomfort: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Discomfort:
-        """Take the limits, the neutral posture and the weights of the figure."""
+        """Read the limits, the neutral posture and the weights of the figure."""
         figure = scene.figure
         limits = figure.limits
         moves = (limits.upper > limits.lower) & np.isfinite(limits.upper - limits.lower)
@@ -76,18 +77,18 @@ class Discomfort(Measure):
         weights = figure.effort_weights[idx_v]
         weights = weights / (max(float(weights.max(initial=0.0)), LEAST_CURVATURE) * span * span)
         phase = STEEPNESS * np.array([-1.0 / span, 1.0 / span])
-        return filled(self, _joints=_Joints(idx_q, idx_v, figure.neutral[idx_q], weights, ends, phase))
+        return filled(self, limited=LimitedJoints(idx_q, idx_v, figure.neutral[idx_q], weights, ends, phase))
 
     def value(self, state: State) -> float:
         """The discomfort."""
-        joints = self._joints
+        joints = self.limited
         q = state.q[joints.idx_q]
         away = q - joints.neutral
         return float(joints.weights @ (away * away) + (np.cos(self._phase(q)) ** POWER).sum())
 
     def gradient(self, state: State) -> Array:
         """(nv,) derivative [1/rad]."""
-        joints = self._joints
+        joints = self.limited
         q = state.q[joints.idx_q]
         phase = self._phase(q)
         slope = (-POWER * np.cos(phase) ** (POWER - 1) * np.sin(phase) * joints.phase).sum(axis=0)
@@ -97,7 +98,7 @@ class Discomfort(Measure):
 
     def curvature(self, state: State) -> Array:
         """(nv,) second derivative, which is diagonal; its negative part near the limits is left out [1/rad^2]."""
-        joints = self._joints
+        joints = self.limited
         phase = self._phase(state.q[joints.idx_q])
         cosine, sine = np.cos(phase), np.sin(phase)
         bend = POWER * cosine ** (POWER - 2) * ((POWER - 1) * sine * sine - cosine * cosine) * joints.phase**2
@@ -107,5 +108,5 @@ class Discomfort(Measure):
 
     def _phase(self, q: Array) -> Array:
         """(2, n) 2.5 r to the upper and lower limits, kept between zero at one limit and 2.5 at the other."""
-        joints = self._joints
+        joints = self.limited
         return np.asarray(np.minimum(np.maximum((q - joints.limits) * joints.phase, 0.0), STEEPNESS))

@@ -1,4 +1,4 @@
-"""How far the joints are from neutral."""
+"""Measure: distance of the joints from the neutral posture."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Displacement(Measure):
         object.__setattr__(self, "weight", inputs.weight(self.weight, "Displacement: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Displacement:
-        """Take the neutral posture and the weights of the figure."""
+        """Read the neutral posture and the weights of the figure."""
         figure = scene.figure
         return filled(self, distance=SquaredDistance.build(scene.model, figure.neutral, figure.neutral_weights))
 

@@ -11,7 +11,7 @@ from wholebody.arrays import Array
 from wholebody.figures.state import State
 
 LEAST_CURVATURE = 1e-6
-"""Curvature [1/rad^2] given to what a measure leaves free: positive, as methods need it, far below any in use."""
+"""Curvature [1/rad^2] of degrees of freedom without weight: positive, as methods require, and far below any in use."""
 
 
 class SquaredDistance(NamedTuple):
@@ -21,7 +21,7 @@ class SquaredDistance(NamedTuple):
         reference: (nq,) posture that has distance zero.
         weights: (nv,) not negative.
         curvature: (nv,) positive diagonal of the second derivative.
-        straight: whether d changes as the displacement does, so that its Jacobian is the identity.
+        straight: whether the Jacobian of d is the identity.
     """
 
     reference: Array

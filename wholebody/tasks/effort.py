@@ -1,4 +1,4 @@
-"""How far the joints moved from where they started."""
+"""Measure: distance of the joints from the start."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wholebody.tasks.distance import SquaredDistance
 
 @dataclass(frozen=True, eq=False)
 class Effort(Measure):
-    """Squared displacement of every joint from the start, weighted by the effort it takes [rad^2].
+    """Squared displacement of every joint from the start, weighted by joint [rad^2].
 
     ``sum_i gamma_i (q_i - q_i_start)^2`` (Marler and Arora's effort; eq. 2.5 of the thesis on posture prediction), with
     the figure's `effort_weights` for gamma: moving the spine costs more than moving an arm.
@@ -31,7 +31,7 @@ class Effort(Measure):
         object.__setattr__(self, "weight", inputs.weight(self.weight, "Effort: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Effort:
-        """Remember the start."""
+        """Store the start."""
         return filled(self, distance=SquaredDistance.build(scene.model, start, scene.figure.effort_weights))
 
     def value(self, state: State) -> float:

@@ -1,4 +1,4 @@
-"""A frame, or only its orientation, where it should be."""
+"""Goals: a frame at a placement, or a frame at an orientation."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from wholebody.tasks.residuals import PlacementResidual
 
 @dataclass(frozen=True, eq=False)
 class Frame(Goal):
-    """Bring a frame to a place and an orientation.
+    """Move a frame to a position and an orientation.
 
-    The error is the place of the frame minus the target [m], then the rotation vector that leads from the target's
-    orientation to the frame's [rad], both in world axes. The vector is exact up to half a turn; at exactly half a turn
-    its direction is one of two that serve equally.
+    The error is the position of the frame minus the target [m], then the rotation vector from the target's orientation
+    to the frame's [rad], both in world axes. The vector is exact up to half a turn; at exactly half a turn it has one
+    of two equivalent directions.
 
     Attributes:
         frame: name of the frame, segment or joint.
-        target: where it should be: (x, y, z) with the axes of the world, (x, y, z, qx, qy, qz, qw), a matrix (4, 4) or
-            a pin.SE3; metres.
+        target: its target: (x, y, z) with the axes of the world, (x, y, z, qx, qy, qz, qw), a matrix (4, 4) or a
+            pin.SE3; metres.
         weight: factor on the squared error [1/m^2 and 1/rad^2: a metre counts as much as a radian].
         resolved_target: `target` as a pin.SE3.
-        residual: what the error is computed by, with frame, joint and target; once resolved.
+        residual: computes the error, with frame, joint and target; once resolved.
 
     Raises:
         InputError: the target is none of these, or not in metres.
@@ -60,7 +60,7 @@ class Frame(Goal):
         return self.residual.angular
 
     def error(self, state: State) -> Array:
-        """(6,) difference in place [m] and orientation [rad]."""
+        """(6,) difference in position [m] and orientation [rad]."""
         return self.residual.value(state)
 
     def jacobian(self, state: State) -> Wrench:
@@ -70,16 +70,16 @@ class Frame(Goal):
 
 @dataclass(frozen=True, eq=False)
 class Orientation(Goal):
-    """Turn a frame to an orientation; its place is free.
+    """Turn a frame to an orientation; its position is free.
 
-    The error is the rotation vector that leads from the target to the frame, in world axes [rad].
+    The error is the rotation vector from the target to the frame, in world axes [rad].
 
     Attributes:
         frame: name of the frame, segment or joint.
         target: quaternion (x, y, z, w) or rotation matrix (3, 3) of the frame in the world.
         weight: factor on the squared error [1/rad^2].
         resolved_target: `target` as a pin.SE3 without translation.
-        residual: what the error is computed by, with frame, joint and target; once resolved.
+        residual: computes the error, with frame, joint and target; once resolved.
 
     Raises:
         InputError: the target is not a rotation.

@@ -1,4 +1,4 @@
-"""A frame that does not move."""
+"""Constraint: a frame that does not move."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from wholebody.tasks.residuals import PlacementResidual, placement_between
 
 @dataclass(frozen=True, eq=False)
 class Hold(Constraint):
-    """Keep a frame at a place, in the world or relative to another frame of the figure.
+    """Keep a frame at a placement, in the world or relative to another frame of the figure.
 
-    Relative to another frame it closes a loop: two hands that carry one box, or the opposite hand on a two-handed tool.
+    Relative to another frame it closes a loop: two hands that carry one box, or the second hand on a two-handed tool.
 
     Attributes:
         frame: name of the frame, segment or joint.
-        at: where to keep it: (x, y, z) with the axes of the world or of `relative_to`, (x, y, z, qx, qy, qz, qw), a
-            matrix (4, 4) or a pin.SE3; metres. None keeps it where it is at the start.
-        orientation: False holds only the frame's origin and leaves it free to turn.
-        relative_to: name of the frame it must keep its place to; None for the world.
-        residual: what the value is computed by, with frames, joints and target; once resolved.
+        at: its placement: (x, y, z) with the axes of the world or of `relative_to`, (x, y, z, qx, qy, qz, qw), a matrix
+            (4, 4) or a pin.SE3; metres. None for its placement at the start.
+        orientation: False holds only the frame's origin and leaves the frame free to turn.
+        relative_to: name of the frame that `at` is relative to; None for the world.
+        residual: computes the value, with frames, joints and target; once resolved.
 
     Raises:
         InputError: `at` is none of these, or not in metres.
@@ -50,7 +50,7 @@ class Hold(Constraint):
             object.__setattr__(self, "_at", inputs.target_placement(self.at, f"Hold({shown(self.frame)}): at"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Hold:
-        """Find the frames, and where they are at the start."""
+        """Find the frames, and their placements at the start."""
         place = inputs.find_place(scene, self.frame, "Hold")
         base = inputs.find_base(scene, self.relative_to, self.frame, "Hold")
         at = self._at if self._at is not None else placement_between(scene, start, place, base)
@@ -58,7 +58,7 @@ class Hold(Constraint):
 
     @property
     def kept_at(self) -> pin.SE3:
-        """Where the frame is kept, in the world or in the other frame, once resolved."""
+        """The placement at which the frame is held, in the world or in the other frame, once resolved."""
         return self.residual.placement
 
     @property
@@ -77,7 +77,7 @@ class Hold(Constraint):
         return self.residual.angular
 
     def value(self, state: State) -> Array:
-        """(m,) difference in place [m] and orientation [rad]."""
+        """(m,) difference in position [m] and orientation [rad]."""
         return self.residual.value(state)
 
     def jacobian(self, state: State) -> Wrench:

@@ -1,4 +1,4 @@
-"""Checks of what people write into a term, and the search for the frames they name."""
+"""Checks of the arguments of terms, and lookup of the frames that they name."""
 
 from __future__ import annotations
 
@@ -17,39 +17,39 @@ from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.tasks.base import Surroundings
 
 FARTHEST = 100.0
-"""Distance [m] beyond which a place is taken for a slip of units: in millimetres it is a tenth of a metre."""
+"""Distance [m] beyond which a position is refused as a wrong unit: 100 mm are a tenth of a metre."""
 
 LIGHTEST, HEAVIEST = 1e-12, 1e12
-"""Least and greatest weight: beyond them the squares of weights lose what other terms say."""
+"""Least and greatest weight: beyond them the squares of weights make other terms vanish in rounding."""
 
 LONGEST_DIRECTION = 1e9
-"""Length beyond which a vector is taken for a slip."""
+"""Length beyond which a vector is refused as a mistake."""
 
 SHORTEST_DIRECTION = 1e-9
-"""Length below which a vector has no direction: a millionth of a millimetre if it came from two points in metres."""
+"""Length below which a vector has no direction: a millionth of a millimetre for a difference of points in metres."""
 
 
 class Place(NamedTuple):
-    """A frame of the model and the joint that carries it."""
+    """Index of a frame of the model, and of the joint that carries it."""
 
     frame: int
     joint: int
 
 
 WORLD = Place(0, 0)
-"""Where nothing moves: Pinocchio's frame and joint 0."""
+"""The world: Pinocchio's frame and joint 0."""
 
 
 def find_place(scene: Surroundings, name: str, where: str) -> Place:
     """Look up a frame, or the joint of that name.
 
     Args:
-        scene: the scene whose figure is meant.
-        name: a frame to reach with, a segment, or a joint.
-        where: the term that asks, for the message.
+        scene: the scene with the figure.
+        name: a frame, a segment, or a joint.
+        where: the calling term, for the message.
 
     Raises:
-        UnknownNameError: the figure has none of that name.
+        UnknownNameError: the name is unknown.
         InputError: the name is not a string.
     """
     if not isinstance(name, str):
@@ -62,11 +62,11 @@ def find_place(scene: Surroundings, name: str, where: str) -> Place:
 
 
 def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> Place:
-    """Look up the frame that another is placed in; None is the world.
+    """Look up the reference frame of another frame; None is the world.
 
     Raises:
         UnknownNameError: the figure has no such frame.
-        InputError: both are carried by one joint, so nothing can move them to each other.
+        InputError: one joint carries both, so they cannot move relative to each other.
     """
     if name is None:
         return WORLD
@@ -92,13 +92,13 @@ def find_dofs(scene: Surroundings, names: Sequence[str], where: str) -> Any:
 
 
 def angular_dofs(model: Any) -> Any:
-    """(nv,) which degrees of freedom are in radians: those that turn something."""
+    """(nv,) whether each degree of freedom is in radians, which holds for rotations."""
     state = State(model)
     return state.folded(np.abs(state.jacobian[3:])).max(axis=0) > 0.5
 
 
 def point(value: object, where: str) -> Array:
-    """Place in space (3,), metres.
+    """Position (3,), metres.
 
     Raises:
         InputError: not three finite numbers, or so far away that it cannot be in metres.
@@ -109,7 +109,7 @@ def point(value: object, where: str) -> Array:
 
 
 def check_reachable(place: Array, where: str) -> None:
-    """Refuse a place that cannot be in metres.
+    """Refuse a position that cannot be in metres.
 
     Raises:
         InputError: it is farther than `FARTHEST` from the origin.
@@ -138,7 +138,7 @@ def direction(value: object, where: str) -> Array:
 
 
 def weight(value: object, where: str) -> float:
-    """A factor on what a term says.
+    """The weight of a term.
 
     Raises:
         InputError: it is no number from `LIGHTEST` to `HEAVIEST`.
@@ -150,10 +150,10 @@ def weight(value: object, where: str) -> float:
 
 
 def target_placement(at: PlacementLike, where: str) -> Any:
-    """Placement (pin.SE3) that somebody wrote in any of the forms of `wholebody.geometry.placement.placement`.
+    """Placement (pin.SE3) from any of the forms of `wholebody.geometry.placement.placement`.
 
     Raises:
-        InputError: it is in none of them, or too far away to be in metres.
+        InputError: it has none of these forms, or is too far away to be in metres.
     """
     result = placement(at, where)
     check_reachable(result.translation, where)
@@ -177,10 +177,10 @@ def target_rotation(value: ArrayLike, where: str) -> Any:
 
 
 def check_mass(scene: Surroundings, where: str) -> None:
-    """Check that something of the figure that moves has mass: else its centre of mass is nowhere.
+    """Check that a moving part of the figure has mass; otherwise its centre of mass is undefined.
 
     Raises:
-        InputError: nothing has.
+        InputError: none has.
     """
     if not any(inertia.mass > 0.0 for inertia in list(scene.model.inertias)[1:]):
         raise InputError(f"{where}: nothing of {scene.figure.name} that moves has mass; leave it out")

@@ -1,4 +1,4 @@
-"""A frame that stays in a plane, or on one side of it."""
+"""Constraint: a frame in a plane, or on one side of it."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ class Plane(Constraint):
     """Keep the origin of a frame or joint in a plane.
 
     The value is the distance (x - p) . n from the plane [m]. An elbow or a wrist that may leave its path only sideways
-    moves in the plane through its place, normal to the direction of its path (eqs. 3.2 and 3.3 of the thesis on
+    moves in the plane through its position, normal to the direction of its path (eqs. 3.2 and 3.3 of the thesis on
     collision avoidance in motion capture clips, there squared and compared with a tolerance).
 
     Attributes:
         frame: name of the frame, segment or joint.
-        normal: (3,) direction at right angles to the plane, in the world; any length.
-        point: (3,) a place in the plane [m]; None for where the frame is at the start.
-        side: "on" keeps it in the plane, "above" lets it leave to the side that the normal points to.
+        normal: (3,) direction normal to the plane, in the world; any length.
+        point: (3,) a point in the plane [m]; None for the frame's position at the start.
+        side: "on" keeps it in the plane, "above" lets it move to the side to which the normal points.
         resolved_normal: (3,) `normal` as a unit vector.
         place: the frame and the joint that carries it, once resolved.
         height: n . p of the plane, its distance from the world's origin along the normal [m]; once resolved.
@@ -55,7 +55,7 @@ class Plane(Constraint):
             object.__setattr__(self, "_point", inputs.point(self.point, f"{where}: point"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Plane:
-        """Find the frame, and the plane through where it is at the start."""
+        """Find the frame, and the plane through its position at the start."""
         place = inputs.find_place(scene, self.frame, "Plane")
         point = self._point
         if point is None:

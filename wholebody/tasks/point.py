@@ -1,4 +1,4 @@
-"""A point of the figure at a place."""
+"""Goal: a point of the figure at a position."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from wholebody.tasks.residuals import point_rows
 
 @dataclass(frozen=True, eq=False)
 class Point(Goal):
-    """Bring a point of a frame to a place; the orientation is free.
+    """Move a point of a frame to a position; the orientation is free.
 
-    The error is the place of the point minus the target, in world axes [m].
+    The error is the position of the point minus the target, in world axes [m].
 
     Attributes:
         frame: name of the frame, segment or joint.
-        target: (3,) place in the world [m].
+        target: (3,) position in the world [m].
         offset: (3,) the point in the frame's own axes [m].
         weight: factor on the squared error [1/m^2].
         place: the frame and the joint that carries it, once resolved.

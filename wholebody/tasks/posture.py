@@ -1,4 +1,4 @@
-"""Joints in the places they have in a known posture."""
+"""Goal: joints at their values in a known posture."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from wholebody.tasks.base import Goal, Surroundings, filled
 
 @dataclass(frozen=True, eq=False)
 class Posture(Goal):
-    """Bring all joints, or some, to a posture.
+    """Move all joints, or some, to their values in a posture.
 
-    The error is the tangent vector from that posture to the present one [rad; m for the root's place and for sliding
-    joints].
+    The error is the tangent vector from that posture to the present one [rad; m for the root's position and for
+    prismatic joints].
 
     Attributes:
         target: name of one of the figure's postures, or a posture (nq,).
-        joints: names of joints and groups that take part; None for all, the root included.
+        joints: names of the joints and groups that the goal moves; None for all, including the root.
         weight: factor on the squared error [1/rad^2 and 1/m^2].
         resolved_target: (nq,) the posture, once resolved.
-        dofs: (m,) places in the tangent of the joints that take part, once resolved.
+        dofs: (m,) indices of these joints in the tangent vector, once resolved.
 
     Raises:
         InputError: the posture has the wrong shape, is not finite, or has a quaternion that is not of unit length.
@@ -70,7 +70,7 @@ class Posture(Goal):
 
     @property
     def angular(self) -> Mask:
-        """(m,) all but the root's place and sliding joints."""
+        """(m,) true for all rows except those of the root's position and of prismatic joints."""
         return self._angular
 
     def error(self, state: State) -> Array:

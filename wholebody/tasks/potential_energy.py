@@ -1,4 +1,4 @@
-"""How much the segments are raised or lowered."""
+"""Measure: change of the potential energy of the segments."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GRAVITY = 9.80665
 
 
 class _Bodies(NamedTuple):
-    """What the joints carry: joint indices, the centre of each mass in its joint, squared weights, rest heights."""
+    """The masses: joint indices, the centre of each mass in its joint, squared weights, rest heights."""
 
     joints: NDArray[np.intp]
     centres: tuple[Array, ...]
@@ -34,8 +34,8 @@ class PotentialEnergy(Measure):
 
     ``sum_k (m_k g)^2 (h_k - h_k_neutral)^2`` with h the height of a segment's centre of mass: the delta potential
     energy of Yang, Marler, Kim, Arora and Abdel-Malek 2004 ("Multi-Objective Optimization for Upper Body Posture
-    Prediction"), over all segments. The neutral posture stands where the root is at the start. Both arms of an
-    average man held out to the sides cost 100 J^2, so a weight of 0.01 makes that count like one radian of `Effort`.
+    Prediction"), over all segments. The neutral posture has the root's placement at the start. Both arms of an
+    average man held out to the sides cost 100 J^2, so with a weight of 0.01 that counts like one radian of `Effort`.
 
     Attributes:
         weight: factor on the measure [1/J^2].
@@ -49,7 +49,7 @@ class PotentialEnergy(Measure):
         object.__setattr__(self, "weight", inputs.weight(self.weight, "PotentialEnergy: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> PotentialEnergy:
-        """Weigh the segments, and find their heights in the neutral posture."""
+        """Compute the weights of the segments, and their heights in the neutral posture."""
         model = scene.model
         neutral = np.array(scene.figure.neutral, dtype=float)
         if scene.figure.root == "free":
@@ -73,7 +73,7 @@ class PotentialEnergy(Measure):
         bodies = self._bodies
         centres = _centres(state, bodies.joints, bodies.centres)
         wrenches = _lifts(centres) * (2.0 * bodies.weights * (centres[:, 2] - bodies.heights))[:, None]
-        # All that hangs on a joint acts on it: sum the wrenches first, then one product with each of its columns.
+        # All descendants of a joint act on it: sum their wrenches first, then multiply by each of its columns.
         columns = ((bodies.support.T @ wrenches) * state.jacobian.T).sum(axis=1)
         return np.asarray(state.folded(columns[None])[0])
 

@@ -1,4 +1,4 @@
-"""Ball joints within their reach cones."""
+"""Constraint: ball joints within their reach cones."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class Limb(NamedTuple):
 
     Attributes:
         cone: the spherical polygon.
-        reference: the frame that the cone is fixed to.
-        limb: the frame that turns within it.
+        reference: the frame to which the cone is fixed.
+        limb: the frame that turns within the cone.
         axis: (3,) the limb's direction in its frame, a unit vector.
     """
 
@@ -35,7 +35,7 @@ class Limb(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ReachCones(Constraint):
-    """Keep the direction of limbs inside the spherical polygons that bound what their joints allow.
+    """Keep the direction of limbs inside the spherical polygons that bound the range of their joints.
 
     Limits of three revolute joints in a row allow directions that a shoulder or a hip does not (Wilhelms and Van Gelder
     2001, "Fast and Easy Reach-Cone Joint Limits", Journal of Graphics Tools 6(2)). The value is the signed angle from
@@ -57,10 +57,10 @@ class ReachCones(Constraint):
             object.__setattr__(self, "names", tuple(listed(self.names, "ReachCones: names", "['left_shoulder']")))
 
     def resolve(self, scene: Surroundings, start: Array) -> ReachCones:
-        """Find the cones and the frames they belong to.
+        """Find the cones and their frames.
 
         Raises:
-            UnknownNameError: the figure has no cone of that name.
+            UnknownNameError: a name is unknown.
             InputError: the figure has no cones.
         """
         cones = scene.figure.cones

@@ -1,4 +1,4 @@
-"""Two frames that keep their places to each other."""
+"""Goal: a frame at a placement relative to another frame."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from wholebody.tasks.residuals import PlacementResidual, placement_between
 
 @dataclass(frozen=True, eq=False)
 class Relative(Goal):
-    """Bring a frame to a place relative to another frame of the figure, if it can be.
+    """Move a frame to a placement relative to another frame of the figure, if possible.
 
-    Use it for two hands on one object. Where it must hold always, use `Hold` with `relative_to`. The error is the place
-    minus the target [m], then the rotation vector from the target's orientation to the frame's [rad], both in the axes
-    of `to`.
+    Use it for two hands on one object. If the relation must always hold, use `Hold` with `relative_to`. The error is
+    the position minus the target [m], then the rotation vector from the target's orientation to the frame's [rad], both
+    in the axes of `to`.
 
     Attributes:
         frame: name of the frame, segment or joint that is placed.
-        to: name of the frame it is placed relative to.
-        placement: where it should be in the axes of `to`: (x, y, z), (x, y, z, qx, qy, qz, qw), a matrix (4, 4) or a
-            pin.SE3; metres. None keeps it as at the start.
+        to: name of the reference frame.
+        placement: its target in the axes of `to`: (x, y, z), (x, y, z, qx, qy, qz, qw), a matrix (4, 4) or a pin.SE3;
+            metres. None for the relative placement at the start.
         orientation: False leaves the frame free to turn about its origin.
         weight: factor on the squared error [1/m^2 and 1/rad^2].
-        residual: what the error is computed by, with frames, joints and target; once resolved.
+        residual: computes the error, with frames, joints and target; once resolved.
 
     Raises:
         InputError: the placement is none of these, or not in metres.
@@ -53,7 +53,7 @@ class Relative(Goal):
         object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Relative:
-        """Find the frames, and where they are to each other at the start."""
+        """Find the frames, and their relative placement at the start."""
         place = inputs.find_place(scene, self.frame, "Relative")
         base = inputs.find_base(scene, self.to, self.frame, "Relative")
         target = self._placement if self._placement is not None else placement_between(scene, start, place, base)
@@ -65,7 +65,7 @@ class Relative(Goal):
         return self.residual.angular
 
     def error(self, state: State) -> Array:
-        """(m,) difference in place [m] and orientation [rad]."""
+        """(m,) difference in position [m] and orientation [rad]."""
         return self.residual.value(state)
 
     def jacobian(self, state: State) -> Wrench:

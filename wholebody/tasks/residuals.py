@@ -1,4 +1,4 @@
-"""Differences between where a frame is and where it should be, and their exact derivatives.
+"""Differences between the placement of a frame and its target, and their exact derivatives.
 
 A spatial velocity V = (v, w) has its linear part at the world's origin. A point p that moves with a joint has the
 velocity v + w x p, so its rows are ``[I, -skew(p)]``. A rotation R that moves with the joint becomes ``exp(w dt) R``;
@@ -43,17 +43,17 @@ def fill_point_rows(rows: Array, point: Array) -> None:
 
 
 class PlacementResidual(NamedTuple):
-    """How far one frame is from its place relative to another, in the axes of that other frame.
+    """Difference between the placement of one frame relative to another and its target, in the axes of the other frame.
 
-    Rows: place (3, metres) where `position`, then rotation vector (3, radians) where `orientation`.
+    Rows: position (3, metres) if `position`, then rotation vector (3, radians) if `orientation`.
 
     Attributes:
         place: the frame that moves.
-        base: the frame it is compared in; the world by default.
-        target: (3,) place of the frame's origin in the base.
-        undo: rotation back from the target, as a placement without translation.
-        position: whether the place counts.
-        orientation: whether the rotation counts.
+        base: the reference frame; the world by default.
+        target: (3,) target position of the frame's origin in the base.
+        undo: inverse of the target's rotation, as a placement without translation.
+        position: whether the residual has the position.
+        orientation: whether it has the rotation.
     """
 
     place: Place
@@ -73,12 +73,12 @@ class PlacementResidual(NamedTuple):
 
     @property
     def placement(self) -> pin.SE3:
-        """The target: where the frame should be in the base."""
+        """The target placement of the frame in the base."""
         return pin.SE3(self.undo.rotation.T, self.target)
 
     @property
     def angular(self) -> Mask:
-        """(m,) which rows are radians."""
+        """(m,) whether each row is in radians."""
         return np.array([False] * 3 * self.position + [True] * 3 * self.orientation)
 
     def value(self, state: State) -> Array:

@@ -1,4 +1,4 @@
-"""The support polygon: where the ground carries a figure."""
+"""The support polygon of a figure that stands on the ground."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from wholebody.tasks import inputs
 from wholebody.tasks.base import Surroundings
 
 STANDING_HEIGHT = 0.01
-"""Height [m] above a foot's lowest point up to which its corners stand on the ground: soles are rounded by as much."""
+"""Height [m] above a foot's lowest point up to which its corners stand on the ground; soles are rounded by as much."""
 
 FLATTEST = 1e-6
-"""Height [m] of a corner over the line through its neighbours below which it makes no corner of its own."""
+"""Height [m] of a corner over the line through its neighbours below which it is no corner."""
 
 THINNEST = 1e-4
-"""Width [m] below which a polygon is a line that nobody stands on."""
+"""Width [m] below which a polygon counts as a line."""
 
 
 def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:
-    """Places (n, 3) where the feet stand at the posture q: the lowest corners of their pieces.
+    """Points (n, 3) on which the feet stand at the posture q: the lowest corners of their pieces.
 
-    What hangs on a foot, such as toes, belongs to it.
+    Child segments of a foot, such as toes, belong to it.
 
     Raises:
         UnknownNameError: the figure has no such foot.
@@ -54,7 +54,7 @@ def low_points(geometry: Any, placement: pin.SE3) -> Array:
 
     Args:
         geometry: a coal shape.
-        placement: where its origin is in the world.
+        placement: of its origin in the world.
     """
     swept = swept_points(geometry)
     if len(swept.points) == 0:
@@ -94,7 +94,7 @@ def edges(corners: Array) -> tuple[Array, Array]:
 
 
 def shrunk(corners: Array, margin: float) -> Array:
-    """Corners (m, 2) of the polygon with a margin cut off on every side, empty when nothing is left.
+    """Corners (m, 2) of the polygon with a margin cut off on every side; empty if nothing remains.
 
     Clips by one edge after the other (Sutherland and Hodgman 1974, "Reentrant polygon clipping").
     """

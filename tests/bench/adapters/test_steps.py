@@ -14,8 +14,7 @@ import wholebody as wb
 from wholebody.bench.adapters import chosen_tools, differences, installed_tools, make_tool
 from wholebody.bench.adapters.mjcf import mjcf
 from wholebody.bench.adapters.own import MovingPoint
-from wholebody.bench.judge import judge
-from wholebody.bench.track import Track
+from wholebody.bench.track import Track, judge
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
 LIMIT = {"pink": 1e-4}

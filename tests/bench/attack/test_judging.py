@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.attack.claims import verdict
 from wholebody.bench.attack.judging import Pairs, judge
+from wholebody.bench.attack.solves import verdict
 from wholebody.bench.stability.bodies import Builder, planar_arm, sliding_tool
 
 REACHED = (0.6, 0.0, 0.0)

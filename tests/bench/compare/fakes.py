@@ -14,7 +14,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.bench.adapters.base import Adapter
-from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
+from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.errors import InputError
 from wholebody.methods.base import SolvingTracker
 from wholebody.methods.control import Progress
@@ -22,9 +22,8 @@ from wholebody.methods.control import Progress
 ARM = Path(__file__).parents[2] / "data" / "arm" / "arm.urdf"
 
 
-def make(number: int, seed: int, frames: int = 0) -> Case:
+def pose(number: int, rng: np.random.Generator, frames: int = 0) -> Any:
     """Return a reach of a robot arm to where its tip is in a random posture; one after the other where it moves."""
-    rng = generator("arm", number, seed)
     figure = wb.load(ARM)
     tip = figure.model.names[-1]
     scene = wb.Scene(figure)
@@ -33,14 +32,14 @@ def make(number: int, seed: int, frames: int = 0) -> Case:
     problem = wb.Problem(scene, figure.neutral, goals=[wb.Point(tip, there)])
     here = pin.SE3(scene.state(figure.neutral).frame(figure.frame_id(tip))).translation
     way = tuple((wb.Point(tip, here + (k + 1) / frames * 0.1 * (there - here)),) for k in range(frames))
-    return Case("arm" if not frames else "moving", number, problem, witness, way)
+    return problem, witness, way
 
 
-SET = ProblemSet("arm", "an arm", "An arm reaches for a place.", make)
-MOVING = ProblemSet("moving", "a moving arm", "An arm follows a place.", partial(make, frames=5), moving=True)
+SET = ProblemSet("arm", "an arm", "An arm reaches for a place.", pose)
+MOVING = ProblemSet("moving", "a moving arm", "An arm follows a place.", partial(pose, frames=5), moving=True)
 
 
-def broken(number: int, seed: int) -> Case:
+def broken(number: int, rng: np.random.Generator) -> Any:
     raise RuntimeError("the set is broken")
 
 

@@ -9,7 +9,7 @@ from types import ModuleType
 
 import pytest
 
-from wholebody.bench.compare import publish as publishing
+from wholebody.bench.compare import report as publishing
 from wholebody.bench.compare.charts import BAND, Point, lowest
 from wholebody.bench.compare.record import ANSWERED, OVERTIME, REFUSED, Record
 from wholebody.bench.compare.results import Results

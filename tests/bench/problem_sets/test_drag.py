@@ -13,8 +13,8 @@ from wholebody.bench.problem_sets.case import generator
 
 @pytest.mark.parametrize("number", [0, 1])
 def test_a_known_posture_meets_each_frame(number: int) -> None:
-    case, problem = drag.make(number, 0), drag.make(number, 0).problem
-    postures = drag.way(human(), generator(drag.NAME, number, 0))
+    case, problem = drag.SET.make(number, 0), drag.SET.make(number, 0).problem
+    postures = drag.way(human(), generator(drag.SET.name, number, 0))
     assert 100 <= len(case.frames) == len(postures) - 1 <= 200
     for q, goals in zip(postures[1:], case.frames, strict=True):
         problem.retarget(goals)
@@ -25,7 +25,7 @@ def test_a_known_posture_meets_each_frame(number: int) -> None:
 
 @pytest.mark.parametrize("number", range(6))
 def test_the_goals_move_far_smoothly_and_at_a_speed_of_people(number: int) -> None:
-    case = drag.make(number, 0)
+    case = drag.SET.make(number, 0)
     goals = [goals[0] for goals in (case.problem.goals, *case.frames)]
     places = np.array([goal.target for goal in goals if isinstance(goal, wb.Point)])
     assert np.linalg.norm(places - places[0], axis=1).max() > 0.2

@@ -7,10 +7,10 @@ import pytest
 
 from wholebody.assessment import assess
 from wholebody.bench.adapters import adapters
+from wholebody.bench.stability.asking import run
 from wholebody.bench.stability.case import HardCase, Nonsense, Posed, Stream
 from wholebody.bench.stability.catalogue import QUICK, cases, names
-from wholebody.bench.stability.rows import result
-from wholebody.bench.stability.running import run
+from wholebody.bench.stability.verdict import result
 from wholebody.errors import InputError, UnknownNameError
 
 FAST = (

@@ -11,9 +11,9 @@ import pytest
 
 from wholebody.bench.adapters import adapters
 from wholebody.bench.stability import page
+from wholebody.bench.stability.asking import run
 from wholebody.bench.stability.catalogue import cases
-from wholebody.bench.stability.rows import Result, StabilityRow, result
-from wholebody.bench.stability.running import run
+from wholebody.bench.stability.verdict import Result, StabilityRow, result
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import stability
 from wholebody.errors import InputError

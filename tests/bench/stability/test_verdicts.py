@@ -12,13 +12,11 @@ import numpy as np
 import pytest
 
 from wholebody.bench.adapters.base import Adapter
-from wholebody.bench.stability.answering import NOTHING, Answer
-from wholebody.bench.stability.case import Stream
+from wholebody.bench.stability.asking import run
+from wholebody.bench.stability.case import NOTHING, Answer, Stream
 from wholebody.bench.stability.catalogue import cases
 from wholebody.bench.stability.judging import Judged, judge
-from wholebody.bench.stability.rows import result
-from wholebody.bench.stability.running import run
-from wholebody.bench.stability.verdict import ALONE, Verdict, audited, decide, length
+from wholebody.bench.stability.verdict import ALONE, Verdict, audited, decide, length, result
 from wholebody.errors import InputError
 from wholebody.problem import Problem
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from wholebody.arrays import Array
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.methods.newton.assembly import Assembly
+from wholebody.methods.newton.batches import Key
+from wholebody.methods.newton.linear_algebra.gram import Gram
+from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 
 Y = (0.0, 1.0, 0.0)
 
@@ -288,3 +294,74 @@ def test_a_scissor_lift_rises_level_with_all_its_bars_alike(stages: int) -> None
     beyond = made.drop_goals().point_goal("platform", (0.0, 0.0, stages * length + 0.1)).solve()
     assert beyond.status == "unreachable"
     assert beyond.placements["platform"].translation[2] == pytest.approx(stages * length, abs=2e-3)
+
+
+def _dragged_chain() -> tuple[Assembly, Array]:
+    """A chain of eight bodies, and the place of its last one."""
+    made, places = Assembly(), np.array([(0.3 * k, 0.1 * (k % 2), 0.05 * (k % 3)) for k in range(8)])
+    for k, place in enumerate(places):
+        made.body(f"b{k}", place)
+        made.spherical("world" if k == 0 else f"b{k - 1}", f"b{k}", at=place - (0.15, 0.0, 0.0))
+    return made, places[-1]
+
+
+@pytest.mark.parametrize("nearest", [False, True])
+def test_a_drag_analyses_its_pattern_once(nearest: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Moves of a goal alone lay out and analyse nothing, and end where an assembly that is stated anew ends."""
+    made, end = _dragged_chain()
+    laid: list[str] = []
+
+    def counted(kind: type) -> None:
+        whole = kind.__init__
+
+        def init(self: Any, *arguments: Any) -> None:
+            laid.append(kind.__name__)
+            whole(self, *arguments)
+
+        monkeypatch.setattr(kind, "__init__", init)
+
+    counted(Gram)
+    counted(QuasiDefinite)
+    for k in range(12):
+        target = end - np.array((0.3, 0.0, 0.0)) + 0.1 * np.array((np.cos(k), np.sin(k), np.sin(0.5 * k)))
+        anew = _dragged_chain()[0].place(made.variables())
+        answer = made.drop_goals().point_goal("b7", target).solve(tolerance=1e-9, nearest=nearest)
+        before = len(laid)
+        expected = anew.point_goal("b7", target).solve(tolerance=1e-9, nearest=nearest)
+        assert laid[:before] == (["Gram", "QuasiDefinite"] if nearest else ["Gram"])
+        del laid[before:]
+        assert answer.status == expected.status == "solved"
+        for name, placement in answer.placements.items():
+            assert np.abs(placement.homogeneous - expected.placements[name].homogeneous).max() < 1e-9
+    assert made.structures == 1
+
+
+def test_what_changes_the_pattern_is_laid_out_anew() -> None:
+    made, end = _dragged_chain()
+    target = end - np.array((0.2, 0.1, 0.0))
+    steps = [
+        lambda: made.point_goal("b7", target),
+        lambda: made.drop_goals().point_goal("b5", target - np.array((0.6, 0.0, 0.0))),
+        lambda: made.drop_goals().frame_goal("b7", (*target, 0.0, 0.0, 0.0, 1.0)),
+        lambda: made.drop_goals(),
+        lambda: made.on_plane("b3", (0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0), through=(0.0, 0.0, 0.0)),
+        lambda: made.body("loose", (0.0, 3.0, 0.0)),
+    ]
+    for number, step in enumerate(steps, start=1):
+        step()
+        assert made.solve().status == "solved"
+        assert made.solve().iterations == 0
+        assert made.structures == number
+    assert made.point_goal("loose", (0.0, 2.0, 0.0)).solve().placements["loose"].translation[1] == pytest.approx(2.0)
+
+
+def test_a_residual_is_that_of_the_numbers_now() -> None:
+    """The same variables are asked before and after a goal moved."""
+    made, end = _dragged_chain()
+    system, x = made.point_goal("b7", end).system(), made.variables()
+    assert np.abs(system.residual(x)).max() < 1e-12
+    moved = made.drop_goals().point_goal("b7", end + np.array((0.0, 0.0, 0.4))).system()
+    system.renew([(batch, Key("", False, False, 1.0)) for batch in moved.batches])
+    assert np.abs(system.residual(x)).max() == pytest.approx(0.4)
+    with pytest.raises(ValueError, match="read-only"):
+        system.residual(x)[:] = 0.0

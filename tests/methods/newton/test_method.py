@@ -11,9 +11,11 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.methods.newton.equations import unit_lengths
 from wholebody.methods.newton.feasibility import reach
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.figure_system import FigureSystem
+from wholebody.methods.newton.system import System
 from wholebody.tasks.base import Bound
 
 
@@ -50,7 +52,8 @@ def test_postures_go_in_and_out(name: str) -> None:
 
 def test_every_joint_of_the_human_holds_at_any_posture(human: wb.Figure) -> None:
     bodies = FigureBodies(human)
-    system = bodies.equations.system(bodies.count, bodies.names, bodies.weight)
+    batches = [unit_lengths(bodies.names), *bodies.equations.batches(bodies.count)]
+    system = System(bodies.count, batches, bodies.weight)
     for name in human.postures:
         assert np.abs(system.residual(bodies.variables(human.posture(name)))).max() < 1e-12
 

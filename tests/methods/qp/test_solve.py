@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.stability.starts import Cancelling
+from wholebody.bench.stability.posed import cancelling
 
 LENGTHS = (0.5, 0.4)
 
@@ -292,7 +292,7 @@ def test_one_degree_of_freedom_is_enough(planar_arm):
 
 def test_a_start_whose_contacts_cancel_ends_outside(honest):
     """A fork over a plate too thick for it: both prongs push, in opposite directions, and no gradient is left."""
-    problem = Cancelling().question().problem
+    problem = cancelling().problem
     assert wb.assess(problem, problem.start).penetration > 0.01
     solution = honest(problem, wb.solve(problem))
     assert solution.status == "unreachable"

@@ -1,6 +1,6 @@
 """The methods and tools that are set beside each other: one file a tool, which solves and follows a reach by steps."""
 
-from wholebody.bench.adapters.base import Adapter, Budget, Prepared, Tool, set_up
+from wholebody.bench.adapters.base import Adapter, Budget, Tool
 from wholebody.bench.adapters.registry import (
     STEPPING,
     adapters,
@@ -16,7 +16,6 @@ __all__ = [
     "STEPPING",
     "Adapter",
     "Budget",
-    "Prepared",
     "Tool",
     "adapters",
     "chosen_tools",
@@ -25,5 +24,4 @@ __all__ = [
     "make_tool",
     "missing",
     "names",
-    "set_up",
 ]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar
 
 from wholebody.arrays import Array
 from wholebody.methods.base import Method
@@ -17,35 +17,16 @@ Budget = tuple[float, "int | None"]
 FIRST_FIT = -1
 """In place of a count of iterations: the first posture that fits, whatever its measures are."""
 
-LADDER: tuple[Budget, ...] = (
-    (1e-1, None),
-    (3e-2, None),
-    (1e-2, None),
-    (3e-3, None),
-    (1e-3, None),
-    (1e-4, None),
-    (1e-5, None),
-    (1e-6, None),
-    (1e-8, None),
-)
+LADDER: tuple[Budget, ...] = tuple((tol, None) for tol in (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8))
 """Tolerances from cheap to exact; each adapter begins and ends where it makes sense for it."""
-
 
 REACH_COST = 1.0
 POSTURE_COST = 1e-3
 """Ratio of what a metre and a radian cost in the tools that weigh them: errors are squared after this."""
 
 
-@runtime_checkable
-class Prepared(Protocol):
-    """A method that builds a model of its own before it can solve."""
-
-    def prepare(self, problem: Problem) -> None:
-        """Build what a solve of this problem needs; a solve without it builds it itself.
-
-        Raises:
-            InputError: the method cannot express the problem.
-        """
+def _nothing(method: Any, problem: Problem) -> None:
+    pass
 
 
 @dataclass(frozen=True)
@@ -58,7 +39,10 @@ class Adapter:
         loose: budgets from cheap to exact, that draw its curve of speed against accuracy; those of first fit go before.
         setup: how it was set up, for reports.
         differences: what it cannot express, or does otherwise; one sentence each.
-        package: what has to be installed for it; None where it comes with wholebody.
+        prepare: builds what a solve of a problem needs, so that it is not timed with it; raises InputError where the
+            method cannot express the problem.
+        hindered: a method, from a tolerance, whose quadratic programs are never finished, or that has one iteration;
+            None where `make` does the latter.
     """
 
     name: str
@@ -66,17 +50,15 @@ class Adapter:
     loose: tuple[Budget, ...]
     setup: str
     differences: tuple[str, ...] = ()
-    package: str | None = None
+    prepare: Callable[[Any, Problem], None] = _nothing
+    hindered: Callable[..., Method] | None = None
 
 
-def set_up(method: Method, problem: Problem) -> None:
-    """Let a method build what it needs before a solve; nothing for one that needs nothing.
-
-    Raises:
-        InputError: the method cannot express the problem.
-    """
-    if isinstance(method, Prepared):
-        method.prepare(problem)
+def made(kind: Callable[..., Method], fewer: Mapping[str, Any], tolerance: float, iterations: int | None) -> Method:
+    """A method by a budget; `fewer` are its further settings where iterations are counted."""
+    if iterations is None:
+        return kind(tolerance=tolerance)
+    return kind(tolerance=tolerance, iterations=iterations, **fewer)
 
 
 def few(*iterations: int) -> tuple[Budget, ...]:

@@ -1,46 +1,27 @@
-"""Differential inverse kinematics iterated until a problem is solved: what pink and mink leave to their users.
-
-The loop is that of our adapter to placo: goals as soft tasks and what must hold as hard ones, the measures by a weight
-that fades, steps of a bounded size, and a damping that grows while steps go to and fro.
-"""
+"""pink and mink as methods: steps of differential inverse kinematics, iterated as our method placo iterates its own."""
 
 from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from typing import Any, NamedTuple
+from typing import ClassVar, NamedTuple, Protocol
 
-import numpy as np
-import pinocchio as pin
-
+import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.errors import InputError
-from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.methods import differential
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError, named_terms, refusal
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress
+from wholebody.methods.differential import Iteration, Settings
 from wholebody.problem import Problem
-from wholebody.solution import Solution, TraceEntry
-from wholebody.tasks import Displacement, Effort, Hold
-from wholebody.workspace import Workspace
+from wholebody.solution import Solution
 
-STEP = (
-    0.025  # rad, m: most that a joint or the root moves in one iteration; twice that leaves pink no solution more often
-)
+STEP = 0.025  # rad, m: most that anything moves in one iteration; twice that leaves pink no solution more often
 NEAR = 0.1  # m: pairs nearer than this have a row, where a tool has such a setting
 GAIN = 1.0  # share of what is free of a gap that may be used up in one iteration; with less, held feet cannot come back
 ITERATIONS = 200  # most, where nothing else is said
-SHARE = 0.5  # of the tolerance: to what everything is met, so that the judge, who rounds otherwise, agrees
-REST = 1e-2  # share of the tolerance: a step smaller than this has come to rest
-COMFORT = 1e-2  # weight of the measures at the beginning, against goals of weight 1
-DECAY = 0.6  # of that weight from one iteration to the next
-LEAST = 1e-3  # share of the tolerance: least weight of the measures
-REGULAR = 1e-3  # share of the measures' weight: what moving itself costs
-DAMPING, STIFFER, LOOSER, MOST_DAMPING = 1e-3, 4.0, 0.5, 10.0  # of steps that go back on the one before
-
-
-class StepError(Exception):
-    """A tool found no step; with its words."""
+DECAY = 0.6  # of the measures' weight from one iteration to the next
 
 
 class Pull(NamedTuple):
@@ -55,28 +36,11 @@ class Pull(NamedTuple):
     weights: Array
 
 
-class Stepper(ABC):
+class Stepper(differential.Stepper, Protocol):
     """A tool, set up for one problem."""
 
-    @abstractmethod
     def begin(self) -> None:
         """State the problem's present goals, constraints and places of objects by the tool's classes."""
-
-    @abstractmethod
-    def step(self, q: Array, weight: float, damping: float) -> Array:
-        """One step of the tool.
-
-        Args:
-            q: (nq,) the posture.
-            weight: of the measures, against goals of weight 1.
-            damping: what moving costs.
-
-        Returns:
-            The displacement (nv,).
-
-        Raises:
-            StepError: the tool found none.
-        """
 
 
 class Loop(ABC):
@@ -85,9 +49,14 @@ class Loop(ABC):
     Attributes:
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most steps.
+        kinds: terms that the tool can express, besides holds of whole frames.
     """
 
     name: str
+    kinds: ClassVar[tuple[type, ...]] = (
+        wb.CenterOfMass, wb.Displacement, wb.Effort, wb.Frame, wb.Freeze, wb.Orientation, wb.Point, wb.Posture,
+        wb.Relative, wb.StepLimit,
+    )  # fmt: skip
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
         """Take a budget."""
@@ -95,10 +64,6 @@ class Loop(ABC):
             raise InputError(f"tolerance is {tolerance}; give metres from 1e-10 to 0.1")
         self.tolerance, self.iterations = tolerance, ITERATIONS if iterations is None else iterations
         self._built: tuple[Problem, Stepper] | None = None
-
-    @abstractmethod
-    def takes(self, term: Any) -> str | None:
-        """None for a term that the tool can express, else why not, in a few words (or nothing)."""
 
     @abstractmethod
     def build(self, problem: Problem) -> Stepper:
@@ -134,8 +99,10 @@ class Loop(ABC):
         began = time.perf_counter()
         self.prepare(problem)
         assert self._built is not None
+        stepper, settings = self._built[1], Settings(self.tolerance, self.iterations, STEP, DECAY)
         with problem.lend() as workspace, Control(None, progress) as control:
-            run = _Run(problem, workspace, self._built[1], self, control)
+            stepper.begin()
+            run = Iteration(problem, workspace, stepper, settings, control)
             run.go()
         failure = f"{self.name} gave up at step {run.steps} ({run.failure})" if run.failure else ""
         ending = Ending(run.q, run.rested, run.steps, tuple(run.trace), f"in {run.steps} steps", "steps", failure)
@@ -150,11 +117,13 @@ class Loop(ABC):
         return SolvingTracker(self, problem, dt)
 
     def _unsupported(self, problem: Problem) -> list[str]:
+        """What the tool cannot express, each with the reason where it is not plain."""
         refused = []
         for where, term in named_terms(problem):
-            reason = self.takes(term)
-            if reason is not None:
-                refused.append(where + (f" ({reason})" if reason else ""))
+            if isinstance(term, wb.Hold):
+                refused += [] if term.orientation else [f"{where} (its hard tasks hold whole frames)"]
+            elif not isinstance(term, self.kinds):
+                refused.append(where)
         return refused
 
 
@@ -162,7 +131,7 @@ def pulls(problem: Problem) -> list[Pull]:
     """The measures, with weights of at most 1."""
     found = []
     for measure in problem.measures:
-        if isinstance(measure, (Effort, Displacement)):
+        if isinstance(measure, (wb.Effort, wb.Displacement)):
             weights = measure.distance.weights
             found.append(Pull(measure.distance.reference, measure.weight * weights / max(float(weights.max()), 1e-12)))
     return found
@@ -177,7 +146,7 @@ def kept_apart(problem: Problem) -> list[tuple[int, int, float]]:
     pieces = problem.scene.geometry.geometryObjects
     still = {0}
     for term in problem.constraints:
-        if isinstance(term, Hold) and term.relative_to is None and term.orientation:
+        if isinstance(term, wb.Hold) and term.relative_to is None and term.orientation:
             still.add(term.residual.place.joint)
     pairs = zip(problem.scene.geometry.collisionPairs, problem.clearances.tolist(), strict=True)
     return [
@@ -185,75 +154,3 @@ def kept_apart(problem: Problem) -> list[tuple[int, int, float]]:
         for pair, clearance in pairs
         if not {pieces[pair.first].parentJoint, pieces[pair.second].parentJoint} <= still
     ]
-
-
-class _Run:
-    """One solve: the present posture, and how it ended."""
-
-    def __init__(
-        self, problem: Problem, workspace: Workspace, stepper: Stepper, method: Loop, control: Control
-    ) -> None:
-        self._problem, self._stepper, self._method, self._control = problem, stepper, method, control
-        self._state, self._proximity = workspace.state, workspace.proximity
-        self.q: Array = problem.scene.figure.clamp(problem.start)
-        self.trace: list[TraceEntry] = []
-        self.steps, self.rested, self.failure = 0, False, ""
-        self._damping, self._last = 0.0, np.zeros(problem.scene.model.nv)
-        stepper.begin()
-
-    def go(self) -> None:
-        """TraceEntry until everything is met, nothing moves, the tool gives up or the steps run out."""
-        enough = SHARE * self._method.tolerance
-        length = 0.0
-        while True:
-            error, violation = self._look()
-            self.trace.append(TraceEntry(error, violation, 0.0, length))
-            self._control.tell(self.trace[-1])
-            if self._control.over:
-                return
-            if max(error, violation) <= enough and self._apart(enough):
-                return
-            if self.steps and length <= REST * self._method.tolerance:
-                self.rested = True
-                return
-            if self.steps == self._method.iterations:
-                return
-            try:
-                moved = self._moved()
-            except StepError as failure:
-                self.failure = str(failure)
-                return
-            length = float(np.abs(pin.difference(self._problem.scene.model, self.q, moved)).max(initial=0.0))
-            self.q = moved
-
-    def _moved(self) -> Array:
-        weight = max(COMFORT * DECAY**self.steps, LEAST * self._method.tolerance)
-        self.steps += 1
-        move = self._stepper.step(self.q, weight, max(REGULAR * weight, self._damping))
-        if not np.isfinite(move).all():
-            raise StepError("a displacement that is not a number")
-        move = move * min(1.0, STEP / max(float(np.abs(move).max(initial=0.0)), STEP))
-        back = float(move @ self._last) < 0.0
-        self._damping = min(max(STIFFER * self._damping, DAMPING), MOST_DAMPING) if back else LOOSER * self._damping
-        self._last = move
-        scene = self._problem.scene
-        return scene.figure.clamp(np.asarray(pin.integrate(scene.model, self.q, move)))
-
-    def _look(self) -> tuple[float, float]:
-        """The largest error of a goal and of a constraint, metres or radians."""
-        state = self._state.update(self.q)
-        errors, violations = [0.0], [0.0]
-        for goal in self._problem.goals:
-            error = np.atleast_1d(goal.error(state))
-            angular = np.broadcast_to(goal.angular, error.shape)
-            errors += [float(np.linalg.norm(error[angular])), float(np.linalg.norm(error[~angular]))]
-        for term in self._problem.constraints:
-            value = np.atleast_1d(term.value(state))
-            violations.append(float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0)))
-        return max(errors), max(violations)
-
-    def _apart(self, tolerance: float) -> bool:
-        """Whether all pairs keep their clearance."""
-        clearances = self._problem.clearances
-        near = self._proximity.near(self._state.data, float(clearances.max(initial=0.0)))
-        return bool((near.distance >= clearances[near.number] - tolerance - COAL_ACCURACY).all())

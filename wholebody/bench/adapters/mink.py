@@ -11,26 +11,15 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
+import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
-from wholebody.bench.adapters.loop import GAIN, NEAR, STEP, Loop, StepError, Stepper, kept_apart, pulls
+from wholebody.bench.adapters.loop import GAIN, NEAR, STEP, Loop, Stepper, kept_apart, pulls
 from wholebody.bench.adapters.mjcf import ROOT, mjcf
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
+from wholebody.figures.figure import Figure
+from wholebody.methods.differential import StepError
 from wholebody.problem import Problem
-from wholebody.tasks import (
-    Axis,
-    CenterOfMass,
-    Displacement,
-    Effort,
-    Frame,
-    Freeze,
-    Hold,
-    Orientation,
-    Point,
-    Posture,
-    Relative,
-    StepLimit,
-)
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
@@ -42,6 +31,7 @@ def mink_adapter() -> Adapter:
     return Adapter(
         name="mink",
         make=MinkLoop,
+        prepare=MinkLoop.prepare,
         loose=(*few(5, 10, 20), *LADDER),
         setup="mink.solve_ik on a MuJoCo model made from ours, with DAQP: FrameTask, RelativeFrameTask, AxisAlignTask, "
         "LookAtTask, ComTask and PostureTask (posture and measures, with a weight that fades) as soft tasks, whole "
@@ -55,7 +45,6 @@ def mink_adapter() -> Adapter:
             "mink minimises Effort and Displacement only",
             "its model is written for free roots, turning and sliding joints, and for all shapes but ellipsoids",
         ),
-        package="mink",
     )
 
 
@@ -63,29 +52,23 @@ class MinkLoop(Loop):
     """Steps of mink."""
 
     name = "mink"
-
-    def takes(self, term: Any) -> str | None:
-        """What mink has a task for."""
-        if isinstance(term, Hold):
-            return None if term.orientation else "its hard tasks hold whole frames"
-        kinds = (Point, Frame, Orientation, Axis, CenterOfMass, Posture, Relative, Freeze, StepLimit, Effort)
-        return None if isinstance(term, (*kinds, Displacement)) else ""
+    kinds = (*Loop.kinds, wb.Axis)
 
     def build(self, problem: Problem) -> Stepper:
         """Write the model."""
         return _MinkStepper(problem)
 
 
-class _MinkStepper(Stepper):
+class _MinkStepper:
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         self._sites: dict[str, tuple[int, Any]] = {}
         for term in (*problem.goals, *problem.constraints):
-            if isinstance(term, Point):
+            if isinstance(term, wb.Point):
                 self._site(term.place, term.resolved_offset)
-            elif isinstance(term, Axis):
+            elif isinstance(term, wb.Axis):
                 self._site(term.place)
-            elif isinstance(term, (Frame, Orientation, Relative, Hold)):
+            elif isinstance(term, (wb.Frame, wb.Orientation, wb.Relative, wb.Hold)):
                 self._site(term.residual.place)
                 self._site(term.residual.base)
         self._compile()
@@ -100,8 +83,8 @@ class _MinkStepper(Stepper):
         model = self._mujoco
         self._points: list[tuple[Any, str, Array]] = []
         self._tasks = [self._goal(goal) for goal in problem.goals]
-        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, Hold)]
-        frozen = [bound for bound in problem.bounds if isinstance(bound, Freeze)]
+        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, wb.Hold)]
+        frozen = [bound for bound in problem.bounds if isinstance(bound, wb.Freeze)]
         if frozen:
             dofs = {self._dof[dof] for bound in frozen for dof in scene.figure.dofs(bound.joints).tolist()}
             self._hard.append(mink.DofFreezingTask(model, sorted(dofs)))
@@ -114,7 +97,7 @@ class _MinkStepper(Stepper):
         import mink
 
         configuration = self._configuration
-        configuration.update(self._theirs(q))
+        configuration.update(self._order.theirs(q))
         for task, site, place in self._points:
             turn = configuration.get_transform_frame_to_world(site, "site").rotation()
             task.set_target(mink.SE3.from_rotation_and_translation(turn, place))
@@ -167,11 +150,8 @@ class _MinkStepper(Stepper):
 
         problem, model = self._problem, self._mujoco
         figure = problem.scene.figure
-        joints = [(model.joint(name), figure.model.joints[figure.joint_id(name)]) for name in figure.joints]
-        self._addresses = [(int(theirs.qposadr[0]), ours) for theirs, ours in joints]
-        self._dof = np.arange(figure.model.nv)
-        for theirs, ours in joints:
-            self._dof[ours.idx_v] = int(theirs.dofadr[0])
+        self._order = _Order(figure, model)
+        self._dof = self._order.dof
         limits = [
             mink.ConfigurationLimit(model, gain=1.0),
             mink.VelocityLimit(model, dict.fromkeys(figure.joints, STEP)),
@@ -193,16 +173,6 @@ class _MinkStepper(Stepper):
             limits.append(apart)
         return limits
 
-    def _theirs(self, q: Array) -> Array:
-        """Posture in MuJoCo's order, from ours (nq,)."""
-        theirs = np.zeros(self._mujoco.nq)
-        if self._problem.scene.figure.root == "free":
-            theirs[:3], theirs[3], theirs[4:7] = q[:3], q[6], q[3:6]
-        for address, joint in self._addresses:
-            part = q[joint.idx_q : joint.idx_q + joint.nq]
-            theirs[address] = part[0] if joint.nq == 1 else np.arctan2(part[1], part[0])
-        return theirs
-
     def _spread(self, ours: Array) -> Array:
         """Values (nv,) by degree of freedom, in MuJoCo's order."""
         theirs = np.zeros(self._mujoco.nv)
@@ -213,18 +183,18 @@ class _MinkStepper(Stepper):
         import mink
 
         cost = goal.weight**0.5
-        if isinstance(goal, Point):
+        if isinstance(goal, wb.Point):
             site = self._site(goal.place, goal.resolved_offset)
             task = mink.FrameTask(site, "site", position_cost=cost, orientation_cost=0.0)
             self._points.append((task, site, np.array(goal.resolved_target)))
-        elif isinstance(goal, Axis):
+        elif isinstance(goal, wb.Axis):
             kind = mink.AxisAlignTask if goal.toward is None else mink.LookAtTask
             task = kind(self._site(goal.place), "site", axis=np.array(goal.basis[2]), cost=cost)
             task.set_target(np.array(goal.resolved_target))
-        elif isinstance(goal, CenterOfMass):
+        elif isinstance(goal, wb.CenterOfMass):
             task = mink.ComTask(cost=np.array([cost, cost, cost if goal.axes == "xyz" else 0.0]))
             task.set_target(np.array((*goal.resolved_target, 0.0)[:3]))
-        elif isinstance(goal, Posture):
+        elif isinstance(goal, wb.Posture):
             task = self._joints(goal.resolved_target)
             costs = np.zeros(self._mujoco.nv)
             costs[self._dof[np.asarray(goal.dofs)]] = cost
@@ -250,8 +220,42 @@ class _MinkStepper(Stepper):
         import mink
 
         task = mink.PostureTask(self._mujoco, cost=0.0)
-        task.set_target(self._theirs(reference))
+        task.set_target(self._order.theirs(reference))
         return task
+
+
+class _Order:
+    """Postures and degrees of freedom in the order of MuJoCo's model.
+
+    Attributes:
+        dof: (nv,) MuJoCo's place of each of ours.
+    """
+
+    def __init__(self, figure: Figure, model: Any) -> None:
+        self._size, self._free = (figure.model.nq, model.nq), figure.root == "free"
+        pairs = [(model.joint(name), figure.model.joints[figure.joint_id(name)]) for name in figure.joints]
+        self._addresses = [(int(theirs.qposadr[0]), ours) for theirs, ours in pairs]
+        self.dof = np.arange(figure.model.nv)
+        for theirs, ours in pairs:
+            self.dof[ours.idx_v] = int(theirs.dofadr[0])
+
+    def theirs(self, q: Array) -> Array:
+        """Posture in MuJoCo's order, from ours (nq,)."""
+        there = np.zeros(self._size[1])
+        if self._free:
+            there[:3], there[3], there[4:7] = q[:3], q[6], q[3:6]
+        for address, joint in self._addresses:
+            part = q[joint.idx_q : joint.idx_q + joint.nq]
+            there[address] = part[0] if joint.nq == 1 else np.arctan2(part[1], part[0])
+        return there
+
+    def ours(self, there: Array) -> Array:
+        """Our posture (nq,), of a figure on a free root whose joints have limits, from MuJoCo's."""
+        q = np.empty(self._size[0])
+        q[:3], q[3:6], q[6] = there[:3], there[4:7], there[3]
+        for address, joint in self._addresses:
+            q[joint.idx_q] = there[address]
+        return q
 
 
 class MinkTool(Tool):
@@ -272,9 +276,7 @@ class MinkTool(Tool):
         self._mink = mink
         model = self._mujoco_model = mujoco.MjModel.from_xml_string(mjcf(track.scene, (track.tip, *track.feet)))
         figure = track.scene.figure
-        self._order = [(int(model.joint(name).qposadr[0]), figure.model.joints[figure.joint_id(name)].idx_q)
-                       for name in figure.joints]  # fmt: skip
-        self._size = figure.model.nq
+        self._order = _Order(figure, model)
         self.reset(track.start)
         self._reach = self._task(track.tip, REACH_COST, 0.0)
         self._at = np.eye(4)
@@ -306,11 +308,7 @@ class MinkTool(Tool):
 
     def reset(self, q: Array) -> None:
         """Go to a posture."""
-        there = np.zeros(self._mujoco_model.nq)
-        there[:3], there[3], there[4:7] = q[:3], q[6], q[3:6]
-        for theirs, ours in self._order:
-            there[theirs] = q[ours]
-        self._configuration = self._mink.Configuration(self._mujoco_model, q=there)
+        self._configuration = self._mink.Configuration(self._mujoco_model, q=self._order.theirs(q))
         self.failures = 0
 
     def step(self, target: Array) -> None:
@@ -328,12 +326,7 @@ class MinkTool(Tool):
 
     def posture(self) -> Array:
         """Where it is."""
-        there = self._configuration.q
-        q = np.empty(self._size)
-        q[:3], q[3:6], q[6] = there[:3], there[4:7], there[3]
-        for theirs, ours in self._order:
-            q[ours] = there[theirs]
-        return q
+        return self._order.ours(self._configuration.q)
 
     def remarks(self) -> dict[str, float]:
         """How many pairs it looks at."""

@@ -9,16 +9,24 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench.adapters.base import FIRST_FIT, LADDER, Adapter, Budget, Tool, few
+from wholebody.bench.adapters.base import FIRST_FIT, LADDER, Adapter, Budget, Tool, few, made
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.base import Method
+from wholebody.methods.qp.active_set import guess_active_set
+from wholebody.methods.qp.method import QP
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.fallback import GUESS_TOLERANCE
+from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver, _Workspace
 from wholebody.tasks.base import Goal, Surroundings, filled
 
 _QP_BUDGETS: tuple[Budget, ...] = (
     *((tolerance, FIRST_FIT) for tolerance in (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),
     *LADDER[1:],
 )
+
+ONE_START = {"restarts": 0}
 
 NEWTONS: dict[str, dict[str, Any]] = {
     "slack": {"inequalities": "slack"},
@@ -34,16 +42,16 @@ _NEWTON_SETUPS = {
 }
 
 
-def qp_adapter(solver: str, package: str | None = None) -> Adapter:
+def qp_adapter(solver: str) -> Adapter:
     """The QP method with one of its solvers."""
     return Adapter(
         name=f"qp/{solver}",
         make=partial(_qp, solver),
+        hindered=partial(UnfinishedQP, solver=solver),
         loose=_QP_BUDGETS,
         setup=f"wb.QP(solver={solver!r}), all else as it comes: stages and seeded starts follow where the first "
         "descent does not reach the goals. Budgets of first fit are wb.QP(measures=False), those of "
         "few iterations have one descent only.",
-        package=package,
     )
 
 
@@ -51,7 +59,8 @@ def ccd_adapter() -> Adapter:
     """Cyclic coordinate descent."""
     return Adapter(
         name="ccd",
-        make=_ccd,
+        make=partial(made, wb.CCD, ONE_START),
+        hindered=partial(wb.CCD, iterations=1),
         loose=(*few(2, 5, 20), *LADDER[:8]),
         setup="wb.CCD(), all else as it comes: 400 sweeps from one start and at most 12 further starts. A budget of "
         "few iterations has no further starts.",
@@ -67,7 +76,7 @@ def dls_adapter() -> Adapter:
     """Damped least squares, the textbook baseline."""
     return Adapter(
         name="dls",
-        make=_dls,
+        make=partial(made, wb.DampedLeastSquares, {}),
         loose=(*few(2, 3, 4, 6), *LADDER),
         setup="wb.DampedLeastSquares(), all else as it comes: one start, at most 300 steps, damping by Sugihara 2011.",
         differences=(
@@ -80,9 +89,11 @@ def dls_adapter() -> Adapter:
 
 def newton_adapter(way: str) -> Adapter:
     """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
+    newton = partial(wb.Newton, **NEWTONS[way])
     return Adapter(
         name=f"newton/{way}",
-        make=partial(_newton, way),
+        make=partial(made, newton, ONE_START),
+        hindered=partial(newton, iterations=1),
         loose=(*few(3, 6, 12, 25), *LADDER[1:]),
         setup=f"wb.Newton() with {_NEWTON_SETUPS[way]}; all else as it comes. A budget of few iterations has one "
         "start.",
@@ -93,35 +104,39 @@ def newton_adapter(way: str) -> Adapter:
 
 
 def _qp(solver: str, tolerance: float, iterations: int | None) -> Method:
-    from wholebody.methods.qp.method import QP
-
     if iterations is None or iterations == FIRST_FIT:
         return QP(solver=solver, tolerance=tolerance, measures=iterations is None)
     return QP(solver=solver, tolerance=tolerance, iterations=iterations, budget=0, restarts=0)
 
 
-def _ccd(tolerance: float, iterations: int | None) -> Method:
-    from wholebody.methods.ccd.method import CCD
-
-    if iterations is None:
-        return CCD(tolerance=tolerance)
-    return CCD(tolerance=tolerance, iterations=iterations, restarts=0)
+LIMIT = 5  # iterations: OSQP takes 25 to some hundreds for programs of a reach
 
 
-def _newton(way: str, tolerance: float, iterations: int | None) -> Method:
-    from wholebody.methods.newton.method import Newton
+class Unfinished(OSQPSolver):
+    """OSQP that is stopped early, without the active sets and the fallback that make its answers exact."""
 
-    if iterations is None:
-        return Newton(tolerance=tolerance, **NEWTONS[way])
-    return Newton(tolerance=tolerance, iterations=iterations, restarts=0, **NEWTONS[way])
+    name = "osqp, unfinished"
+
+    def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
+        """Minimise, not quite; a guess is not used."""
+        return self.solve_cold(program)
+
+    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
+        """What some iterations lead to, inside the box of the program."""
+        if self._workspace is None or not self._workspace.fits(program):
+            self._workspace = _Workspace(program, self._workspace)
+        self._workspace.load(program)
+        x, used = self._workspace.run(LIMIT, 1e-3)
+        x = x.clip(program.lower, program.upper)
+        return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, used, self.name)
 
 
-def _dls(tolerance: float, iterations: int | None) -> Method:
-    from wholebody.methods.damped_least_squares import DampedLeastSquares
+class UnfinishedQP(QP):
+    """The QP method with such a solver."""
 
-    if iterations is None:
-        return DampedLeastSquares(tolerance=tolerance)
-    return DampedLeastSquares(tolerance=tolerance, iterations=iterations)
+    def _qp_solver(self) -> QPSolver:
+        """One that never finishes."""
+        return Unfinished()
 
 
 class MovingPoint(Goal):

@@ -11,24 +11,13 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
-from wholebody.bench.adapters.loop import GAIN, STEP, Loop, StepError, Stepper, kept_apart, pulls
+from wholebody.bench.adapters.loop import GAIN, STEP, Loop, Stepper, kept_apart, pulls
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
+from wholebody.methods.differential import StepError
 from wholebody.problem import Problem
-from wholebody.tasks import (
-    CenterOfMass,
-    Displacement,
-    Effort,
-    Frame,
-    Freeze,
-    Hold,
-    Orientation,
-    Point,
-    Posture,
-    Relative,
-    StepLimit,
-)
 from wholebody.tasks.residuals import PlacementResidual
 
 NEAREST = 60  # pairs that its barrier looks at in a solve; it gets slower with more, and loses contacts with fewer
@@ -42,6 +31,7 @@ def pink_adapter() -> Adapter:
     return Adapter(
         name="pink",
         make=PinkLoop,
+        prepare=PinkLoop.prepare,
         loose=(*few(5, 10, 20), *LADDER),
         setup="pink.solve_ik on our own Pinocchio model, with DAQP: FrameTask, RelativeFrameTask, ComTask and "
         "LinearHolonomicTask (posture and measures, with a weight that fades) as soft tasks, whole holds and frozen "
@@ -57,7 +47,6 @@ def pink_adapter() -> Adapter:
             "pink has no task for Axis, no Balance, Plane or ReachCones, and holds whole frames only",
             "pink minimises Effort and Displacement only",
         ),
-        package="pin-pink",
     )
 
 
@@ -66,26 +55,19 @@ class PinkLoop(Loop):
 
     name = "pink"
 
-    def takes(self, term: Any) -> str | None:
-        """What pink has a task for."""
-        if isinstance(term, Hold):
-            return None if term.orientation else "its hard tasks hold whole frames"
-        kinds = (Point, Frame, Orientation, CenterOfMass, Posture, Relative, Freeze, StepLimit, Effort, Displacement)
-        return None if isinstance(term, kinds) else ""
-
     def build(self, problem: Problem) -> Stepper:
         """Copy our models."""
         return _PinkStepper(problem)
 
 
-class _PinkStepper(Stepper):
+class _PinkStepper:
     def __init__(self, problem: Problem) -> None:
         from pink.limits import FloatingBaseVelocityLimit
 
         self._problem, figure = problem, problem.scene.figure
         self._model = model = figure.model.copy()  # pink hangs attributes onto it
         for goal in problem.goals:
-            if isinstance(goal, Point):
+            if isinstance(goal, wb.Point):
                 _offset_frame(model, goal)
         model.velocityLimit = np.full(model.nv, STEP)
         if figure.root == "free":
@@ -103,8 +85,8 @@ class _PinkStepper(Stepper):
             self._geometry.geometryObjects[number].placement = scene.geometry.geometryObjects[ours].placement * shift
         self._points: list[tuple[Any, Array]] = []
         self._tasks = [self._goal(goal) for goal in problem.goals]
-        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, Hold)]
-        frozen = [figure_dof for bound in problem.bounds if isinstance(bound, Freeze)
+        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, wb.Hold)]
+        frozen = [figure_dof for bound in problem.bounds if isinstance(bound, wb.Freeze)
                   for figure_dof in scene.figure.dofs(bound.joints).tolist()]  # fmt: skip
         if frozen:
             self._hard.append(self._joints(problem.start, sorted(set(frozen)), np.ones(len(set(frozen)))))
@@ -144,15 +126,15 @@ class _PinkStepper(Stepper):
         from pink.tasks import ComTask, FrameTask
 
         cost = goal.weight**0.5
-        if isinstance(goal, Point):
+        if isinstance(goal, wb.Point):
             task = FrameTask(_offset_name(goal), position_cost=cost, orientation_cost=0.0)
             self._points.append((task, np.array(goal.resolved_target)))
             return task
-        if isinstance(goal, CenterOfMass):
+        if isinstance(goal, wb.CenterOfMass):
             task = ComTask(cost=[cost, cost, cost if goal.axes == "xyz" else 0.0])
             task.set_target(np.array((*goal.resolved_target, 0.0)[:3]))
             return task
-        if isinstance(goal, Posture):
+        if isinstance(goal, wb.Posture):
             dofs = np.asarray(goal.dofs)
             return self._joints(goal.resolved_target, dofs, np.full(len(dofs), cost))
         return self._placement(goal.residual, cost)
@@ -173,11 +155,11 @@ class _PinkStepper(Stepper):
         return LinearHolonomicTask(np.eye(self._model.nv)[dofs], np.zeros(len(dofs)), np.array(reference), cost=cost)
 
 
-def _offset_name(goal: Point) -> str:
+def _offset_name(goal: wb.Point) -> str:
     return f"{goal.frame} at {goal.resolved_offset.tolist()}"
 
 
-def _offset_frame(model: Any, goal: Point) -> None:
+def _offset_frame(model: Any, goal: wb.Point) -> None:
     frame = model.frames[goal.place.frame]
     there = frame.placement * pin.SE3(np.eye(3), goal.resolved_offset)
     if not model.existFrame(_offset_name(goal)):

@@ -6,24 +6,26 @@ The objects are added to its collision model, fixed to the world; it then treats
 
 from __future__ import annotations
 
+from functools import partial
 from typing import ClassVar
 from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 
+import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
+from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few, made
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, WITHIN, Track
 from wholebody.figures.packaged_urdf import urdf_path
-from wholebody.methods.base import Method
 
 
 def placo_adapter() -> Adapter:
     """The adapter to placo's kinematics solver."""
     return Adapter(
         name="placo",
-        make=_placo,
+        make=partial(made, wb.Placo, {}),
+        prepare=wb.Placo.prepare,
         loose=(*few(5, 10, 20), *LADDER),
         setup="wb.Placo(), all else as it comes: goals as soft tasks, holds and the self-collision constraint hard, "
         "joint limits, at most 0.05 rad or m a program, joints tasks for the measures with a weight that fades; one "
@@ -36,14 +38,7 @@ def placo_adapter() -> Adapter:
             "placo has one row a pair, between the two nearest points",
             "placo finds no solution where hard tasks repeat each other, as in a redundant closed loop",
         ),
-        package="placo",
     )
-
-
-def _placo(tolerance: float, iterations: int | None) -> Method:
-    from wholebody.methods.placo.method import Placo
-
-    return Placo(tolerance=tolerance) if iterations is None else Placo(tolerance=tolerance, iterations=iterations)
 
 
 class PlacoTool(Tool):

@@ -80,9 +80,9 @@ def _rows() -> dict[str, _Row]:
 
     rows = {f"qp/{solver}": _Row(partial(qp_adapter, solver)) for solver in ("osqp", "daqp")}
     for solver, module in SOLVERS.items():
-        rows[f"qp/{solver}"] = _Row(partial(qp_adapter, solver, module), (module,), "solvers")
+        rows[f"qp/{solver}"] = _Row(partial(qp_adapter, solver), (module,), "solvers")
     for solver in solver_names():  # any other that qpsolvers finds on this machine
-        rows.setdefault(f"qp/{solver}", _Row(partial(qp_adapter, solver, solver)))
+        rows.setdefault(f"qp/{solver}", _Row(partial(qp_adapter, solver)))
     for way in NEWTONS:
         rows[f"newton/{way}"] = _Row(partial(newton_adapter, way))
     rows["ccd"] = _Row(ccd_adapter)

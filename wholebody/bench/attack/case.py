@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -11,6 +12,9 @@ import numpy as np
 Outcome = Literal["right", "refused", "gave up", "wrong"]
 
 SCRIPT = "repeat.py"
+CORPUS = Path(__file__).parent / "corpus"
+"""Small files of every kind that people give to the package, each right as it stands, and calls that are right."""
+
 PATTERN = (
     ("file", "solve", "file", "argument") * 4
     + ("file", "sweep", "file", "solve") * 3
@@ -46,12 +50,10 @@ class Written:
     Attributes:
         script: Python; it leaves a `Verdict` in the name `verdict` and prints it.
         files: what the script reads, by names beside it.
-        timed: whether the case is a solve, of which the time counts.
     """
 
     script: str
     files: Mapping[str, bytes] = field(default_factory=dict)
-    timed: bool = False
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.bench.attack import corpus
-from wholebody.bench.attack.case import Verdict, Written
+from wholebody.bench.attack.case import CORPUS, Verdict, Written
 from wholebody.bench.attack.mutations import mutated
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
 
@@ -30,6 +29,10 @@ NO_FILES = (
     "/dev/full",
 )
 ELSEWHERE = 0.01  # share of cases whose path leads to no file
+
+ROBOT = {"robot.urdf": "robot.urdf", "part.obj": "box.obj"}
+TASK = {"task.toml": "everything.toml"} | ROBOT
+"""Names of files that belong together, and where they are stored."""
 
 SCRIPT = '''"""{title}"""
 
@@ -81,24 +84,35 @@ def written(rng: np.random.Generator) -> Written:
 def _reader(rng: np.random.Generator) -> Reader:
     kind = str(rng.choice(["task", "robot", "mesh", "track", "result"], p=[0.3, 0.3, 0.1, 0.15, 0.15]))
     if kind == "mesh":
-        name, text = (("part.obj", corpus.CUBE), ("part.stl", corpus.STL))[int(rng.integers(2))]
-        return Reader("", "wb.Mesh({path}).pieces()", {name: text.encode()})
+        name, stored = (("part.obj", "box.obj"), ("part.stl", "tetrahedron.stl"))[int(rng.integers(2))]
+        return Reader("", "wb.Mesh({path}).pieces()", _stored({name: stored}))
     if kind == "track":
         call = "read_track({path}, wb.load(HERE / 'robot.urdf'))"
-        return Reader("from wholebody.interaction.track_files import read_track\n", call, corpus.track())
+        return Reader(
+            "from wholebody.interaction.track_files import read_track\n",
+            call,
+            _stored({"track.csv": "track.csv"} | ROBOT),
+        )
     if kind == "result":
-        return Reader("from wholebody.cli.result import read\n", "read({path})", corpus.result())
+        return Reader(
+            "from wholebody.cli.result import read\n", "read({path})", _stored({"result.json": "result.json"} | TASK)
+        )
     if kind == "robot":
         if rng.random() < SHIPPED:
             return Reader("", "wb.load({path})", {"hand.urdf": urdf_path("hand").read_bytes()})
-        return Reader("", "wb.load({path})", corpus.robot())
+        return Reader("", "wb.load({path})", _stored(ROBOT))
     imports = "from wholebody.taskfile import read_task\n"
     if rng.random() < SHIPPED:
         tasks = task_paths()
         name = sorted(tasks)[int(rng.integers(len(tasks)))]
         beside = {p.name: p.read_bytes() for p in tasks[name].parent.iterdir() if p.suffix in (".urdf", ".csv")}
         return Reader(imports, "read_task({path})", {"task.toml": tasks[name].read_bytes(), **beside})
-    return Reader(imports, "read_task({path})", corpus.task())
+    return Reader(imports, "read_task({path})", _stored(TASK))
+
+
+def _stored(names: Mapping[str, str]) -> dict[str, bytes]:
+    """Files of the corpus, under other names."""
+    return {name: (CORPUS / stored).read_bytes() for name, stored in names.items()}
 
 
 def refused(error: Exception) -> Verdict:

@@ -15,21 +15,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.problem import Problem
 from wholebody.scene import Scene
-from wholebody.tasks import (
-    Axis,
-    CenterOfMass,
-    Frame,
-    Freeze,
-    Hold,
-    Orientation,
-    Plane,
-    Point,
-    Posture,
-    Relative,
-)
 
 RESTING = 1e-6  # m: a pair that begins deeper than this begins inside, and is asked for the whole clearance
 
@@ -106,13 +95,9 @@ class Pairs:
 
 
 def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q: Array) -> Judged:
-    """Measure a posture.
+    """Measure a posture (nq,) against goals, constraints and bounds as they were given.
 
-    Args:
-        problem: what was asked; only its scene, start and clearance are read, and Balance and ReachCones.
-        goals: as they were given.
-        constraints: as they were given, with bounds.
-        q: (nq,) the posture.
+    Of the problem only the scene, the start and the clearance are read, and Balance and ReachCones.
     """
     scene, start = problem.scene, problem.start
     q = np.asarray(q, dtype=float)
@@ -174,22 +159,22 @@ class _Body:
 
     def goal(self, term: Any) -> float:
         """What is left of a goal, metres or radians, the larger."""
-        if isinstance(term, Point):
+        if isinstance(term, wb.Point):
             there = self._at(term.frame).act(np.array(term.offset, dtype=float))
             return float(np.linalg.norm(there - np.array(term.target, dtype=float)))
-        if isinstance(term, CenterOfMass):
+        if isinstance(term, wb.CenterOfMass):
             left = self._after.com[0] - np.array(term.target, dtype=float)
             return float(np.linalg.norm(left[: len(term.axes)]))
-        if isinstance(term, Frame):
+        if isinstance(term, wb.Frame):
             return _apart(self._at(term.frame), _placement(term.target))
-        if isinstance(term, Orientation):
+        if isinstance(term, wb.Orientation):
             return _angle(self._at(term.frame).rotation, pin.Quaternion(np.array(term.target, dtype=float)).matrix())
-        if isinstance(term, Axis):
+        if isinstance(term, wb.Axis):
             return self._axis(term)
-        if isinstance(term, Relative):
+        if isinstance(term, wb.Relative):
             wanted = self._between(self._before, term) if term.placement is None else _placement(term.placement)
             return _apart(self._between(self._after, term), wanted, term.orientation)
-        if isinstance(term, Posture):
+        if isinstance(term, wb.Posture):
             way = pin.difference(self._model, np.array(term.target, dtype=float), self._q)
             taking = np.zeros(self._model.nv, dtype=bool)
             taking[self._places(term.joints)] = True
@@ -199,19 +184,19 @@ class _Body:
 
     def constraint(self, term: Any) -> Iterator[float]:
         """By how much a constraint or a frozen joint misses what must hold; nothing for bounds on speeds."""
-        if isinstance(term, Hold):
+        if isinstance(term, wb.Hold):
             wanted = self._at(term.frame, self._before) if term.at is None else _placement(term.at)
             yield _apart(self._at(term.frame), wanted, term.orientation)
-        elif isinstance(term, Plane):
+        elif isinstance(term, wb.Plane):
             normal = np.array(term.normal, dtype=float)
             point = self._at(term.frame, self._before).translation if term.point is None else np.array(term.point)
             height = float((self._at(term.frame).translation - point) @ normal / np.linalg.norm(normal))
             yield -height if term.side == "above" else abs(height)
-        elif isinstance(term, Freeze):
+        elif isinstance(term, wb.Freeze):
             way = pin.difference(self._model, self._start, self._q)
             yield float(np.abs(way[self._places(term.joints)]).max(initial=0.0))
 
-    def _axis(self, term: Axis) -> float:
+    def _axis(self, term: wb.Axis) -> float:
         there = self._at(term.frame)
         pointing = there.rotation @ np.array(term.axis, dtype=float)
         wanted = (
@@ -221,7 +206,7 @@ class _Body:
         )
         return float(np.arctan2(np.linalg.norm(np.cross(pointing, wanted)), pointing @ wanted))
 
-    def _between(self, data: Any, term: Relative) -> pin.SE3:
+    def _between(self, data: Any, term: wb.Relative) -> pin.SE3:
         return self._at(term.to, data).actInv(self._at(term.frame, data))
 
     def _at(self, frame: str, data: Any = None) -> pin.SE3:

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from wholebody.bench.attack.case import SCRIPT, Case, Verdict, Written
-from wholebody.bench.attack.writing import write
-from wholebody.errors import WholebodyError
+from wholebody.bench.attack import arguments, files, solves, streams, sweeps
+from wholebody.bench.attack.case import KINDS, SCRIPT, Case, Verdict, Written
+from wholebody.errors import UnknownNameError, WholebodyError
 from wholebody.files import Scratch
 from wholebody.runner import ONE_THREAD, Child, EndedError, Job, allow, run_jobs, tell
 
@@ -40,14 +40,10 @@ class Ended:
 
 
 def attack(cases: Iterator[Case], jobs: int, going: Callable[[], bool], deadline: float = DEADLINE) -> Iterator[Ended]:
-    """Run cases, and return them as they end.
+    """Run cases, `jobs` at a time, and return them as they end; no more are begun once `going` says no.
 
-    Args:
-        cases: what is run.
-        jobs: processes at a time. Their libraries have one thread, whose CPU time is what a call takes on an idle
-            machine.
-        going: asked before each case; no more are begun once it says no.
-        deadline: seconds for a case.
+    The libraries of a process have one thread, whose CPU time is what a call takes on an idle machine. A case that
+    takes longer than the deadline, seconds, is run once more before it counts as one that hangs.
     """
     again: deque[Case] = deque()
     repeated: set[Case] = set()
@@ -89,6 +85,23 @@ def _attacked(case: Case, deadline: float) -> Verdict:
     tell(prepared)
     allow(deadline)
     return run(prepared)
+
+
+WRITERS = {
+    "argument": arguments.written, "file": files.written, "solve": solves.written, "stream": streams.written,
+    "sweep": sweeps.written,
+}  # fmt: skip
+
+
+def write(case: Case) -> Written:
+    """Write a case out, from its seed and number and from nothing else.
+
+    Raises:
+        UnknownNameError: there is no such kind.
+    """
+    if case.kind not in WRITERS:
+        raise UnknownNameError("kind of case", case.kind, KINDS)
+    return WRITERS[case.kind](case.rng())
 
 
 def run(prepared: Written) -> Verdict:

@@ -1,20 +1,30 @@
-"""Solves: figures inside things by micrometres to half a metre, goals that can be met, cannot be, or contradict."""
+"""Solves: figures inside things by micrometres to half a metre, goals that can be met, cannot be, or contradict.
+
+The verdict is on what an answer says of itself, against what the judge finds.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any, get_args
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.bench.attack.bodies import Body, body
-from wholebody.bench.attack.case import Written
-from wholebody.bench.attack.things import Placed, Thing, clear, inside, seven
-from wholebody.methods import installed_methods
+from wholebody.bench.attack.case import Verdict, Written
+from wholebody.bench.attack.judging import Judged, Pairs, judge
+from wholebody.bench.attack.things import Thing, clear, inside, seven
+from wholebody.bench.problem_sets.things import Occupied
+from wholebody.methods import METHODS, installed_methods
+from wholebody.methods.solve import method_named
+from wholebody.problem import Problem
+from wholebody.solution import Solution, Status
 
 CLEARANCES = (0.0, 0.0, 0.001, 0.005, 0.005, 0.05, 0.3)
-METHODS = (*("'qp'",) * 12, "wb.QP(tolerance=1e-8)", "wb.QP(measures=False)", "wb.QP(solver='daqp')") + tuple(
+ASKED_OF = (*("'qp'",) * 12, "wb.QP(tolerance=1e-8)", "wb.QP(measures=False)", "wb.QP(solver='daqp')") + tuple(
     f"'{name}'" for name in installed_methods() if name != "qp"
 )
 MEASURES = (
@@ -45,7 +55,7 @@ method = {method}
 began = process_time()
 solution = wb.solve(problem, method=method)
 seconds = process_time() - began
-verdict = claims.verdict(
+verdict = solves.verdict(
     problem, goals, constraints, solution, method=method, witness={witness}, seconds=seconds,
 )
 print(verdict)
@@ -75,16 +85,16 @@ def written(rng: np.random.Generator) -> Written:
     things = around(figure, start, witness, clearance, rng)
     asked = wishes(figure, start, witness, rng)
     known = witness is not None and asked.can and bool(asked.goals) and _clear(figure, witness, things, clearance)
-    chosen = METHODS[int(rng.integers(len(METHODS)))]
+    chosen = ASKED_OF[int(rng.integers(len(ASKED_OF)))]
     measures = MEASURES[int(rng.integers(len(MEASURES)))]
     title = f"{figure.figure.name} among {len(things)} things; {'a posture that fits is known' if known else 'made up'}"
     tail = TAIL.format(measures=measures, clearance=clearance, method=chosen, witness=known)
-    return Written(opening(title, figure, start, things, asked) + tail, figure.files, timed=True)
+    return Written(opening(title, figure, start, things, asked, "solves") + tail, figure.files)
 
 
-def opening(title: str, figure: Body, start: Array, things: list[Thing], asked: Asked) -> str:
-    """Return the script up to the problem: figure, scene, start, goals, constraints."""
-    imports = "from wholebody.bench.attack import claims\n"
+def opening(title: str, figure: Body, start: Array, things: list[Thing], asked: Asked, judge: str) -> str:
+    """Return the script up to the problem: figure, scene, start, goals, constraints; `judge` is its judging module."""
+    imports = f"from wholebody.bench.attack import {judge}\n"
     if "_path" in figure.call:
         imports += "from wholebody.figures.packaged_urdf import task_paths, urdf_path\n"
     lines = [
@@ -109,7 +119,7 @@ def around(
     figure: Body, start: Array, witness: Array | None, clearance: float, rng: np.random.Generator
 ) -> list[Thing]:
     """Return things: clear of the witness, some of them in the figure where it starts."""
-    placed = Placed(figure, [start] if witness is None else [start, witness])
+    placed = Occupied(figure.figure, [start] if witness is None else [start, witness])
     count = CROWD if rng.random() < 0.05 else int(rng.integers(0, MOST + 1))
     room = clearance + 1e-3 * figure.size
     found: list[Thing | None] = []
@@ -125,7 +135,7 @@ def around(
 
 
 def _clear(figure: Body, witness: Array, things: list[Thing], clearance: float) -> bool:
-    placed = Placed(figure, [witness])
+    placed = Occupied(figure.figure, [witness])
     return all(placed.distance(thing.shape, thing.placement, 0) > clearance for thing in things)
 
 
@@ -145,15 +155,15 @@ def wishes(figure: Body, start: Array, witness: Array | None, rng: np.random.Gen
         way = rng.normal(size=3)
         way *= figure.size * float(rng.choice([0.02, 0.3, 1.0, 5.0, 40.0])) / np.linalg.norm(way)
         place = np.clip(data.oMf[model.getFrameId(str(frames[0]))].translation + way, -FARTHEST, FARTHEST)
-        asked.goals.append(f"wb.Point({str(frames[0])!r}, {_three(place)})")
+        asked.goals.append(f"wb.Point({str(frames[0])!r}, {three(place)})")
         asked.can = False
     if mood == "contradicts":
         asked.can = False
         place = data.oMf[model.getFrameId(str(frames[0]))].translation
         for sign in (-1.0, 1.0):
-            asked.goals.append(f"wb.Point({str(frames[0])!r}, {_three(place + sign * 0.1 * figure.size)})")
+            asked.goals.append(f"wb.Point({str(frames[0])!r}, {three(place + sign * 0.1 * figure.size)})")
         if rng.random() < 0.5:
-            asked.constraints.append(f"wb.Hold({str(frames[0])!r}, {_three(place + 0.3 * figure.size)})")
+            asked.constraints.append(f"wb.Hold({str(frames[0])!r}, {three(place + 0.3 * figure.size)})")
     _hold(figure, start, witness, before, data, asked, rng)
     return asked
 
@@ -167,13 +177,13 @@ def _goal(name: str, at: pin.SE3, mass: Array, q: Array, rng: np.random.Generato
         return f"wb.Orientation({name!r}, {seven(at)[3:]}{weight})"
     if kind == "Axis":
         axis = rng.normal(size=3)
-        return f"wb.Axis({name!r}, {_three(axis)}, direction={_three(at.rotation @ axis)}{weight})"
+        return f"wb.Axis({name!r}, {three(axis)}, direction={three(at.rotation @ axis)}{weight})"
     if kind == "CenterOfMass":
         axes = ("xy", "xyz")[int(rng.integers(2))]
-        return f"wb.CenterOfMass({_three(mass)}, axes={axes!r}{weight})"
+        return f"wb.CenterOfMass({three(mass)}, axes={axes!r}{weight})"
     if kind == "Posture" and rng.random() < 0.3:
         return f"wb.Posture(np.array({q.tolist()!r}){weight})"
-    return f"wb.Point({name!r}, {_three(at.translation)}{weight})"
+    return f"wb.Point({name!r}, {three(at.translation)}{weight})"
 
 
 def _hold(
@@ -193,7 +203,7 @@ def _hold(
         normal = rng.normal(size=3)
         place = data.oMf[model.getFrameId(name)].translation
         side = ("on", "above")[int(rng.integers(2))]
-        asked.constraints.append(f"wb.Plane({name!r}, {_three(normal)}, point={_three(place)}, side={side!r})")
+        asked.constraints.append(f"wb.Plane({name!r}, {three(normal)}, point={three(place)}, side={side!r})")
     joints = figure.figure.joints
     if rng.random() < 0.15 and len(joints) > 1:
         chosen = [str(name) for name in rng.permutation(joints)[: int(rng.integers(1, len(joints)))]]
@@ -205,5 +215,82 @@ def _hold(
         asked.constraints.append("wb.Balance()" if rng.random() < 0.7 else "wb.ReachCones()")
 
 
-def _three(values: Array) -> str:
+def three(values: Array) -> str:
+    """Return three numbers as Python."""
     return repr(tuple(float(x) for x in values))
+
+
+ROUNDING = 2e-6  # m, rad: by which two ways of measuring may differ for pieces of up to a metre
+OF_SIZE = 1e-5  # of the size of the largest piece: coal's distances of ellipsoids are relative to it
+SHARE = 1.1  # of a method's tolerance, to which its answers may be off
+CLEARLY = 0.5  # share of the tolerance within which everything must hold for "infeasible" to be a false claim
+
+
+def tolerance_of(method: Any) -> float:
+    """Return the tolerance of a method, given by name or configured, metres and radians."""
+    chosen: Any = method_named(method) if method in METHODS else method
+    return float(chosen.tolerance)
+
+
+def verdict(
+    problem: Problem,
+    goals: Sequence[Any],
+    constraints: Sequence[Any],
+    solution: Solution,
+    *,
+    method: Any,
+    witness: bool,
+    seconds: float,
+) -> Verdict:
+    """Judge what a method, by name or configured, answered in seconds of CPU time; what was asked is as in `judge`.
+
+    `witness` says whether the problem was made from a posture that solves it.
+    """
+    found = judge(problem, goals, constraints, solution.q)
+    words, said = _words(found), f"{solution.method} says {solution.status!r}"
+    wrongs = _wrongs(problem, solution, found, tolerance_of(method))
+    if wrongs:
+        return Verdict("wrong", f"{said}: {', '.join(wrongs)}; {words}", seconds, solution.status)
+    gave_up = witness and solution.status != "solved"
+    return Verdict("gave up" if gave_up else "right", f"{said}; {words}", seconds, solution.status)
+
+
+def _wrongs(problem: Problem, solution: Solution, found: Judged, tolerance: float) -> list[str]:
+    """What is false about an answer."""
+    if not found.finite:
+        return ["the posture or a distance at it is not made of numbers"]
+    if solution.status not in get_args(Status):
+        return [f"{solution.status!r} is no status"]
+    size = Pairs(problem.scene).size
+    rounding = ROUNDING + OF_SIZE * size
+    allowed = SHARE * tolerance + rounding
+    wrongs = []
+    if found.unit > 1e-6:
+        wrongs.append(f"a quaternion is {found.unit:.3g} off unit length")
+    if solution.status == "solved" and found.goal > allowed:
+        wrongs.append(f"goals are missed by {found.goal:.3g} m or rad")
+    if solution.status in ("solved", "unreachable") and found.violation > allowed:
+        wrongs.append(f"what must hold is missed by {found.violation:.3g} m or rad")
+    if solution.status == "infeasible" and found.violation < CLEARLY * tolerance:
+        wrongs.append(f"everything holds to {found.violation:.3g} m or rad")
+    said = solution.assessment
+    pairs = (
+        ("least distance", said.least_distance, found.least),
+        ("goal error", max(said.goal_error, said.goal_angle), found.goal),
+        ("clearance lack", said.clearance_violation, found.lack),
+    )
+    for name, value, measured in pairs:
+        if not np.isfinite(value) and value != measured:
+            wrongs.append(f"its {name} is {value}")
+        elif np.isfinite(value) and abs(value - measured) > rounding + 1e-6 * abs(measured):
+            wrongs.append(f"its {name} is {value:.9g}, and {measured:.9g} was measured")
+    return wrongs
+
+
+def _words(found: Judged) -> str:
+    if not found.finite:
+        return "not measured"
+    return (
+        f"goals {found.goal:.3g}, least distance {found.least:.3g}, clearance lack {found.lack:.3g} ({found.closest}), "
+        f"limits {found.limits:.3g}, constraints {found.constraints:.3g}"
+    )

@@ -12,8 +12,9 @@ from wholebody.arrays import Array
 from wholebody.bench.attack.bodies import Body, body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs, judge
-from wholebody.bench.attack.solves import Asked, opening
-from wholebody.bench.attack.things import Placed, Thing, clear, seven
+from wholebody.bench.attack.solves import Asked, opening, three
+from wholebody.bench.attack.things import Thing, clear, seven
+from wholebody.bench.problem_sets.things import Occupied
 from wholebody.errors import WholebodyError
 from wholebody.problem import Problem
 
@@ -59,14 +60,7 @@ class Watch:
     """Looks at every step of a stream, and at the way between two postures."""
 
     def __init__(self, problem: Problem, constraints: Sequence[Any], *, speed: float, dt: float) -> None:
-        """Begin.
-
-        Args:
-            problem: what is asked.
-            constraints: as they were given.
-            speed: most that a joint may move [rad/s or m/s]; inf for any.
-            dt: seconds a step.
-        """
+        """Begin; joints may move at `speed` [rad/s or m/s], inf for any, and a step takes `dt` seconds."""
         self._problem, self._constraints, self._most = problem, constraints, speed * dt
         self._frame = 0
         self._wrongs: list[str] = []
@@ -135,15 +129,16 @@ def written(rng: np.random.Generator) -> Written:
     for target in targets:
         goals = target if method != "step" else f"[{_goal(figure, frame, target, rng)}]"
         frames.append(f"    ({goals}, {_moved(things, figure.size, rng)!r}),\n")
-    text = opening(f"{figure.figure.name}: {len(targets)} frames by {method}", figure, figure_start, things, asked)
-    text = text.replace("import claims", "import streams")
+    text = opening(
+        f"{figure.figure.name}: {len(targets)} frames by {method}", figure, figure_start, things, asked, "streams"
+    )
     text += f"\nframes = [\n{''.join(frames)}]"
     values = {"clearance": clearance, "speed": speed if np.isfinite(speed) else 1e300, "dt": dt, "method": method}
     return Written(text + (STEPPING if method == "step" else DRAGGING).format(**values), figure.files)
 
 
 def _things(figure: Body, start: Array, rng: np.random.Generator) -> list[Thing]:
-    placed = Placed(figure, [start])
+    placed = Occupied(figure.figure, [start])
     count = int(rng.integers(0, 8))
     found = (clear(rng, placed, figure.size, 1e-3 * figure.size, [0]) for _ in range(count))
     return [thing for thing in found if thing is not None]
@@ -159,10 +154,10 @@ def _targets(figure: Body, start: Array, frame: str, count: int, rng: np.random.
         places.append(np.array(data.oMf[number].translation))
     places[2] = places[2] + rng.normal(size=3) * figure.size * float(rng.choice([0.0, 0.3]))
     if rng.random() < 0.3:
-        return [_three(places[int(rng.integers(3))]) for _ in range(count)]
+        return [three(places[int(rng.integers(3))]) for _ in range(count)]
     stations = np.linspace(0.0, 2.0, count)
     return [
-        _three(np.clip(places[int(s)] + (s - int(s)) * (places[min(int(s) + 1, 2)] - places[int(s)]), -99.0, 99.0))
+        three(np.clip(places[int(s)] + (s - int(s)) * (places[min(int(s) + 1, 2)] - places[int(s)]), -99.0, 99.0))
         for s in stations
     ]
 
@@ -192,7 +187,3 @@ def _moved(things: list[Thing], size: float, rng: np.random.Generator) -> list[t
     place = things[number].placement
     place.translation = np.clip(place.translation + rng.normal(size=3) * 0.1 * size, -99.0, 99.0)
     return [(f"thing {number}", seven(place))]
-
-
-def _three(values: Array) -> str:
-    return repr(tuple(float(x) for x in values))

@@ -10,7 +10,8 @@ from wholebody.bench.attack.bodies import body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs
 from wholebody.bench.attack.solves import Asked, opening
-from wholebody.bench.attack.things import Placed, clear, inside
+from wholebody.bench.attack.things import clear, inside
+from wholebody.bench.problem_sets.things import Occupied
 from wholebody.geometry.continuous.sweep import TOLERANCE, FirstContact
 from wholebody.scene import Scene
 
@@ -37,7 +38,7 @@ def written(rng: np.random.Generator) -> Written:
     free = list(range(figure.figure.model.nv)) if rng.random() < 0.3 else None
     end = figure.near(q, share, rng, free)
     middle = np.asarray(pin.interpolate(figure.figure.model, q, end, float(rng.uniform(0.2, 0.8))))
-    placed = Placed(figure, [middle, q])
+    placed = Occupied(figure.figure, [middle, q])
     things = []
     for _ in range(int(rng.integers(0, 6))):
         if rng.random() < 0.5:
@@ -48,20 +49,12 @@ def written(rng: np.random.Generator) -> Written:
             thing = clear(rng, placed, figure.size, 0.0, [1])
         if thing is not None and np.abs(thing.at[:3]).max() < 99.0:
             things.append(thing)
-    text = opening(f"a way of {figure.figure.name} among {len(things)} things", figure, q, things, Asked())
-    return Written(text.replace("import claims", "import sweeps") + TAIL.format(end=end.tolist()), figure.files)
+    text = opening(f"a way of {figure.figure.name} among {len(things)} things", figure, q, things, Asked(), "sweeps")
+    return Written(text + TAIL.format(end=end.tolist()), figure.files)
 
 
 def verdict(scene: Scene, start: Array, end: Array, found: FirstContact | None, seconds: float) -> Verdict:
-    """Judge a sweep.
-
-    Args:
-        scene: with the figure and things.
-        start: (nq,) where the way begins.
-        end: (nq,) where it ends.
-        found: what the sweep found.
-        seconds: CPU time that it took.
-    """
+    """Judge what a sweep found on the way from one posture (nq,) to another, and took in seconds of CPU time."""
     pairs = Pairs(scene)
     rounding = ROUNDING * max(1.0, pairs.size)
     shares = np.linspace(0.0, 1.0, PARTS + 1)

@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench.attack.bodies import Body
+from wholebody.bench.problem_sets.things import Occupied
 
 KINDS = ("box", "sphere", "capsule", "ellipsoid", "hull", "plate", "halfspace", "mesh")
 SHARES = (0.25, 0.15, 0.15, 0.1, 0.12, 0.12, 0.1, 0.01)
 THINNEST = 2e-4  # m
 LEAST, MOST = 2e-4, 300.0  # m: of a size
 FAR = 60.0  # m: things stand nearer than this
+TRIES = 20  # things that are tried for one that is clear
 HALVINGS = 60  # of a way, until a depth is met
 
 
@@ -88,52 +88,22 @@ def _corner(size: float) -> tuple[wb.Shape, str]:
     return wb.Mesh((np.array(vertices), np.array(faces))), call
 
 
-class Placed:
-    """The pieces of a figure at postures."""
-
-    def __init__(self, body: Body, postures: list[Array]) -> None:
-        """Place the pieces at each posture (nq,)."""
-        model = body.figure.model
-        data = model.createData()
-        self.places: list[list[tuple[Any, pin.SE3]]] = []
-        for q in postures:
-            pin.forwardKinematics(model, data, q)
-            self.places.append(
-                [
-                    (piece.geometry, data.oMi[piece.parentJoint] * piece.placement)
-                    for piece in body.figure.geometry.geometryObjects
-                ]
-            )
-        centers = np.array([place.translation for one in self.places for _, place in one]).reshape(-1, 3)
-        self.middle = centers.mean(axis=0) if len(centers) else np.zeros(3)
-        self.spread = float(np.linalg.norm(centers - self.middle, axis=1).max(initial=0.0))
-
-    def distance(self, thing: wb.Shape, at: pin.SE3, posture: int) -> float:
-        """Least signed distance of a shape at a place from the figure in one of the postures, metres."""
-        least = np.inf
-        for piece in thing.pieces():
-            there = at * piece.placement
-            put = coal.Transform3s(there.rotation, there.translation)
-            for geometry, place in self.places[posture]:
-                other = coal.Transform3s(place.rotation, place.translation)
-                found = coal.distance(
-                    piece.geometry, put, geometry, other, coal.DistanceRequest(), coal.DistanceResult()
-                )
-                least = min(least, float(found))
-        return least
-
-
-def somewhere(rng: np.random.Generator, placed: Placed, size: float) -> pin.SE3:
+def somewhere(rng: np.random.Generator, placed: Occupied, size: float) -> pin.SE3:
     """Return a place about a figure."""
-    reach = 1.3 * placed.spread + 0.5 * size
-    return pin.SE3(pin.Quaternion(_turn(rng)).matrix(), placed.middle + rng.uniform(-reach, reach, 3))
+    middle, spread = _extent(placed)
+    reach = 1.3 * spread + 0.5 * size
+    return pin.SE3(pin.Quaternion(_turn(rng)).matrix(), middle + rng.uniform(-reach, reach, 3))
 
 
-def clear(
-    rng: np.random.Generator, placed: Placed, size: float, room: float, postures: list[int], tries: int = 20
-) -> Thing | None:
+def _extent(placed: Occupied) -> tuple[Array, float]:
+    """Middle (3,) of a figure's pieces in its postures, and how far the farthest is from there, metres."""
+    middle = placed.centres.mean(axis=0) if len(placed.centres) else np.zeros(3)
+    return middle, float(np.linalg.norm(placed.centres - middle, axis=1).max(initial=0.0))
+
+
+def clear(rng: np.random.Generator, placed: Occupied, size: float, room: float, postures: list[int]) -> Thing | None:
     """Return a thing that leaves some room, metres, around a figure in some of its postures; None if none was found."""
-    for _ in range(tries):
+    for _ in range(TRIES):
         made, call = shape(rng, size)
         at = somewhere(rng, placed, size)
         if all(placed.distance(made, at, posture) > room for posture in postures):
@@ -141,16 +111,16 @@ def clear(
     return None
 
 
-def inside(rng: np.random.Generator, placed: Placed, size: float, depth: float) -> Thing | None:
+def inside(rng: np.random.Generator, placed: Occupied, size: float, depth: float) -> Thing | None:
     """Return a thing that is in the figure's first posture by a depth, metres; None where its shape does not let it."""
     made, call = shape(rng, size)
-    if not placed.places[0]:
+    if not placed.places:
         return None
-    start = pin.SE3(placed.places[0][int(rng.integers(len(placed.places[0])))][1])
+    start = placed.places[int(rng.integers(placed.count))]
     direction = rng.normal(size=3)
     direction /= np.linalg.norm(direction)
     turn = pin.Quaternion(_turn(rng)).matrix()
-    near, far = 0.0, 4.0 * (placed.spread + size)
+    near, far = 0.0, 4.0 * (_extent(placed)[1] + size)
 
     def at(way: float) -> pin.SE3:
         return pin.SE3(turn, start.translation + way * direction)

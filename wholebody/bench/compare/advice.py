@@ -12,7 +12,6 @@ from wholebody.bench.compare.paired import Ratio, named
 from wholebody.bench.compare.record import FLOOR
 from wholebody.bench.compare.results import EFFORT_FLOOR, Results, middle
 from wholebody.bench.compare.summary import GOOD, Summary
-from wholebody.bench.intervals import wilson
 from wholebody.bench.report import words
 
 NOTHING = Ratio(nan, 0.0, inf, 0)
@@ -22,7 +21,6 @@ class Choice(NamedTuple):
     """What to choose for one set. Methods that cannot be told apart stand together; none where none is dependable.
 
     Attributes:
-        set: which.
         fastest: dependable methods with the least time; the median milliseconds of the first.
         exact: dependable methods with the least error at any of their budgets; the median error of the first.
         cheapest: dependable methods with the least effort; the median effort of the first above the best known.
@@ -44,7 +42,6 @@ class Standing(NamedTuple):
     """A method over all sets.
 
     Attributes:
-        adapter: its name.
         taken: sets of which it takes every case.
         dependable: sets of which it solves at least 98 %.
         worst_set, worst_share: where it solves least of what it takes.
@@ -172,10 +169,12 @@ def _in_doubt(results: Results, ranked: Sequence[Standing]) -> str:
 
 def _warning(standing: Standing, rows: Sequence[Summary]) -> list[str]:
     """That a method is not enough, if in no set so many problems that it might be dependable after all are solved."""
+    from scipy.stats import binomtest
+
     mine = [row for row in rows if row.method == standing.method and row.refused < row.cases]
     for row in mine:
-        count = row.cases - row.refused
-        if not row.refused and wilson(round(row.success * count), count)[1] >= GOOD:
+        solved = binomtest(round(row.success * row.cases), row.cases) if not row.refused else None
+        if solved is not None and solved.proportion_ci(method="wilson").high >= GOOD:
             return []
     best = max(mine, key=lambda row: row.success)
     deep = f", and ends up to {standing.deepest_mm:.0f} mm inside of things" if standing.deepest_mm > 1.0 else ""

@@ -92,8 +92,7 @@ def _dress(panel: Any, quantity: Quantity, what: str) -> None:
     panel.axhline(COARSE, color=GREY, linewidth=0.9, linestyle="--", zorder=1)
     panel.set_title("shaded: more than half of the answers are none", loc="right", fontsize=8, color=GREY)
     panel.set_title(quantity.title, loc="left", fontsize=10)
-    panel.set_xlabel(f"time of {what} [ms]")
-    panel.set_ylabel(quantity.label)
+    panel.set(xlabel=f"time of {what} [ms]", ylabel=quantity.label)
 
 
 def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Path, Path]:
@@ -116,11 +115,12 @@ def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Pat
             )  # fmt: skip
         panel.axhline(98.0, color=GREY, linewidth=0.9, linestyle="--", zorder=1)
         plot_style.plain_log(panel)
-        panel.set_xlim(start, end)
-        panel.set_ylim(0.0, 103.0)
+        panel.set(xlim=(start, end), ylim=(0.0, 103.0))
         panel.set_title(f"solved to {tolerance:g} m and rad", loc="left", fontsize=10)
-        panel.set_xlabel(f"time of {'a frame' if results.moving(family) else 'a solve'} [ms]")
-        panel.set_ylabel("cases solved within the time [%]")
+        panel.set(
+            xlabel=f"time of {'a frame' if results.moving(family) else 'a solve'} [ms]",
+            ylabel="cases solved within the time [%]",
+        )
     chart.suptitle(title, x=0.01, ha="left", fontsize=13)
     _legend(chart, results, drawn)
     return plot_style.save(chart, path)
@@ -138,13 +138,7 @@ def _legend(chart: Any, results: Results, drawn: dict[str, Any]) -> None:
 
 
 def draw_all(results: Results, titles: Iterable[tuple[str, str]], folder: Path) -> dict[str, tuple[Path, Path]]:
-    """All charts of a comparison: name -> its SVG and PNG.
-
-    Args:
-        results: what was found.
-        titles: name and title of every set.
-        folder: where they go.
-    """
+    """All charts of a comparison, by name; `titles` are name and title of every set."""
     drawn = {}
     for family, title in titles:
         name = family.replace("_", "-")

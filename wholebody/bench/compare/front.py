@@ -77,14 +77,14 @@ def time_to(
     return min(times)
 
 
-def front(results: Results, family: str, quantity: Quantity, ours: str = OURS, share: float = HALF) -> Rival | None:
+def front(results: Results, family: str, quantity: Quantity, share: float = HALF) -> Rival | None:
     """The method that comes nearest to ours in a chart, or beats it most; None where ours did not take part."""
-    own = results.swept(family, ours)
+    own = results.swept(family, OURS)
     if not own:
         return None
     worst: Rival | None = None
     for other in results.adapters:
-        if other == ours or other.startswith(FAMILY):
+        if other == OURS or other.startswith(FAMILY):
             continue
         cases = own & results.swept(family, other)
         if not cases:
@@ -95,21 +95,19 @@ def front(results: Results, family: str, quantity: Quantity, ours: str = OURS, s
             there = time_to(results, family, other, quantity, accuracy, cases, share)
             if there == inf:
                 continue
-            here = time_to(results, family, ours, quantity, accuracy, cases, share)
+            here = time_to(results, family, OURS, quantity, accuracy, cases, share)
             rival = Rival(family, quantity.name, other, accuracy, here / there, here, there, len(cases))
             if worst is None or rival.ratio > worst.ratio:
                 worst = rival
     if worst is None:
-        here = time_to(results, family, ours, quantity, ACCURACIES[0], own, share)
+        here = time_to(results, family, OURS, quantity, ACCURACIES[0], own, share)
         return Rival(family, quantity.name, "", ACCURACIES[0], 0.0 if here < inf else inf, here, inf, len(own))
     return worst
 
 
-def fronts(results: Results, ours: str = OURS, share: float = HALF) -> list[Rival]:
+def fronts(results: Results, share: float = HALF) -> list[Rival]:
     """One row for every chart in which our method took part."""
     found = [
-        front(results, family, quantity, ours, share)
-        for family in results.sets
-        for quantity in results.quantities(family)
+        front(results, family, quantity, share) for family in results.sets for quantity in results.quantities(family)
     ]
     return [rival for rival in found if rival is not None]

@@ -23,19 +23,14 @@ class Record:
     """One solve. Errors are infinite where there is no answer.
 
     Attributes:
-        set, number: which case.
-        adapter: which method.
-        tolerance, budget: of this solve; a budget of 0 iterations is the method's own, one of -1 is
-            `FIRST_FIT`.
-        outcome: "answered", "refused", "failed" or "overtime".
-        status: what the method claims: "solved", "unreachable", "infeasible", "stalled"; empty without an answer.
+        tolerance, budget: of this solve; a budget of 0 iterations is the method's own, one of -1 is `FIRST_FIT`.
+        status: what the method claims; empty without an answer.
         said: its message, its refusal or the exception.
-        seconds: wall time of the call without the judgement in it [s]; of a frame, median, where goals move.
-        cpu_seconds: the same of the processor [s].
-        setup_seconds: to build a model of its own from the problem [s]; 0 for one that needs none.
+        seconds, cpu_seconds: of the call without the judgement in it; of a frame, median, where goals move.
+        setup_seconds: to build a model of its own from the problem; 0 for one that needs none.
         iterations: as the method counts them; of a frame, mean, where goals move.
         goal_error, goal_angle: left, as judged [m], [rad]; 95 % of the frames where goals move.
-        penetration, clearance_violation, limit_violation, constraint_violation: as judged; the worst frame.
+        penetration, clearance_violation, limit_violation, constraint_violation: as judged [m, rad]; the worst frame.
         measure, optimality: as judged; of the last frame.
         best: measure of the witness, which is as good as any method need be.
         frames: answered with moving goals; 0 for a case that is solved once.

@@ -1,4 +1,4 @@
-"""The report of a comparison: what to choose when, the charts, the figures, and what was left out."""
+"""What a comparison leaves: every solve as CSV, charts, and the report of what to choose when and what was left out."""
 
 from __future__ import annotations
 
@@ -6,22 +6,26 @@ import base64
 import gzip
 import json
 import re
-from collections.abc import Mapping, Sequence
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from wholebody.bench.compare.advice import advice, choices, effort, error, reference, slowness, standings
-from wholebody.bench.compare.exclusions import exclusions
+from wholebody.bench.compare.charts import draw_all
 from wholebody.bench.compare.front import MOST, OURS, Rival, fronts
 from wholebody.bench.compare.paired import algorithms
 from wholebody.bench.compare.record import COARSE, DEFAULT
 from wholebody.bench.compare.results import Results
-from wholebody.bench.compare.scenes import OPENING, Scene
+from wholebody.bench.compare.scenes import OPENING, Scene, chosen, draw
 from wholebody.bench.compare.settings import Settings
-from wholebody.bench.compare.store import Chunk
-from wholebody.bench.compare.summary import GOOD, Summary, summaries
+from wholebody.bench.compare.store import Chunk, Store
+from wholebody.bench.compare.summary import GOOD, Summary, exclusions, summaries
 from wholebody.bench.report import formatted, render
+from wholebody.bench.tables import replace_section, write_rows, write_text
 
+PAGE = "report.html"
 FEW = 10  # problems below which a share is no share
 LONG = 35  # letters of a table's cell that is a text and no figure
 PICTURE = re.compile(r'<p><img src="[^"]*?([^"/]+)\.svg" alt="([^"]*)" ?/?></p>')
@@ -59,14 +63,53 @@ def material(
     return Material(settings, chunks, results, summaries(results), facts, missing)
 
 
-def as_markdown(given: Material, whole: bool, charts: str) -> str:
-    """The report as Markdown.
+def publish(
+    settings: Settings,
+    store: Store,
+    folder: Path,
+    facts: Mapping[str, str],
+    missing: Mapping[str, str],
+    docs: Path | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Material:
+    """Write everything that is made from the records of a run into a folder, and its part of the docs where given.
 
-    Args:
-        given: what it is written from.
-        whole: everything, or only the part that the documentation shows.
-        charts: folder of the charts, as seen from the page.
+    `missing` are methods that are not installed, and what installs them; `say` is told what is being made.
+
+    Raises:
+        FileFormatError: the documentation has no place for it.
     """
+    given = material(settings, store.chunks, facts, missing)
+    write_rows(folder / "solves.csv", facts, store.records)
+    write_rows(folder / "summary.csv", facts, given.rows)
+    front = fronts(given.results)
+    if front:
+        write_rows(folder / "front.csv", facts, front)
+    say("charts and scenes")
+    families = {family.name: family for family in settings.sets}
+    methods = {adapter.name: adapter for adapter in settings.adapters}
+    with ThreadPoolExecutor(1) as pool:  # scenes are drawn in a process of their own, charts in this one
+        drawn = pool.submit(draw, chosen(given.results), families, methods, settings.seed, settings.cap)
+        titles = [(family.name, family.title) for family in settings.sets]
+        charts = draw_all(given.results, titles, folder / "charts")
+        scenes = drawn.result()
+    say("report")
+    subtitle = f"{len(settings.sets)} problem sets, {len(settings.adapters)} methods, {len(store.records)} solves. " + (
+        f"Measured {facts.get('date', '')} with wholebody {facts.get('wholebody', '')} on {facts.get('processor', '')}."
+    )
+    write_text(folder / PAGE, as_page(given, charts, scenes, subtitle) + "\n")
+    short = as_markdown(given, False, "assets/bench")
+    write_text(folder / "compare.md", short + "\n")
+    if docs is not None:
+        replace_section(docs / "results.md", "compare", short)
+        (docs / "assets" / "bench").mkdir(parents=True, exist_ok=True)
+        for svg, _ in charts.values():
+            shutil.copyfile(svg, docs / "assets" / "bench" / svg.name)
+    return given
+
+
+def as_markdown(given: Material, whole: bool, charts: str) -> str:
+    """The report as Markdown, or only the part that the documentation shows; `charts` is the folder of the charts."""
     results, settings = given.results, given.settings
     wall, processor, dependable = fronts(results), fronts(results.by_processor()), fronts(results, share=MOST)
     by_cpu, by_most = ({(rival.set, rival.quantity): rival for rival in rivals} for rivals in (processor, dependable))
@@ -90,11 +133,7 @@ def as_markdown(given: Material, whole: bool, charts: str) -> str:
 def as_page(given: Material, charts: Mapping[str, tuple[Path, Path]], scenes: Sequence[Scene], subtitle: str) -> str:
     """The whole report as one HTML file that needs no network: charts within, scenes unpacked when they are seen.
 
-    Args:
-        given: what it is written from.
-        charts: name -> SVG and PNG; the SVG goes into the page.
-        scenes: to look at.
-        subtitle: below the title: when, on what.
+    `charts` are SVG and PNG by name, of which the SVG goes into the page; the subtitle says when and on what.
     """
     from markdown_it import MarkdownIt
 

@@ -94,12 +94,12 @@ class Shown(NamedTuple):
     about: str
 
 
-def chosen(results: Results, most: int = SCENES) -> list[Shown]:
+def chosen(results: Results) -> list[Shown]:
     """At most one case a set, where a method is farthest from an answer; another method each time, if there is one."""
     shown: list[Shown] = []
     for family in results.sets:
         found = _candidates(results, family)
-        if found and len(shown) < most:
+        if found and len(shown) < SCENES:
             seen = [one.bad for one in shown]
             shown.append(min(found, key=lambda pair: (seen.count(pair[1].bad), -pair[0]))[1])
     return shown

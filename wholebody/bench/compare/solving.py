@@ -1,4 +1,4 @@
-"""One solve of one case, timed, and judged by `assess` alone.
+"""One solve of one case, or goals that move followed frame by frame, timed, and judged by `assess` alone.
 
 `built`, `warmed` and `solved` are jobs of a process of `wholebody.runner`, which keeps the last case and knows
 which methods have run in it.
@@ -14,17 +14,28 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.assessment import Assessment, assess
-from wholebody.bench.adapters.base import Adapter, Budget, set_up
+from wholebody.bench.adapters.base import Adapter, Budget
 from wholebody.bench.compare.record import ANSWERED, DEFAULT, FAILED, REFUSED, Record
 from wholebody.bench.problem_sets.case import Case, ProblemSet
 from wholebody.compiled import compile_all
 from wholebody.errors import WholebodyError
+from wholebody.methods.base import SolvedStep, Tracker
+from wholebody.motion_assessment import third_differences
 from wholebody.problem import Problem
 from wholebody.runner import allow
 
 BUILDING = 120.0  # s: to build a case and what belongs to its scene; compiling once included
 FRAME_CAP = 0.1  # s: most for a frame, on the average, where goals move; slower than that nobody drags
+JUDGED = (
+    "goal_error", "goal_angle", "penetration", "clearance_violation", "limit_violation", "constraint_violation",
+    "measure", "optimality",
+)  # fmt: skip
+"""Figures of a judgement that records have too: of the goals, of what must hold, and of the measures."""
+
+USUAL = 0.95  # share of the frames whose tracking error counts: in the first ones the goal is far away
+STILL = 1e-6  # m: a gap that changes less in a frame does not turn
 GLIMPSE = 3  # frames of a moving case that a method sees before it is timed
 
 
@@ -103,19 +114,17 @@ def ready(family: ProblemSet, number: int, seed: int) -> Ready:
 
 def solve(adapter: Adapter, level: Budget, made: Ready) -> Record:
     """Solve a case with a fresh method. Whatever the method does, this returns what came of it."""
-    from wholebody.bench.compare.following import follow
-
     empty = blank(adapter, level, made.case.set, made.case.number)
     try:
         method = adapter.make(*level)
         moving = bool(made.case.frames)
         problem = copy.copy(made.case.problem) if moving else made.case.problem  # each moves the goals of its own copy
         began = time.perf_counter()
-        set_up(method, problem)
+        adapter.prepare(method, problem)
         empty = replace(empty, setup_seconds=time.perf_counter() - began, best=made.best)
         gc.disable()
         if moving:
-            return follow(method, problem, made.case, empty)
+            return _followed(method, problem, made.case, empty)
         return _once(method, problem, empty)
     except WholebodyError as error:
         return replace(empty, outcome=REFUSED, said=sentence(error))
@@ -161,14 +170,75 @@ def _once(method: Any, problem: Problem, empty: Record) -> Record:
 
 def judged(record: Record, judgement: Assessment) -> Record:
     """The record with the figures of a judgement."""
+    return replace(record, **{name: getattr(judgement, name) for name in JUDGED})
+
+
+class _Frame(NamedTuple):
+    q: Array
+    seconds: float
+    cpu_seconds: float
+    iterations: int
+    judgement: Assessment
+
+
+def _followed(method: Any, problem: Problem, case: Case, empty: Record) -> Record:
+    """Follow the goals of a case frame by frame; `problem` is a copy of its problem, that may be changed.
+
+    Each frame is one of the method's tracker, to the method's tolerance: qp and newton make a few steps, as `wb.Drag`
+    does; every other method solves each frame from the posture of the frame before.
+    """
+    q = problem.scene.figure.clamp(problem.start)
+    frames: list[_Frame] = []
+    tracker: Tracker = method.tracker(problem, case.dt)
+    for goals in case.frames:
+        problem.retarget(goals)
+        worked, began = time.process_time(), time.perf_counter()
+        step = tracker.frame(q, method.tolerance)
+        q, iterations = step.q, step.iterations
+        judging = step.judging if isinstance(step, SolvedStep) else 0.0
+        seconds = time.perf_counter() - began - judging
+        worked = time.process_time() - worked
+        if not np.isfinite(q).all():
+            return replace(empty, said=f"frame {len(frames)}: the posture is not finite")
+        again = time.process_time()
+        judgement = assess(problem, q)
+        if judging:
+            worked -= time.process_time() - again  # the same judgement as the one within the call
+        frames.append(_Frame(q, max(seconds, 0.0), max(worked, 0.0), iterations, judgement))
+    return _summary(frames, case, empty)
+
+
+def _summary(frames: list[_Frame], case: Case, empty: Record) -> Record:
+    judgements = [frame.judgement for frame in frames]
+    figures = {name: np.array([getattr(judged, name) for judged in judgements]) for name in JUDGED}
+    kept: dict[str, Any] = {name: float(np.quantile(figures[name], USUAL)) for name in JUDGED[:2]}
+    kept |= {name: float(figures[name].max()) for name in JUDGED[2:6]}
+    kept |= {name: float(figures[name][-1]) for name in JUDGED[6:]}
+    seconds = np.array([frame.seconds for frame in frames])
+    gaps = np.array([judged.least_distance for judged in judgements])
     return replace(
-        record,
-        goal_error=judgement.goal_error,
-        goal_angle=judgement.goal_angle,
-        penetration=judgement.penetration,
-        clearance_violation=judgement.clearance_violation,
-        limit_violation=judgement.limit_violation,
-        constraint_violation=judgement.constraint_violation,
-        measure=judgement.measure,
-        optimality=judgement.optimality,
+        empty,
+        outcome=ANSWERED,
+        said=f"{len(frames)} frames",
+        seconds=float(np.median(seconds)),
+        cpu_seconds=float(np.median([frame.cpu_seconds for frame in frames])),
+        iterations=float(np.mean([frame.iterations for frame in frames])),
+        **kept,
+        frames=len(frames),
+        frame_p95=float(np.quantile(seconds, USUAL)),
+        jerk=jerk(case.problem.scene.model, [case.problem.start, *(frame.q for frame in frames)], case.dt),
+        turns=turns(gaps) / (max(len(frames) - 1, 1) * case.dt),
     )
+
+
+def jerk(model: Any, postures: list[Array], dt: float) -> float:
+    """Root mean square over frames and degrees of freedom of the third difference of postures [rad/s^3, m/s^3]."""
+    found = third_differences(model, np.array(postures), dt)
+    return float(np.sqrt(np.mean(found**2))) if len(found) else 0.0
+
+
+def turns(gaps: Array) -> int:
+    """How often the velocity of a gap (frames,) changes its sign: what a trembling contact does."""
+    change = np.diff(gaps[np.isfinite(gaps)])
+    signs = np.sign(change[np.abs(change) > STILL])
+    return int(np.count_nonzero(signs[1:] != signs[:-1]))

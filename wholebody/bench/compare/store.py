@@ -10,7 +10,6 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +63,7 @@ class Store:
     def add(self, chunk: Chunk) -> None:
         """Keep a chunk, on the disk before this returns."""
         self.chunks.append(chunk)
-        self._append(_plain(asdict(chunk)))
+        self._append(asdict(chunk))
 
     @property
     def records(self) -> list[Record]:
@@ -101,24 +100,9 @@ class Store:
                 file.truncate(len(whole))
 
 
-def _plain(value: Any) -> Any:
-    """JSON has no infinity: None stands for it."""
-    if isinstance(value, dict):
-        return {key: _plain(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(inner) for inner in value]
-    return None if isinstance(value, float) and value == inf else value
-
-
 def _chunk(value: dict[str, Any]) -> Chunk:
-    records = tuple(_record(inner) for inner in value["records"])
-    rest: dict[str, Any] = {name: inner for name, inner in value.items() if name != "records"}
-    return Chunk(records=records, **rest)
-
-
-def _record(value: dict[str, Any]) -> Record:
-    filled: dict[str, Any] = {name: inf if inner is None else inner for name, inner in value.items()}
-    return Record(**filled)
+    records = tuple(Record(**inner) for inner in value.pop("records"))
+    return Chunk(records=records, **value)
 
 
 def _short(value: Any) -> str:

@@ -1,13 +1,19 @@
-"""The figures of every method in every set at the default budget, as one row each."""
+"""The figures of every method in every set at the default budget, as one row each, and what they leave out."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, nan
+from typing import NamedTuple
 
 from wholebody.bench.compare.record import COARSE, FAILED, FINE, OVERTIME, REFUSED
 from wholebody.bench.compare.results import Results, effort_excess, middle
+from wholebody.bench.compare.settings import Settings
+from wholebody.bench.compare.store import Chunk
+from wholebody.bench.report import words
 
+SHOWN = 110  # characters of a message
 GOOD = 0.98  # share of the cases that a method has to solve to be called dependable
 
 
@@ -16,19 +22,15 @@ class Summary:
     """One method in one set.
 
     Attributes:
-        set, adapter: which.
-        cases: given to it; fewer than asked for where it is too slow for the time there is.
-        swept: of these, solved at all its budgets.
+        cases, swept: given to it, fewer than asked for where it is too slow; and of these solved at all its budgets.
         refused, failed, overtime: cases without an answer: said so, broke, or took too long.
         said: the first refusal or exception.
         success, success_fine: share of the cases not refused that are solved to 1e-3 and to 1e-4, as judged.
         false_claims: answers called solved that are off by more than 1 mm.
-        median_ms, p95_ms: of a call (of a frame where goals move) [ms], over all answers.
-        cpu_median_ms: of the processor.
-        setup_ms: to build a model of its own, median.
-        iterations: median.
+        median_ms, p95_ms, cpu_median_ms: of a call (of a frame where goals move), over all answers.
+        setup_ms, iterations: medians; the first to build a model of its own.
         worst_median: median of the worst error [m or rad].
-        deepest_mm: deepest overlap of all answers [mm].
+        deepest_mm: deepest overlap of all answers.
         effort: above the best known, median over the successes, as a share.
         frame_p95_ms, error_mm, jerk, turns: where goals move: 95 % of the frames, tracking error, trembling.
     """
@@ -110,3 +112,65 @@ def _summary(results: Results, family: str, adapter: str) -> Summary:
         jerk=middle([record.jerk for record in answered]),
         turns=middle([record.turns for record in answered]),
     )
+
+
+class Excluded(NamedTuple):
+    """One reason to leave methods out, as a table."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+
+
+class Exclusions(NamedTuple):
+    """Everything that was left out.
+
+    Attributes:
+        tables: refusals, failures, and what there was no time for; none that is empty.
+        faults: problems that could not be built, a sentence each.
+    """
+
+    tables: list[Excluded]
+    faults: list[str]
+
+
+def exclusions(settings: Settings, chunks: Sequence[Chunk], rows: Sequence[Summary]) -> Exclusions:
+    """Collect refusals, failures and what there was no time for."""
+    asked = {family.name: settings.asked(family) for family in settings.sets}
+    tables = [
+        Excluded(
+            "Refused: what a method cannot express",
+            ("method", "problems", "refused", "in its own words"),
+            sorted(
+                (row.method, words(row.set), "all" if row.refused == row.cases else f"{row.refused} of {row.cases}",
+                 _cut(row.said))
+                for row in rows
+                if row.refused
+            ),
+        ),
+        Excluded(
+            "No answer: exceptions, answers that are not finite, and solves that took too long",
+            ("method", "problems", "failed", "took too long", "the first"),
+            sorted(
+                (row.method, words(row.set), str(row.failed), str(row.overtime), _cut(row.said))
+                for row in rows
+                if row.failed or row.overtime
+            ),
+        ),
+        Excluded(
+            "Fewer problems, for there was no time for more",
+            ("method", "problems", "at the default budget", "at all budgets"),
+            sorted(
+                (row.method, words(row.set), f"{row.cases} of {cases}", f"{row.swept} of {sweep}")
+                for row in rows
+                for cases, sweep in [asked[row.set]]
+                if row.cases < cases or (row.swept < sweep and row.refused < row.cases)
+            ),
+        ),
+    ]  # fmt: skip
+    faults = [f"{words(chunk.set)} {chunk.number}: {chunk.fault}" for chunk in chunks if chunk.fault]
+    return Exclusions([table for table in tables if table.rows], faults)
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."

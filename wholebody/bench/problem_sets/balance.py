@@ -9,24 +9,22 @@ import numpy as np
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.problem_sets.bodies import (
-    ATTEMPTS,
-    CLEARANCE,
     FEET,
     TIPS,
     alone,
     floor_scene,
-    held_feet,
     human,
     is_free,
     movable,
     place_of,
+    point,
     shaken,
+    standing_problem,
+    until_found,
 )
-from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
+from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.bench.problem_sets.fitting import MassAbove, fitted
-from wholebody.errors import InputError
 
-NAME = "balance"
 MARGIN = 0.02  # m: asked of the centre of mass from the edges of the support polygon
 SPARE = 0.005  # m: what the witness has beyond that
 LOW = ((0.10, -0.45, 0.03), (0.65, 0.45, 0.35))  # m: where a fingertip is asked to be, near the floor
@@ -38,27 +36,21 @@ STANCE = {"hip_flexion": (0.0, 110.0), "knee_flexion": (5.0, 130.0), "ankle_dors
 ARMS = 0.35  # share of the range of every joint of the upper body, around how it stands, to begin with
 
 
-def make(number: int, seed: int) -> Case:
+def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """In turn: a fingertip low down, one far out, both low down; sides change too."""
-    rng, figure = generator(NAME, number, seed), human()
-    start = figure.posture("standing")
-    tip = TIPS[number // 3 % 2]
-    for _ in range(ATTEMPTS):
+    figure, tip = human(), TIPS[number // 3 % 2]
+
+    def attempt() -> tuple[list[wb.Point], Array] | None:
         goals = _goals(number % 3, tip, rng)
         equalities = [*_resolved(figure, goals), MassAbove(rng.uniform(*OVER))]
-        witness = fitted(figure, _beginning(figure, rng), equalities, movable(figure))
-        if witness is not None and is_free(alone(figure), witness) and _least_room(witness) > MARGIN + SPARE:
-            break
-    else:
-        raise InputError(f"no posture of {ATTEMPTS} is free and in balance; give another seed")
-    problem = wb.Problem(
-        floor_scene(figure),
-        start,
-        goals=[wb.Point(goal.frame, place_of(figure, witness, goal.frame).translation) for goal in goals],
-        constraints=[*held_feet(), wb.Balance(margin=MARGIN)],
-        clearance=CLEARANCE,
-    )
-    return Case(NAME, number, problem, witness)
+        found = fitted(figure, _beginning(figure, rng), equalities, movable(figure))
+        good = found is not None and is_free(alone(figure), found) and _least_room(found) > MARGIN + SPARE
+        return (goals, found) if found is not None and good else None
+
+    goals, witness = until_found(attempt)
+    reached = [point(figure, witness, goal.frame) for goal in goals]
+    start = figure.posture("standing")
+    return standing_problem(floor_scene(figure), start, reached, wb.Balance(margin=MARGIN)), witness
 
 
 def _goals(kind: int, tip: str, rng: np.random.Generator) -> list[wb.Point]:
@@ -101,9 +93,9 @@ def _least_room(q: Array) -> float:
 
 
 SET = ProblemSet(
-    NAME,
+    "balance",
     "balance",
     "A standing person reaches low down or far out with one hand or both, feet held, the centre of mass kept above "
     "the feet: the legs have to bend and the pelvis to give way.",
-    make,
+    _posed,
 )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -22,6 +23,9 @@ ATTEMPTS = 5000
 """Postures that are tried for one witness; about one in five of a person's upper body is free."""
 
 
+_Found = TypeVar("_Found")
+
+
 @lru_cache(maxsize=1)
 def human() -> wb.Figure:
     """The person, loaded once."""
@@ -31,7 +35,7 @@ def human() -> wb.Figure:
 @lru_cache(maxsize=8)
 def alone(figure: wb.Figure) -> wb.Scene:
     """A figure on the floor and nothing else, to ask whether postures are free; never part of a case."""
-    return wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+    return floor_scene(figure)
 
 
 def floor_scene(figure: wb.Figure) -> wb.Scene:
@@ -55,11 +59,25 @@ def sampled_posture(figure: wb.Figure, start: Array, rng: np.random.Generator) -
     joints = figure.groups["upper_body"]
     places = np.array([figure.model.joints[figure.joint_id(name)].idx_q for name in joints])
     lower, upper = figure.model.lowerPositionLimit[places], figure.model.upperPositionLimit[places]
-    for _ in range(ATTEMPTS):
+
+    def sampled() -> Array | None:
         q = np.array(start)
         q[places] = rng.uniform(lower, upper)
-        if is_free(alone(figure), q):
-            return q
+        return q if is_free(alone(figure), q) else None
+
+    return until_found(sampled)
+
+
+def until_found(attempt: Callable[[], _Found | None]) -> _Found:
+    """What an attempt gives, made again until it gives something.
+
+    Raises:
+        InputError: it never did.
+    """
+    for _ in range(ATTEMPTS):
+        found = attempt()
+        if found is not None:
+            return found
     raise InputError(f"none of {ATTEMPTS} postures is free; give another seed")
 
 
@@ -93,6 +111,14 @@ def _data(figure: wb.Figure) -> Any:
     return figure.model.createData()
 
 
-def held_feet() -> list[wb.Hold]:
-    """Both feet where they are at the start."""
-    return [wb.Hold(foot) for foot in FEET]
+def standing_problem(
+    scene: wb.Scene, start: Array, goals: Sequence[wb.Goal], *constraints: wb.Constraint
+) -> wb.Problem:
+    """What is asked of a person: both feet stay where they are at the start (nq,), and all pairs `CLEARANCE` apart."""
+    feet = [wb.Hold(foot) for foot in FEET]
+    return wb.Problem(scene, start, goals=goals, constraints=[*constraints, *feet], clearance=CLEARANCE)
+
+
+def point(figure: wb.Figure, q: Array, frame: str) -> wb.Point:
+    """The goal that a frame is where the posture q, (nq,), has it."""
+    return wb.Point(frame, place_of(figure, q, frame).translation)

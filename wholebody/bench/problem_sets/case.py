@@ -33,6 +33,10 @@ class Case:
     dt: float = 1.0 / 60.0
 
 
+Posed = tuple[Problem, Array] | tuple[Problem, Array, tuple[tuple[Goal, ...], ...]]
+"""What a set poses: the first fields of a `Case` after its number."""
+
+
 @dataclass(frozen=True)
 class ProblemSet:
     """A family of problems.
@@ -41,15 +45,19 @@ class ProblemSet:
         name: as typed at the command line.
         title: as written over a chart.
         about: one sentence: what is asked, and what makes it hard.
-        make: a case from its number and the seed of the set; the same ones make the same case.
+        pose: a problem, its witness, and the frames of a moving set, from a number and a generator of random numbers.
         moving: whether its goals move from frame to frame.
     """
 
     name: str
     title: str
     about: str
-    make: Callable[[int, int], Case]
+    pose: Callable[[int, np.random.Generator], Posed]
     moving: bool = False
+
+    def make(self, number: int, seed: int) -> Case:
+        """A case from its number and the seed of the set; the same ones make the same case."""
+        return Case(self.name, number, *self.pose(number, generator(self.name, number, seed)))
 
 
 def generator(name: str, number: int, seed: int) -> np.random.Generator:

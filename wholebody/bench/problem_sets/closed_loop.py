@@ -8,21 +8,18 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.problem_sets.bodies import (
-    ATTEMPTS,
-    CLEARANCE,
     alone,
     floor_scene,
-    held_feet,
     human,
     is_free,
     place_of,
     shaken,
+    standing_problem,
+    until_found,
 )
-from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
+from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.bench.problem_sets.fitting import fitted
-from wholebody.errors import InputError
 
-NAME = "closed_loop"
 GRIP = 0.006  # m: between a palm and what it holds; more than the clearance, so that the witness has room
 APART = (0.22, 0.55)  # m: from palm to palm
 THICK = 0.016  # m: radius of a bar
@@ -37,30 +34,31 @@ LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 BENT = {"elbow_flexion": 85.0, "shoulder_rotation": 18.0, "wrist_flexion": -18.0}  # degrees
 
 
-def make(number: int, seed: int) -> Case:
+def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """In turn a bar and a box, brought to a place and an orientation."""
-    rng, figure = generator(NAME, number, seed), human()
+    figure = human()
     apart = float(rng.uniform(*APART))
     shape, ahead = _shape(number % 2, apart - 2.0 * GRIP, rng)
     middle = np.array((ahead, 0.0, 0.5 * apart))
     scene = floor_scene(figure).attach(shape, to="right_palm", name="load", at=middle)
     other = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array((0.0, 0.0, apart)))
-    start = _start(figure, scene, other, middle, rng)
-    for _ in range(ATTEMPTS):
+    bent = {f"{side}_{name}": np.radians(angle) for side in ("left", "right") for name, angle in BENT.items()}
+    q = figure.with_joints(figure.posture("standing"), bent)
+
+    def level() -> Array | None:
+        """The thing held level before the belly, elbows anyhow, (nq,)."""
+        near = shaken(figure, q, 0.5 * SPREAD, rng)
+        return _holding(scene, near, other, LEVEL, np.array(AT_START), middle)
+
+    def turned() -> Array | None:
         turn = pin.exp3(rng.uniform(-TURNED, TURNED, 3)) @ LEVEL
-        witness = _holding(figure, shaken(figure, start, SPREAD, rng), other, turn, rng.uniform(*MIDDLE), middle)
-        if witness is not None and is_free(scene, witness):
-            break
-    else:
-        raise InputError(f"no posture of {ATTEMPTS} is free; give another seed")
-    problem = wb.Problem(
-        scene,
-        start,
-        goals=[wb.Frame("right_palm", place_of(figure, witness, "right_palm"))],
-        constraints=[wb.Hold("left_palm", other, relative_to="right_palm"), *held_feet()],
-        clearance=CLEARANCE,
-    )
-    return Case(NAME, number, problem, witness)
+        return _holding(scene, shaken(figure, start, SPREAD, rng), other, turn, rng.uniform(*MIDDLE), middle)
+
+    start = until_found(level)
+    witness = until_found(turned)
+    goals = [wb.Frame("right_palm", place_of(figure, witness, "right_palm"))]
+    grip = wb.Hold("left_palm", other, relative_to="right_palm")
+    return standing_problem(scene, start, goals, grip), witness
 
 
 def _shape(kind: int, length: float, rng: np.random.Generator) -> tuple[wb.Shape, float]:
@@ -71,31 +69,21 @@ def _shape(kind: int, length: float, rng: np.random.Generator) -> tuple[wb.Shape
     return wb.Box((depth, height, length)), 0.5 * depth - BEHIND
 
 
-def _start(figure: wb.Figure, scene: wb.Scene, other: pin.SE3, middle: Array, rng: np.random.Generator) -> Array:
-    """The thing held level before the belly, elbows anyhow, (nq,)."""
-    bent = {f"{side}_{name}": np.radians(angle) for side in ("left", "right") for name, angle in BENT.items()}
-    q = figure.with_joints(figure.posture("standing"), bent)
-    for _ in range(ATTEMPTS):
-        start = _holding(figure, shaken(figure, q, 0.5 * SPREAD, rng), other, LEVEL, np.array(AT_START), middle)
-        if start is not None and is_free(scene, start):
-            return start
-    raise InputError(f"none of {ATTEMPTS} ways to hold it is free; give another seed")
-
-
-def _holding(figure: wb.Figure, q: Array, other: pin.SE3, turn: Array, place: Array, middle: Array) -> Array | None:
-    """The posture near q, (nq,), with the thing's middle at a place, held by both hands."""
+def _holding(scene: wb.Scene, q: Array, other: pin.SE3, turn: Array, place: Array, middle: Array) -> Array | None:
+    """The posture near q, (nq,), with the thing's middle at a place, held by both hands; None where it is not free."""
+    figure = scene.figure
     goals = [
         wb.Frame("right_palm", pin.SE3(turn, place - turn @ middle)),
         wb.Relative("left_palm", "right_palm", other),
     ]
-    scene = alone(figure)
-    return fitted(figure, q, [goal.resolve(scene, q) for goal in goals], figure.dofs("upper_body"))
+    found = fitted(figure, q, [goal.resolve(alone(figure), q) for goal in goals], figure.dofs("upper_body"))
+    return found if found is not None and is_free(scene, found) else None
 
 
 SET = ProblemSet(
-    NAME,
+    "closed_loop",
     "closed loop",
     "A standing person who holds a bar or a box in both hands brings it to a place and an orientation; the hands keep "
     "their grip all the way, so both arms and the thing are one closed loop.",
-    make,
+    _posed,
 )

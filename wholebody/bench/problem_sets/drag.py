@@ -7,22 +7,20 @@ import numpy as np
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.problem_sets.bodies import (
-    CLEARANCE,
     ROOM,
     TIPS,
     alone,
     floor_scene,
-    held_feet,
     human,
     is_free,
-    place_of,
+    point,
     shaken,
+    standing_problem,
 )
-from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
+from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.bench.problem_sets.things import Occupied, add_things
 from wholebody.errors import InputError
 
-NAME = "drag"
 THINGS = 12
 SPAN = 24  # frames from one knot of the spline to the next: 0.4 s
 SPANS = (5, 8)  # fewest and most spans of a drag, the last of which come to rest
@@ -31,22 +29,14 @@ STRIDE = 0.35  # share of the range of every joint between one control posture a
 TRIES, STARTS = 40, 50  # postures tried for a knot, and ways begun anew where none of them would do
 
 
-def make(number: int, seed: int) -> Case:
+def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array, tuple[tuple[wb.Goal, ...], ...]]:
     """The goals are where the fingertip is in each posture of `way`; the first is where it is at the start."""
-    rng, figure = generator(NAME, number, seed), human()
-    tip = TIPS[number % len(TIPS)]
+    figure, tip = human(), TIPS[number % len(TIPS)]
     postures = way(figure, rng)
     scene = floor_scene(figure)
     add_things(scene, THINGS, Occupied(figure, postures), ROOM, rng)
-    goals = [wb.Point(tip, place_of(figure, q, tip).translation) for q in postures]
-    problem = wb.Problem(
-        scene,
-        postures[0],
-        goals=goals[:1],
-        constraints=held_feet(),
-        clearance=CLEARANCE,
-    )
-    return Case(NAME, number, problem, postures[0], tuple((goal,) for goal in goals[1:]))
+    goals = [point(figure, q, tip) for q in postures]
+    return standing_problem(scene, postures[0], goals[:1]), postures[0], tuple((goal,) for goal in goals[1:])
 
 
 def way(figure: wb.Figure, rng: np.random.Generator) -> Array:
@@ -87,10 +77,10 @@ def _span(control: Array) -> Array:
 
 
 SET = ProblemSet(
-    NAME,
+    "drag",
     "drag",
     "A fingertip is dragged for two to three seconds along a smooth curve past twelve things, a goal every sixtieth of "
     "a second; what counts is how closely and how calmly the body follows.",
-    make,
+    _posed,
     moving=True,
 )

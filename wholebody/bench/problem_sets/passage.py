@@ -6,24 +6,22 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.problem_sets.bodies import (
-    ATTEMPTS,
-    CLEARANCE,
     ROOM,
     alone,
     floor_scene,
-    held_feet,
     human,
     is_free,
-    place_of,
+    point,
     shaken,
+    standing_problem,
+    until_found,
 )
-from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
+from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.bench.problem_sets.fitting import fitted
 from wholebody.bench.problem_sets.things import Occupied
-from wholebody.errors import InputError
 
-NAME = "passage"
 GAP = (0.008, 0.020)  # m: what a window leaves free on every side of the hand and forearm
 HALF = (0.045, 0.035)  # m: half the breadth of a hand, half the thickness of a forearm
 WIDE = 0.22  # m: of the board on every side of its window
@@ -31,46 +29,34 @@ DEEP = (0.15, 0.30)  # m: of two boards, along the way between them
 THICK = 0.02  # m: of all boards
 PAST_WRIST = (-0.12, 0.04)  # m: from the wrist to the window, along the forearm; negative is behind the wrist
 PLACE = ((0.30, -0.05, 0.90), (0.60, 0.40, 1.45))  # m: of the wrist, for the left hand
-TURN, RISE, ROLL = (
-    0.6,
-    0.4,
-    1.6,
-)  # rad: most that the way through is turned from straight ahead, and rolled about itself
+TURN, RISE, ROLL = 0.6, 0.4, 1.6  # rad: most that the way is turned from straight ahead, and rolled about itself
 SPREAD = 0.3  # share of the range of every joint of the upper body that a witness may begin with
 BEGIN = {"shoulder_flexion": 40.0, "shoulder_abduction": 20.0, "elbow_flexion": 60.0}  # degrees
 
 
-def make(number: int, seed: int) -> Case:
+def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """In turn a window and two boards; left and right in turn of two."""
-    rng, figure = generator(NAME, number, seed), human()
-    side = ("left", "right")[number // 2 % 2]
+    figure, side = human(), ("left", "right")[number // 2 % 2]
     start = figure.posture("standing")
     begin = figure.with_joints(start, {f"{side}_{name}": np.radians(angle) for name, angle in BEGIN.items()})
     standing = Occupied(figure, (start,))
-    for _ in range(ATTEMPTS):
+
+    def attempt() -> tuple[Array, list[tuple[wb.Box, pin.SE3]]] | None:
         wrist = _wrist(side, rng)
         boards = _boards(number % 2, wrist, rng)
         goal = wb.Frame(f"{side}_hand", wrist).resolve(alone(figure), start)
         witness = fitted(figure, shaken(figure, begin, SPREAD, rng), [goal], figure.dofs("upper_body"))
         if witness is None or not is_free(alone(figure), witness):
-            continue
+            return None
         taken = standing, Occupied(figure, (witness,))
-        if all(body.clear_of(board, at, ROOM) for body in taken for board, at in boards):
-            break
-    else:
-        raise InputError(f"none of {ATTEMPTS} passages lets a hand through; give another seed")
+        clear = all(body.clear_of(board, at, ROOM) for body in taken for board, at in boards)
+        return (witness, boards) if clear else None
+
+    witness, boards = until_found(attempt)
     scene = floor_scene(figure)
     for count, (board, at) in enumerate(boards):
         scene.add(board, name=f"board {count}", at=at)
-    tip = f"{side}_index_tip"
-    problem = wb.Problem(
-        scene,
-        start,
-        goals=[wb.Point(tip, place_of(figure, witness, tip).translation)],
-        constraints=held_feet(),
-        clearance=CLEARANCE,
-    )
-    return Case(NAME, number, problem, witness)
+    return standing_problem(scene, start, [point(figure, witness, f"{side}_index_tip")]), witness
 
 
 def _wrist(side: str, rng: np.random.Generator) -> pin.SE3:
@@ -107,9 +93,9 @@ def _at(middle: tuple[float, float, float]) -> pin.SE3:
 
 
 SET = ProblemSet(
-    NAME,
+    "passage",
     "narrow passage",
     "A standing person puts a fingertip through a window in a board, or between two boards, 8 to 20 mm wider on every "
     "side than the hand and forearm that have to follow.",
-    make,
+    _posed,
 )

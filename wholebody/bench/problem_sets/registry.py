@@ -5,36 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from wholebody.bench.problem_sets import (
-    balance,
-    closed_loop,
-    clutter,
-    drag,
-    free_reach,
-    free_reach_several,
-    passage,
-    robot_arm,
-    self_contact,
-)
+from wholebody.bench.problem_sets import balance, closed_loop, drag, passage, reaching, robot_arm, self_contact
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.errors import UnknownNameError
 
-SETS: Mapping[str, ProblemSet] = MappingProxyType(
-    {
-        module.SET.name: module.SET
-        for module in (
-            free_reach,
-            free_reach_several,
-            clutter,
-            self_contact,
-            balance,
-            closed_loop,
-            passage,
-            drag,
-            robot_arm,
-        )
-    }
-)
+_ALL = (
+    reaching.FREE, reaching.SEVERAL, reaching.CLUTTER, self_contact.SET, balance.SET, closed_loop.SET, passage.SET,
+    drag.SET, robot_arm.SET,
+)  # fmt: skip
+SETS: Mapping[str, ProblemSet] = MappingProxyType({each.name: each for each in _ALL})
 """By name, as they are listed in reports."""
 
 CASES = 200

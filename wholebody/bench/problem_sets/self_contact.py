@@ -10,20 +10,17 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.problem_sets.bodies import (
-    ATTEMPTS,
-    CLEARANCE,
     alone,
     floor_scene,
-    held_feet,
     human,
     is_free,
     shaken,
+    standing_problem,
+    until_found,
 )
-from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
+from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.bench.problem_sets.fitting import fitted
-from wholebody.errors import InputError
 
-NAME = "self_contact"
 LEAST, MOST = 0.0027, 0.005  # m: between a hand and what it lies on, in the witness
 TURNS = 6  # of laying a hand on what is under it
 FAR = 0.5  # m: distances beyond are not looked for
@@ -69,28 +66,22 @@ class Touch:
         return self.axis + height * self.normal
 
 
-def make(number: int, seed: int) -> Case:
+def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """In turn: a hand on the other elbow, both on the hips, arms crossed; in every other round turned as asked."""
-    rng, figure = generator(NAME, number, seed), human()
+    figure = human()
     start = figure.posture("standing")
     kind, turned = number % 3, number // 3 % 2 == 1
     bent = {f"{side}_{name}": np.radians(angle) for side in SIDES for name, angle in BEGIN[kind].items()}
     begin = figure.with_joints(start, bent)
-    for _ in range(ATTEMPTS):
+
+    def attempt() -> tuple[Array, list[Touch]] | None:
         touches = _touches(kind, SIDES[number // 6 % 2], rng)
         witness = _laid(figure, shaken(figure, begin, SPREAD, rng), touches)
-        if witness is not None and is_free(alone(figure), witness, LEAST):
-            break
-    else:
-        raise InputError(f"none of {ATTEMPTS} postures is free; give another seed")
-    problem = wb.Problem(
-        floor_scene(figure),
-        start,
-        goals=[_goal(figure, witness, touch, turned) for touch in touches],
-        constraints=held_feet(),
-        clearance=CLEARANCE,
-    )
-    return Case(NAME, number, problem, witness)
+        return (witness, touches) if witness is not None and is_free(alone(figure), witness, LEAST) else None
+
+    witness, touches = until_found(attempt)
+    goals = [_goal(figure, witness, touch, turned) for touch in touches]
+    return standing_problem(floor_scene(figure), start, goals), witness
 
 
 def _touches(kind: int, hand: str, rng: np.random.Generator) -> list[Touch]:
@@ -158,9 +149,9 @@ def _goal(figure: wb.Figure, q: Array, touch: Touch, turned: bool) -> wb.Relativ
 
 
 SET = ProblemSet(
-    NAME,
+    "self_contact",
     "self-contact",
     "A standing person lays a hand on the other elbow, both hands on the hips, or crosses its arms: hands end a few "
     "millimetres from the body they belong to, in half of the problems turned as asked.",
-    make,
+    _posed,
 )

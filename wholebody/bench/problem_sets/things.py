@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 import coal
 import numpy as np
@@ -21,35 +22,53 @@ TRIES = 2000
 
 
 class Occupied:
-    """The space that a figure takes up in some postures."""
+    """The space that a figure takes up in some postures.
+
+    Attributes:
+        places: placements (pin.SE3) of all pieces in the first posture, then in the second, and so on.
+        centres: (n, 3) of these places.
+        count: pieces of the figure.
+    """
 
     def __init__(self, figure: wb.Figure, postures: Iterable[Array]) -> None:
         """Place the figure's pieces at each posture (nq,)."""
         geometry = figure.geometry
         data, placed = figure.model.createData(), pin.GeometryData(geometry)
-        self.shapes = [piece.geometry for piece in geometry.geometryObjects]
-        self.places = []
+        self.places: list[pin.SE3] = []
+        self._shapes: list[Any] = []
         for q in postures:
             pin.updateGeometryPlacements(figure.model, data, geometry, placed, q)
             self.places += [pin.SE3(place) for place in placed.oMg]
-        self.centres = np.array([place.translation for place in self.places])
-        self.reach = np.tile([swept_points(shape).reach for shape in self.shapes], len(self.places) // len(self.shapes))
+            self._shapes += [piece.geometry for piece in geometry.geometryObjects]
+        self.centres = np.array([place.translation for place in self.places]).reshape(-1, 3)
+        self._reach = np.array([swept_points(shape).reach for shape in self._shapes])
+        self.count = geometry.ngeoms
 
     def clear_of(self, shape: wb.Shape, at: Sequence[float] | pin.SE3, room: float) -> bool:
         """Whether a thing at a placement leaves this much room, metres, around the figure in every posture."""
         base = placement(at)
         for piece in shape.pieces():
             there = base * piece.placement
-            put = coal.Transform3s(there.rotation, there.translation)
             between = np.linalg.norm(self.centres - there.translation, axis=1)
-            near = np.flatnonzero(between < self.reach + swept_points(piece.geometry).reach + room)
-            for number in near.tolist():
-                body, place = self.shapes[number % len(self.shapes)], self.places[number]
-                other = coal.Transform3s(place.rotation, place.translation)
-                found = coal.DistanceResult()
-                if coal.distance(piece.geometry, put, body, other, coal.DistanceRequest(), found) < room:
-                    return False
+            near = np.flatnonzero(between < self._reach + swept_points(piece.geometry).reach + room)
+            if any(distance < room for distance in self._distances(piece.geometry, there, near.tolist())):
+                return False
         return True
+
+    def distance(self, shape: wb.Shape, at: pin.SE3, posture: int) -> float:
+        """Least signed distance of a thing at a placement from the figure in one of the postures, metres."""
+        numbers = range(posture * self.count, (posture + 1) * self.count)
+        pieces = ((piece.geometry, at * piece.placement) for piece in shape.pieces())
+        return min((least for piece in pieces for least in self._distances(*piece, numbers)), default=np.inf)
+
+    def _distances(self, geometry: Any, there: pin.SE3, numbers: Iterable[int]) -> Iterator[float]:
+        """Signed distances of a piece from some of the figure's, metres."""
+        put = coal.Transform3s(there.rotation, there.translation)
+        for number in numbers:
+            place = self.places[number]
+            other = coal.Transform3s(place.rotation, place.translation)
+            request, result = coal.DistanceRequest(), coal.DistanceResult()
+            yield float(coal.distance(geometry, put, self._shapes[number], other, request, result))
 
 
 def add_things(

@@ -21,6 +21,7 @@ JOINTS = {
 
 TURN = 2.9  # rad: limit of a joint if nothing else is said
 SLIDE = 2.0  # m
+THICK = 0.04  # m: radius of an arm in space
 COLOR = (0.62, 0.66, 0.70, 1.0)
 
 
@@ -111,31 +112,26 @@ def planar_arm(
     return builder.figure()
 
 
-def spatial_arm(radius: float = 0.04) -> Figure:
+def spatial_arm() -> Figure:
     """An arm of six joints that stands upright at zero: base, shoulder, elbow and three of a wrist; frame "tip"."""
-    builder = Builder("arm of six joints")
-    base = builder.joint("rz", "base", at=(0.0, 0.0, 0.15))
-    builder.rod(base, (0.0, 0.0, 0.15), 1.5 * radius)
-    shoulder = builder.joint("ry", "shoulder", parent=base, at=(0.0, 0.0, 0.2))
-    builder.rod(shoulder, (0.0, 0.0, 0.4), radius)
-    elbow = builder.joint("ry", "elbow", parent=shoulder, at=(0.0, 0.0, 0.4))
-    builder.rod(elbow, (0.0, 0.0, 0.2), radius)
-    roll = builder.joint("rz", "roll", parent=elbow, at=(0.0, 0.0, 0.2))
-    builder.rod(roll, (0.0, 0.0, 0.15), 0.8 * radius)
-    pitch = builder.joint("ry", "pitch", parent=roll, at=(0.0, 0.0, 0.15))
-    builder.rod(pitch, (0.0, 0.0, 0.1), 0.7 * radius)
-    hand = builder.joint("rz", "hand", parent=pitch, at=(0.0, 0.0, 0.1))
-    builder.rod(hand, (0.0, 0.0, 0.08), 0.6 * radius)
-    builder.frame(hand, "tip", (0.0, 0.0, 0.08))
+    builder, joint, at = Builder("arm of six joints"), 0, 0.15
+    for kind, name, length, share in (
+        ("rz", "base", 0.15, 1.5), ("ry", "shoulder", 0.4, 1.0), ("ry", "elbow", 0.2, 1.0),
+        ("rz", "roll", 0.15, 0.8), ("ry", "pitch", 0.1, 0.7), ("rz", "hand", 0.08, 0.6),
+    ):  # fmt: skip
+        joint = builder.joint(kind, name, parent=joint, at=(0.0, 0.0, at))
+        builder.rod(joint, (0.0, 0.0, length), share * THICK)
+        at = 0.2 if name == "base" else length  # the shoulder is a little above the end of the base
+    builder.frame(joint, "tip", (0.0, 0.0, at))
     return builder.figure()
 
 
-def sliding_tool(*pieces: tuple[Shape, pin.SE3], turning: bool = False) -> Figure:
-    """A tool that slides along x, y and z, and turns about them where asked; frame "tool" at its middle."""
+def sliding_tool(*pieces: tuple[Shape, pin.SE3]) -> Figure:
+    """A tool that slides along x, y and z; frame "tool" at its middle."""
     builder = Builder("sliding tool")
     joint = 0
-    for kind in ("px", "py", "pz", *(("rz", "ry", "rx") if turning else ())):
-        joint = builder.joint(kind, f"{'slide' if kind[0] == 'p' else 'turn'}_{kind[1]}", parent=joint)
+    for kind in ("px", "py", "pz"):
+        joint = builder.joint(kind, f"slide_{kind[1]}", parent=joint)
     for shape, place in pieces:
         builder.shape(joint, shape, place)
     builder.frame(joint, "tool", (0.0, 0.0, 0.0))

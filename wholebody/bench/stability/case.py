@@ -1,14 +1,14 @@
-"""What a hard case is: something to ask of a method, why it is hard, and what an acceptable answer is."""
+"""What a hard case is: something to ask of a method, why it is hard, and which of the answers are acceptable."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.bench.adapters.base import Adapter
 from wholebody.problem import Problem
 
@@ -24,12 +24,12 @@ class Posed:
     Attributes:
         problem: what is asked.
         iterations: most iterations that the method gets; None for its own default.
-        adjust: what takes the method's place, from the method; None for itself.
+        hindered: whether the method is asked as `Adapter.hindered` makes it.
     """
 
     problem: Problem
     iterations: int | None = None
-    adjust: Callable[[Any], Any] | None = None
+    hindered: bool = False
 
 
 @dataclass(frozen=True)
@@ -78,9 +78,11 @@ class Nonsense:
 
 
 Question = Posed | Stream | Nonsense
+_Ask = TypeVar("_Ask", bound=Callable[[], Question])
 
 
-class HardCase(ABC):
+@dataclass(frozen=True)
+class HardCase:
     """One hard case.
 
     Attributes:
@@ -89,36 +91,33 @@ class HardCase(ABC):
         title: as written over its picture.
         why: why it is hard.
         acceptable: what an acceptable answer is, in words.
+        question: what is asked, made anew at each call: what a method does to it does not reach the judge.
+        drawn: what is drawn with an answer's postures, where that is not what is asked.
         expected: the best verdict that there can be.
+        also: verdicts that are acceptable besides.
         best: goal error of the best possible answer [m, rad]; None where only the best answer of all is known.
+        near: by how much an honest best effort may miss the best known answer and still be as good as it [m, rad].
         tolerance: to which an answer counts as solved [m, rad].
         can_hold: whether all constraints can hold together.
         see_through: things that are drawn transparent because they would hide what is to be seen.
         eye: (3,) direction from which one looks at it.
-        near: for an honest best effort: by how much it may miss the best known answer and still be as good as it
-            [m, rad].
     """
 
-    name: ClassVar[str]
-    group: ClassVar[str]
-    title: ClassVar[str]
-    why: ClassVar[str]
-    acceptable: ClassVar[str]
-    expected: ClassVar[Kind] = "solved"
-    best: ClassVar[float | None] = 0.0
-    tolerance: ClassVar[float] = 1e-4
-    can_hold: ClassVar[bool] = True
-    near: ClassVar[float] = 1e-3
-    see_through: ClassVar[tuple[str, ...]] = ()
-    eye: ClassVar[tuple[float, float, float]] = (0.35, -1.0, 0.3)
-
-    @abstractmethod
-    def question(self) -> Question:
-        """What is asked, made anew at each call: what a method does to it does not reach the judge."""
-
-    def drawn(self) -> Question:
-        """What is drawn with an answer's postures; another one only where it cannot be seen at its own size."""
-        return self.question()
+    name: str
+    group: str
+    title: str
+    why: str
+    acceptable: str
+    question: Callable[[], Question]
+    drawn: Callable[[], Question] | None = None
+    expected: Kind = "solved"
+    also: tuple[Kind, ...] = ()
+    best: float | None = 0.0
+    near: float = 1e-3
+    tolerance: float = 1e-4
+    can_hold: bool = True
+    see_through: tuple[str, ...] = ()
+    eye: tuple[float, float, float] = (0.35, -1.0, 0.3)
 
     def accepts(self, kind: Kind, miss: float) -> bool:
         """Whether an answer is acceptable.
@@ -127,9 +126,56 @@ class HardCase(ABC):
             kind: its verdict.
             miss: by how much its goal error is above that of the best known answer [m, rad].
         """
-        return kind == self.expected and (kind != "honest" or miss <= self.near)
+        return kind in self.also or (kind == self.expected and (kind != "honest" or miss <= self.near))
+
+
+class Group:
+    """Cases under one heading, in the order of reports."""
+
+    def __init__(self, title: str, **shared: Any) -> None:
+        """Begin with none; `shared` are attributes that all of them have."""
+        self.title, self.shared = title, shared
+        self.cases: list[HardCase] = []
+
+    def case(self, name: str, title: str, *, why: str, acceptable: str, **facts: Any) -> Callable[[_Ask], _Ask]:
+        """Make the case that asks what the decorated function returns; `facts` are further attributes."""
+
+        def added(question: _Ask) -> _Ask:
+            facts.update(self.shared)
+            self.cases.append(HardCase(name, self.title, title, why, acceptable, question, **facts))
+            return question
+
+        return added
 
 
 def still(target: tuple[float, float, float], count: int) -> tuple[Frame, ...]:
     """As many frames in which nothing moves."""
     return (Frame(target),) * count
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a method did with one case.
+
+    Attributes:
+        postures: (k, nq) its answer, or one posture a frame; empty where it gave none.
+        status: what it says of its answer; "" for streams, which say only what is left.
+        left: (k,) what it says is left to the goal, metres or radians; NaN where it does not say.
+        refusal: what it says where it refuses.
+        failure: an exception that is no WholebodyError, or how the process ended.
+        taken: nonsense that it took without a word.
+        seconds: wall time.
+        message: its own sentence.
+    """
+
+    postures: Array
+    status: str = ""
+    left: tuple[float, ...] = ()
+    refusal: str = ""
+    failure: str = ""
+    taken: tuple[str, ...] = ()
+    seconds: float = 0.0
+    message: str = ""
+
+
+NOTHING = np.zeros((0, 0))

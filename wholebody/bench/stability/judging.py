@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wholebody.assessment import Assessment, assess
-from wholebody.bench.stability.answering import Answer
-from wholebody.bench.stability.case import HardCase, Nonsense, Posed, Stream
+from wholebody.bench.stability.case import Answer, HardCase, Nonsense, Posed, Stream
 from wholebody.motion_assessment import dip, velocities
 from wholebody.problem import Problem
 from wholebody.tasks import Point

@@ -11,8 +11,7 @@ from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.report import render
 from wholebody.bench.stability.case import Kind
 from wholebody.bench.stability.pictures import Drawn
-from wholebody.bench.stability.rows import Result
-from wholebody.bench.stability.verdict import SYMBOLS, WORDS, Verdict
+from wholebody.bench.stability.verdict import SYMBOLS, WORDS, Result, Verdict
 
 CHART = "stability.svg"
 
@@ -23,15 +22,7 @@ def report(result: Result, facts: Mapping[str, str]) -> str:
 
 
 def page(result: Result, adapters: Sequence[Adapter], facts: Mapping[str, str], drawn: Drawn, folder: str) -> str:
-    """The section of the page that is written by the command.
-
-    Args:
-        result: all cells.
-        adapters: who was asked.
-        facts: of the machine.
-        drawn: pictures by case.
-        folder: of the pictures, relative to the page.
-    """
+    """The section of the page that is written by the command; `folder` has the pictures, seen from the page."""
     return render(
         "stability.md", page=True, result=result, kinds=WORDS, facts=facts, adapters=adapters, drawn=drawn,
         folder=folder, chart=CHART,
@@ -61,8 +52,7 @@ def matrix(result: Result, path: Path) -> tuple[Path, Path]:
             continue
         for column, method in enumerate(result.methods):
             _cell(axis, row, column, result.verdicts[case, method])
-    axis.set_xlim(-0.5, len(result.methods) - 0.5)
-    axis.set_ylim(len(lines) - 0.5, -0.5)
+    axis.set(xlim=(-0.5, len(result.methods) - 0.5), ylim=(len(lines) - 0.5, -0.5))
     axis.set_xticks(range(len(result.methods)), [name.replace("/", "\n") for name in result.methods], fontsize=8.5)
     axis.xaxis.tick_top()
     rows = [number for number, (case, _) in enumerate(lines) if case is not None]

@@ -10,9 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.bench.stability.answering import Answer
-from wholebody.bench.stability.case import HardCase, Nonsense, Stream
-from wholebody.bench.stability.rows import Result
+from wholebody.bench.stability.case import Answer, HardCase, Nonsense, Stream
+from wholebody.bench.stability.verdict import Result
 from wholebody.files import Scratch
 from wholebody.problem import Problem
 from wholebody.tasks import Point
@@ -32,15 +31,7 @@ Drawn = dict[str, list[tuple[Path, str]]]
 
 
 def draw(result: Result, folder: Path, progress: Callable[[], None] = lambda: None) -> Drawn:
-    """Draw a picture of each case, and of answers that fail.
-
-    Args:
-        result: all cells.
-        folder: where the pictures are written.
-        progress: called after each case.
-
-    Returns:
-        Paths and captions by the case's name, the case's own picture first.
+    """Draw a picture of each case into a folder, and of answers that fail; a case's own picture comes first.
 
     Raises:
         MissingPackageError: there is no Chromium.
@@ -97,7 +88,7 @@ def _failing(case: HardCase, result: Result) -> list[str]:
 
 def _picture(case: HardCase, answer: Answer | None, index: int | None, path: Path, screenshots: Screenshots) -> Path:
     """Draw one posture of an answer; the one that the case wants shown where `index` is None."""
-    question = case.drawn()
+    question = (case.drawn or case.question)()
     problem = question.problem
     if index is None:
         index = question.shown % len(question.frames) if isinstance(question, Stream) else 0

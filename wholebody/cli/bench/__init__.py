@@ -12,6 +12,7 @@ from wholebody.cli.bench import (
     detail,
     newton,
     reaches,
+    regress,
     robots,
     scaling,
     solve,
@@ -42,5 +43,6 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         robots,
         attack,
         ablation,
+        regress,
     ):
         command.add_to(kinds)

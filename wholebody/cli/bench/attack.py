@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 from itertools import count
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.bench.publishing import check_count
+from wholebody.cli.bench.publishing import add_folders, check_count
 from wholebody.errors import InputError
 
 if TYPE_CHECKING:
@@ -33,13 +32,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser.add_argument("--cases", type=int, metavar="N", help="end after as many cases, if the time suffices")
     parser.add_argument("--kinds", nargs="+", metavar="KIND", help="of cases: solve, stream, sweep, file, argument")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes at a time (default: 1)")
-    parser.add_argument(
-        "--out", type=Path, default=Path("out/attack"), metavar="DIR", help="folder (default: out/attack)"
-    )
-    parser.add_argument(
-        "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
-        help="write the counts into the documentation too (default folder: docs)",
-    )  # fmt: skip
+    add_folders(parser, "out/attack")
     parser.set_defaults(run=run)
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wholebody.cli.bench.publishing import check_count
+from wholebody.cli.bench.publishing import add_folders, check_count
 
 if TYPE_CHECKING:
     from wholebody.bench.compare.settings import Settings
@@ -32,13 +31,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         "--jobs", type=int, metavar="N", help="cases beside each other (default: 1, or all of the cluster)"
     )
     parser.add_argument("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786")
-    parser.add_argument(
-        "--out", type=Path, default=Path("out/compare"), metavar="DIR", help="folder (default: out/compare)"
-    )
-    parser.add_argument(
-        "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
-        help="write the result into the documentation too (default folder: docs)",
-    )  # fmt: skip
+    add_folders(parser, "out/compare")
     parser.set_defaults(run=run)
 
 
@@ -50,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.adapters import missing
     from wholebody.bench.compare import run as comparison
     from wholebody.bench.compare.advice import advice
-    from wholebody.bench.compare.publish import PAGE, publish
+    from wholebody.bench.compare.report import PAGE, publish
 
     jobs = _jobs(arguments)
     settings = _settings(arguments)

@@ -22,18 +22,17 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure sparse Newton."""
-    from wholebody.bench import newton, newton_solves
+    from wholebody.bench import newton
     from wholebody.bench.machine import machine
-    from wholebody.bench.newton_solves import drag_row
     from wholebody.bench.tables import write_rows
 
     repeats, sizes, frames = (3, (10, 30), 20) if arguments.quick else (arguments.repeats, newton.SIZES, 1000)
     check_count(repeats, "--repeats")
     facts = machine()
     many = 10 * repeats
-    solves = [newton_solves.paper_row(many), newton_solves.nearest_row(many), *newton_solves.loop_rows(many)]
-    agreements = newton_solves.agreement_rows(many)
-    drags = [drag_row(frames, contacts) for contacts in (False, True)]
+    solves = [newton.paper_row(many), newton.nearest_row(many), *newton.loop_rows(many)]
+    agreements = newton.agreement_rows(many)
+    drags = [newton.drag_row(frames, contacts) for contacts in (False, True)]
     linear = list(newton.linear_rows(sizes, repeats))
     write_rows(arguments.out / "newton-linear.csv", facts, linear)
     write_rows(arguments.out / "newton-solves.csv", facts, solves)

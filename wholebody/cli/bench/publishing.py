@@ -16,9 +16,12 @@ if TYPE_CHECKING:
 def add_common(parser: argparse.ArgumentParser) -> None:
     """Add `--quick`, `--out` and `--update-docs`."""
     parser.add_argument("--quick", action="store_true", help="a short run that shows whether all works")
-    parser.add_argument(
-        "--out", type=Path, default=Path("out/bench"), metavar="DIR", help="folder (default: out/bench)"
-    )
+    add_folders(parser, "out/bench")
+
+
+def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
+    """Add `--out`, with a folder where it is left out, and `--update-docs`."""
+    parser.add_argument("--out", type=Path, default=Path(out), metavar="DIR", help=f"folder (default: {out})")
     parser.add_argument(
         "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
         help="write tables and charts into the documentation too (default folder: docs)",

@@ -24,9 +24,8 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure random reaches."""
-    from wholebody.bench import charts
     from wholebody.bench.machine import machine
-    from wholebody.bench.reaches import reaches_report, run
+    from wholebody.bench.reaches import reach_times, reaches_report, run
     from wholebody.bench.tables import write_rows
     from wholebody.methods.qp.solvers.registry import make_solver
 
@@ -44,6 +43,6 @@ def run(arguments: argparse.Namespace) -> int:
                 print(f"seed {row.seed}, {solver}: {row.status}; {row.how}")
     report = reaches_report(rows, facts, arguments.jobs)
     write_rows(arguments.out / "reaches.csv", facts, rows)
-    drawn = {"reaches": charts.reach_times(rows, arguments.out / "reaches")}
+    drawn = {"reaches": reach_times(rows, arguments.out / "reaches")}
     publish("reaches", report, drawn, {"reaches": "Share of the reaches solved within a time"}, arguments)
     return 0

@@ -25,7 +25,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 def run(arguments: argparse.Namespace) -> int:
     """Measure all descriptions; --quick makes three reaches instead of twelve."""
     from wholebody.bench.machine import machine
-    from wholebody.bench.robots.table import REACHES, measure, page
+    from wholebody.bench.robots import REACHES, measure, page
     from wholebody.bench.tables import write_text
 
     facts, reaches = machine(), 3 if arguments.quick else REACHES

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from wholebody.bench.adapters import Adapter
     from wholebody.bench.stability.case import HardCase
     from wholebody.bench.stability.pictures import Drawn
-    from wholebody.bench.stability.rows import Result
+    from wholebody.bench.stability.verdict import Result
 
 PAGE = "where-methods-fail.md"
 ASSETS = "assets/stability"
@@ -79,8 +79,8 @@ def _check_page(arguments: argparse.Namespace) -> None:
 
 
 def _asked(cases: Sequence[HardCase], adapters: Sequence[Adapter], jobs: int) -> Result:
-    from wholebody.bench.stability.rows import result
-    from wholebody.bench.stability.running import run as ask_all
+    from wholebody.bench.stability.asking import run as ask_all
+    from wholebody.bench.stability.verdict import result
 
     cells = []
     with _bar() as bar:

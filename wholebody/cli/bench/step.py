@@ -23,10 +23,9 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure steps."""
-    from wholebody.bench import charts, step_profile
     from wholebody.bench.adapters import chosen_tools, differences
     from wholebody.bench.machine import machine
-    from wholebody.bench.step import goal_lines, measure, step_report
+    from wholebody.bench.step import goal_lines, least_distances, linearise_us, measure, step_report, step_times
     from wholebody.bench.tables import write_rows
     from wholebody.bench.track import VARIANTS, track
 
@@ -42,13 +41,13 @@ def run(arguments: argparse.Namespace) -> int:
         rows += measured
         times += timed
         if "wholebody/osqp" in tools:
-            shares[name] = step_profile.linearise_us(course, "osqp")
+            shares[name] = linearise_us(course, "osqp")
     report = step_report(rows, facts, {name: differences(name) for name in tools}, shares)
     write_rows(arguments.out / "step.csv", facts, rows)
     write_rows(arguments.out / "step-times.csv", facts, times)
     drawn = {
-        "step-times": charts.step_times(times, arguments.out / "step-times"),
-        "step-distances": charts.least_distances(times, arguments.out / "step-distances"),
+        "step-times": step_times(times, arguments.out / "step-times"),
+        "step-distances": least_distances(times, arguments.out / "step-distances"),
     }
     captions = {
         "step-times": "Time of a step of every tool",

@@ -1,1 +1,1 @@
-"""Continuous collision detection: what happens between two postures, not only at them."""
+"""Continuous collision detection: contacts during the motion between two postures."""

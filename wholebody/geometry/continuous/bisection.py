@@ -1,4 +1,4 @@
-"""The last free posture on the way from a free one, by halving."""
+"""The last free posture of a motion from a free one, by bisection."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from wholebody.arrays import Array
 
 
 def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array], object], halvings: int) -> Array:
-    """Halve the way from a free posture to one that overlaps something; never beyond what was found free.
+    """Bisect the motion from a free posture to one that overlaps something; the result was tested to be free.
 
-    Algorithm 1, step 4, of Schmidl and Lin. A way that is free again beyond an overlap may end on either side of it.
+    Algorithm 1, step 4, of Schmidl and Lin. If the motion is free again after an overlap, the result may be on either
+    side.
 
     Args:
         model: of the figure.
-        free: (nq,) where nothing overlaps.
-        q: (nq,) where something does.
+        free: (nq,) posture without overlap.
+        q: (nq,) posture with overlap.
         overlaps: whether something overlaps at a posture (nq,).
-        halvings: the way is known to 2 to the power of minus this.
+        halvings: number of halvings; the result is accurate to 2 to the power of minus this.
     """
     inside, outside = 0.0, 1.0
     for _ in range(halvings):

@@ -1,10 +1,10 @@
-"""How fast pieces can approach each other on the way from one posture to another.
+"""Bounds on the velocity with which pieces approach each other during the motion between two postures.
 
-On the geodesic q(t) = integrate(q0, t v), v = difference(q0, q1), every joint turns with a twist (l, w) that is
+On the geodesic q(t) = integrate(q0, t v), v = difference(q0, q1), every joint moves with a twist (l, w) that is
 constant in its own frame. A point at distance r from the joint's origin then moves, relative to the joint's base,
-with a speed of at most |l| + |w| r, and r is at most the sum of the distances between the moving joints on the way to
-the point, plus the travel of the sliding ones: lengths that do not change, because what lies between two moving
-joints is rigid. The speed of approach of two pieces is at most the sum over the joints that carry exactly one of them
+with a speed of at most |l| + |w| r. Here r is at most the sum of the distances between the moving joints from there to
+the point, plus the travel of the prismatic ones; these distances are constant, because the parts between two moving
+joints are rigid. The speed of approach of two pieces is at most the sum over the joints that carry exactly one of them
 (common ancestors move both).
 """
 
@@ -29,9 +29,9 @@ class MotionBounds:
     """Bounds for one geometry model, renewed for each motion by `update`.
 
     Attributes:
-        speed: (n, njoints) most speed that joint j gives to a point of piece i, metres for the whole way; 0 where it
-            gives none.
-        turn: (njoints,) angle that each joint turns by on the way, radians.
+        speed: (n, njoints) largest speed that joint j gives to a point of piece i, metres for the whole motion; 0 where
+            it gives none.
+        turn: (njoints,) rotation angle of each joint during the motion, radians.
     """
 
     def __init__(self, model: pin.Model, joint: NDArray[np.intp], reach: Array) -> None:
@@ -43,7 +43,7 @@ class MotionBounds:
             reach: (n,) radius of each piece about its origin; infinite for a half-space.
 
         Raises:
-            InputError: a joint whose axis turns as it moves (composite, Euler angles, universal).
+            InputError: a joint whose axis is not constant (composite, Euler angles, universal).
         """
         for name, kind in zip(model.names, model.joints, strict=True):
             if any(word in kind.shortname() for word in TURNING_AXES):
@@ -70,7 +70,7 @@ class MotionBounds:
         self._parents = [int(parent) for parent in model.parents]
 
     def update(self, data: Any, velocity: Array, centers: Array) -> None:
-        """Bound the motion from where `data` is.
+        """Bound the motion that begins at the posture of `data`.
 
         Args:
             data: Pinocchio's data after forwardKinematics at the start, with `velocity`.
@@ -83,7 +83,7 @@ class MotionBounds:
         origins = np.array([place.translation for place in data.oMi])
         self.speed = self._speeds(origins, centers, self._size)
         if not self._finite[self.joint > 0].all():
-            # Of a half-space only the part near other pieces counts: where two pieces are nearest, either of the two
+            # Of a half-space only the part near other pieces matters: where two pieces are nearest, either of the two
             # points gives the same speed along the normal, and all other pieces stay within this sphere.
             travel = self.speed.sum(axis=1)
             extent = self._size + travel
@@ -92,7 +92,7 @@ class MotionBounds:
             self.speed = self._speeds(origins, centers, np.where(self._finite, self.reach, wide))
 
     def _speeds(self, origins: Array, centers: Array, reach: Array) -> Array:
-        """Slides and turns of the joints times the ways from them to the pieces, along the joints that move."""
+        """Translations of the joints, and rotations times the distances to the pieces along the moving joints."""
         moving = ((self._slide > 0.0) | (self.turn > 0.0)).tolist()
         above = [0] * len(moving)  # the joint that moves, itself or the nearest to the root
         inner = [0] * len(moving)  # the next one from there
@@ -112,21 +112,21 @@ class MotionBounds:
         return np.where(self.carries[self.joint], self._slide + self.turn * farthest, 0.0)
 
     def approach(self, first: NDArray[np.intp], second: NDArray[np.intp]) -> Array:
-        """Most speed with which the distance of each pair can change, (k,), metres for the whole way."""
+        """Largest rate of change of the distance of each pair, (k,), metres for the whole motion."""
         against = self.speed @ ~self.carries.T  # of each piece against what each joint carries
         return np.asarray(against[first, self.joint[second]] + against[second, self.joint[first]])
 
     def curvature(self, first: int, second: int, gap: float) -> float:
-        """Most acceleration of a point of the first piece seen from the second, metres for the whole way squared.
+        """Largest acceleration of a point of the first piece relative to the second, metres per squared duration.
 
         With the joints between the two pieces taken as a product of exponentials, the second derivative of the point
-        is a sum over pairs of joints: each speed is turned twice by every joint nearer to the second piece, and once
+        is a sum over pairs of joints: each velocity counts twice for every joint nearer to the second piece, and once
         by its own.
 
         Args:
             first: the piece with the points; of finite reach.
-            second: the piece it is seen from.
-            gap: distance of the two now, metres.
+            second: the reference piece.
+            gap: present distance of the two, metres.
         """
         a, b = self.carries[self.joint[first]], self.carries[self.joint[second]]
         near, far = a & ~b, b & ~a

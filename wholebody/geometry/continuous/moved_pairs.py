@@ -1,4 +1,4 @@
-"""Which pairs moved against each other, from one posture to the next, by more than lay between them."""
+"""The pairs that moved against each other, from one posture to the next, by more than their distance."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError
 from wholebody.geometry.proximity import ENDLESS, Contacts, PairTable
 
-ARC = 1.1  # length of an arc over its chord, at the most, for the turns that one step makes
+ARC = 1.1  # largest ratio of an arc to its chord, for the rotations of one step
 
 
 class Placed(NamedTuple):
-    """Which pairs are near at a posture, nearer than what: what a motion is judged by."""
+    """The near pairs at a posture and the query distance, for tests of motions."""
 
     contacts: Contacts
     within: float
 
     @property
     def placements(self) -> Array:
-        """(n, 4, 3) where the pieces are."""
+        """(n, 4, 3) placements of the pieces."""
         return self.contacts.placements
 
 
 def far_moved(table: PairTable, before: Placed, after: Placed) -> Indices:
-    """Pairs that moved against each other by more than lay between them.
+    """Pairs that moved against each other by more than their distance.
 
     Raises:
         InputError: the placements are of other pieces.
@@ -47,7 +47,7 @@ def far_moved(table: PairTable, before: Placed, after: Placed) -> Indices:
 
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
-    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    """The module of compiled loops, compiled or loaded from the cache, before a solve."""
     from wholebody.geometry.continuous import moved_pairs_kernel
 
     none, places, pairs = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
@@ -59,7 +59,7 @@ def compiled_kernel() -> Any:
 
 
 def distances(placed: Placed, count: int) -> Array:
-    """Signed distance (pairs,) of every pair: measured where it is near, else what it was looked for within."""
+    """Signed distance (pairs,) of every pair; the query distance for pairs that are not near."""
     distance = np.full(count, placed.within)
     distance[placed.contacts.number] = placed.contacts.distance
     return distance

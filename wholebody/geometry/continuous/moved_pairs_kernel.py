@@ -1,4 +1,4 @@
-"""Which pairs moved by more than lay between them, as compiled loops: see `moved_pairs`."""
+"""The pairs that moved by more than their distance, as compiled loops: see `moved_pairs`."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ def far_moved(
     arc: float,
     endless: float,
 ) -> Indices:
-    """Return the pairs (k,) that moved against each other by more than lay between them.
+    """Return the pairs (k,) that moved against each other by more than their distance.
 
     Args:
-        before: (n, 4, 3) placements of the pieces.
-        after: the same, later.
+        before: (n, 4, 3) placements of the pieces before the motion.
+        after: the same after the motion.
         pairs: (p, 2).
         widths: (p,) of both pieces of a pair together.
         reach: (n,) of the pieces from their origins; infinite where endless.
-        number_before: pairs that were measured before.
+        number_before: pairs that were near before.
         distance_before: their distances.
-        within_before: what all others were farther apart than.
-        number_after: pairs that were measured after.
+        within_before: query distance before; all other pairs were farther apart.
+        number_after: pairs that are near after.
         distance_after: their distances.
-        within_after: what all others are farther apart than.
-        arc: length of an arc over its chord, at the most.
-        endless: what counts for an infinite reach.
+        within_after: query distance after.
+        arc: largest ratio of an arc to its chord.
+        endless: value used for an infinite reach.
     """
     count = len(before)
     motion = np.empty(count)
@@ -90,7 +90,7 @@ def _between(placements: Array, first: int, second: int) -> float:
 
 @compiled()
 def _seen(before: Array, after: Array, carrier: int, other: int, reach: float, arc: float, endless: float) -> float:
-    """Longest way that any point of a piece made in the axes of another one."""
+    """Largest motion of a point of a piece in the axes of another one."""
     shift, turn = 0.0, 0.0
     for j in range(3):
         along = 0.0

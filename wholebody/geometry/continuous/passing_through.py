@@ -1,9 +1,9 @@
-"""Whether a motion passes through something: proof for most pairs, a continuous sweep for the others.
+"""Test whether a motion passes through something: proof for most pairs, a continuous sweep for the others.
 
 Two convex pieces that are d0 apart before a motion and d1 after it can only have changed sides if they moved against
-each other by d0 + d1 and the widths of both. Where a motion is longer (a fast hand, a thin plate), the plane that parts
-them before it, carried along by one piece, may still part them after it, up to the height of the arcs that points
-describe. What is left is swept.
+each other by d0 + d1 and the widths of both. If a motion is longer (a fast hand, a thin plate), the plane that
+separates them before it, fixed to one piece, may still separate them after it, up to the height of the arcs that points
+describe. The remaining pairs are swept.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from wholebody.geometry.continuous.sweep import FirstContact, Sweep
 
 
-DIP = 5e-4  # m: between two postures a piece may dip in by this much; half of the thinnest plate that counts
-OVERLAP = 2e-4  # m: overlap on the way that does not count; finer than any piece is thick
-GRAZE = 5e-4  # m: deeper than this a way goes into something; soles that are held dip in between two postures
-SHORT = 0.03  # rad, m: a shorter way of joints whose every step was looked after dips in by less than GRAZE
-HALVINGS = 3  # of a way before what is still in doubt is swept
+DIP = 5e-4  # m: overlap that is allowed between two postures; half of the thinnest plate that counts
+OVERLAP = 2e-4  # m: overlap during a motion that is ignored; smaller than the width of any piece
+GRAZE = 5e-4  # m: a motion that gets deeper than this is blocked; held soles overlap a little between two postures
+SHORT = 0.03  # rad, m: a shorter motion whose every step was tested gets less deep than GRAZE
+HALVINGS = 3  # of a motion before doubtful pairs are swept
 
 
 class Queries(Protocol):
-    """What is asked about postures between the two, as `wholebody.workspace.Workspace` answers it."""
+    """Queries at postures between the two; `wholebody.workspace.Workspace` implements them."""
 
     @property
     def model(self) -> pin.Model:
@@ -42,23 +42,23 @@ class Queries(Protocol):
 
     @property
     def sweep(self) -> Sweep:
-        """Conservative advancement with the pieces where they stand now."""
+        """Conservative advancement with the present placements of the pieces."""
 
     def near(self, q: Array, within: float) -> Contacts:
         """Every pair nearer than `within` metres at a posture (nq,)."""
 
     def placements(self, q: Array) -> Array:
-        """Where all pieces are at a posture (nq,); see `Contacts.placements`."""
+        """Placements of all pieces at a posture (nq,); see `Contacts.placements`."""
 
 
 def is_free(queries: Queries, before: Array, after: Array, unswept: float) -> bool:
-    """Whether the way between two postures (nq,) goes into nothing.
+    """Whether the motion between two postures (nq,) penetrates nothing.
 
     Args:
         queries: of the run.
-        before: where the way begins.
-        after: where it ends.
-        unswept: radians and metres: ways up to this are taken as they are.
+        before: start of the motion.
+        after: its end.
+        unswept: radians and metres: shorter motions are not swept.
     """
     if np.isinf(unswept) or np.abs(pin.difference(queries.model, before, after)).max(initial=0.0) <= unswept:
         return True
@@ -66,16 +66,16 @@ def is_free(queries: Queries, before: Array, after: Array, unswept: float) -> bo
 
 
 def passes_through(queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array) -> bool:
-    """Whether some pair is on other sides of each other after a motion than before it.
+    """Whether some pair has changed sides during a motion.
 
-    A pair that touches on the way and still does at the end was bumped into, which its distance tells; one that is
-    apart again was passed through. The way is halved a few times, which parts most pairs beyond doubt at a tenth of the
-    cost of a sweep; what remains is swept.
+    A pair that touches during the motion and at its end is a collision, which its distance shows; a pair that touches
+    and is separate again was passed through. The motion is halved a few times, which decides most pairs at a tenth of
+    the cost of a sweep; the remaining pairs are swept.
 
     Args:
         queries: of the run that makes the motion; its state is moved.
-        before: where the pieces are before the motion.
-        after: where they are after it.
+        before: near pairs before the motion.
+        after: near pairs after it.
         q0: (nq,) posture before the motion.
         q1: (nq,) posture after it.
     """
@@ -108,7 +108,7 @@ def _halved(
 
 
 def _swept_through(queries: Queries, q0: Array, q1: Array, doubtful: Indices, end: Array) -> bool:
-    """By continuous collision detection of these pairs; `end` are the distances (pairs,) after the way."""
+    """The same by a sweep of these pairs; `end` are the distances (pairs,) after the motion."""
     while len(doubtful):
         hit = queries.sweep.first_contact(q0, q1, queries.table.pairs[doubtful], OVERLAP)
         if hit is None:
@@ -122,15 +122,15 @@ def _swept_through(queries: Queries, q0: Array, q1: Array, doubtful: Indices, en
 def first_passed(
     queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array, overlap: float
 ) -> FirstContact | None:
-    """First contact of a pair that may have changed sides, and is apart after the motion; None where there is none.
+    """First contact of a pair that may have changed sides, and is separate after the motion; None if there is none.
 
     Args:
         queries: of the run.
-        before: where the pieces are before the motion.
-        after: where they are after it.
+        before: near pairs before the motion.
+        after: near pairs after it.
         q0: (nq,) posture before the motion.
         q1: (nq,) posture after it.
-        overlap: m of overlap on the way that does not count.
+        overlap: overlap during the motion that is ignored, metres.
     """
     table = queries.table
     moved = far_moved(table, before, after)
@@ -146,10 +146,10 @@ def doubtful_pairs(table: PairTable, before: Placed, after: Placed) -> Indices:
 def _passing_by(
     queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array, pairs: Indices
 ) -> NDArray[np.bool_]:
-    """Which of these pairs keep their bounding spheres apart all the way, as a look at its middle has it.
+    """The pairs whose bounding spheres stay separate during the motion, estimated from its middle.
 
-    The centres' way against each other is taken for the two chords that meet in the middle; what it leaves them by is
-    a quarter of what the middle is off the whole chord where the way is a parabola, and taken for twice that.
+    The relative path of the centres is approximated by two chords that meet in the middle. For a parabola the deviation
+    from these chords is a quarter of the deviation of the middle from the whole chord; twice that is assumed.
     """
     table = queries.table
     halfway = queries.placements(np.asarray(pin.interpolate(queries.model, q0, q1, 0.5)))
@@ -173,14 +173,14 @@ def _nearest(start: Array, end: Array) -> Array:
 
 
 def _not_parted(table: PairTable, before: Placed, after: Placed, doubtful: Indices) -> Indices:
-    """Those of these pairs that no plane parts before and after."""
+    """The pairs that no plane separates before and after."""
     listed = np.full(len(table.pairs), -1, dtype=np.intp)
     listed[before.contacts.number] = np.arange(len(before.contacts.number))
     return np.array([k for k in doubtful if not _parted(table, before, after, int(listed[k]))], dtype=np.intp)
 
 
 def _parted(table: PairTable, before: Placed, after: Placed, contact: int) -> bool:
-    """Whether the plane between two pieces before the motion still parts them after it, carried by either."""
+    """Whether the plane between two pieces before the motion, fixed to either, still separates them after it."""
     if contact < 0:
         return False
     first, second = before.contacts.pair[contact]

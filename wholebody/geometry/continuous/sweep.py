@@ -1,13 +1,13 @@
-"""The first contact on the way from one posture to another, by conservative advancement.
+"""The first contact of the motion from one posture to another, by conservative advancement.
 
-Each pair is safe for as long as its distance, divided by the most speed with which it can shrink
-(`wholebody.geometry.continuous.motion_bounds`), says. The motion jumps to the end of the shortest such time, asks coal
-again for the pairs that are due, and so on: nothing can be passed between two questions, however thin (Mirtich 1996;
-Zhang, Lee and Kim 2006).
+Each pair is safe for the time that is its distance divided by the largest rate at which it can decrease
+(`wholebody.geometry.continuous.motion_bounds`). The motion advances by the shortest such time, coal computes the
+distances of the pairs that are due, and so on. So no pair can be passed between two queries, however thin (Mirtich
+1996; Zhang, Lee and Kim 2006).
 
-Pieces that slide on each other would be asked again and again. For them the distance to a plane that moves with one of
-the two pieces is bounded to second order: heights, their exact rates and a bound of their acceleration; the plane
-supports that piece, so the least height of the other bounds the distance from below, in penetration too.
+Pieces that slide on each other would need very many queries. For them the distance to a plane that moves with one of
+the two pieces is bounded to second order: heights, their exact rates and a bound of their acceleration. The plane
+supports that piece, so the least height of the other piece bounds the distance from below, in penetration too.
 """
 
 from __future__ import annotations
@@ -26,30 +26,30 @@ from wholebody.geometry.proximity import SINGLY
 from wholebody.geometry.swept_points import swept_points
 
 TOLERANCE = 1e-4
-"""Depth that is not yet a contact, metres."""
+"""Depth up to which an overlap is no contact, metres."""
 
 MOST_QUERIES = 4000
-"""Places on the way that are looked at before giving up, some 40 us each; ordinary motions take 10 to 100."""
+"""Most queries of a motion, some 40 us each; ordinary motions take 10 to 100."""
 
 TOGETHER = 0.05
-"""Pairs due within this share of the way are asked together: a query costs more than the pairs in it."""
+"""Pairs due within this share of the motion are queried together: a query costs more than the pairs in it."""
 
 SLOW = 3
-"""Queries after which a pair is bounded to second order, which costs more and pays only where pieces slide."""
+"""Queries after which a pair is bounded to second order, which costs more and helps only if pieces slide."""
 
 
 @dataclass(frozen=True)
 class FirstContact:
-    """Where a motion has to stop.
+    """The first contact of a motion.
 
     Attributes:
-        fraction: share of the way, 0 to 1, that is free of contact.
-        q: (nq,) the posture there; no pair is deeper in it than the tolerance allows.
+        fraction: share of the motion, 0 to 1, that is free of contact.
+        q: (nq,) the posture there; no pair is deeper than the tolerance allows.
         index: the pair that touches, as an index into the geometry model's collision pairs.
         pair: the two pieces of it.
         distance: its signed distance there, metres.
-        certain: true if the pair does touch there; false if the sweep gave up there: the way is free so far and unknown
-            beyond.
+        certain: true if the pair touches there; false if the queries ran out there: the motion is free so far and
+            unknown beyond.
     """
 
     fraction: float
@@ -61,7 +61,7 @@ class FirstContact:
 
 
 class Sweep:
-    """Sweeps of one model and geometry, re-used from motion to motion."""
+    """Sweeps of one model and geometry; one object serves many motions."""
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel) -> None:
         """Read the pieces and pairs once; placements of fixed pieces may change between sweeps.
@@ -79,7 +79,7 @@ class Sweep:
         self._pairs: Indices = np.array(pairs, dtype=np.intp).reshape(-1, 2)
         self._number = {(int(i), int(j)): k for k, (i, j) in enumerate(self._pairs)}
         self._reach = reach[self._pairs].sum(axis=1)
-        few = len(self._pairs) < SINGLY  # else no table over all pairs of pieces is made
+        few = len(self._pairs) < SINGLY  # otherwise no table over all pairs of pieces is made
         self._active = np.zeros((geometry.ngeoms,) * 2 if few else (0, 0), dtype=bool, order="F")
         self._place(pin.neutral(model), np.zeros(model.nv))
         pin.computeDistances(geometry, self._results)
@@ -97,13 +97,13 @@ class Sweep:
         deeper by half of it never. So nothing thicker than twice the tolerance is ever passed.
 
         Args:
-            q0: (nq,) where the motion starts.
-            q1: (nq,) where it ends.
-            pairs: (k, 2) the pairs of pieces to look at, collision pairs of the geometry model; all of them by default.
+            q0: (nq,) start of the motion.
+            q1: (nq,) its end.
+            pairs: (k, 2) the pairs of pieces to test, collision pairs of the geometry model; all of them by default.
             tolerance: metres.
 
         Returns:
-            None if the whole way is free.
+            None if the whole motion is free.
 
         Raises:
             InputError: postures of the wrong shape, not finite or with a quaternion that is not of unit length; a
@@ -123,7 +123,7 @@ class Sweep:
         speed = self._bounds.approach(self._pairs[index, 0], self._pairs[index, 1])
         between = centers[self._pairs[index, 0]] - centers[self._pairs[index, 1]]
         near = np.sqrt(np.einsum("ij,ij->i", between, between)) < self._reach[index] + speed
-        near &= speed > 0.0  # spheres that cannot meet on the way need no question
+        near &= speed > 0.0  # spheres that cannot meet need no query
         index, speed = index[near], speed[near]
         if not len(index):
             return None
@@ -171,7 +171,7 @@ class Sweep:
             raise InputError(f"sweep: pieces {missing.args[0]} are not a collision pair; add the pair first") from None
 
     def _second_order(self, index: int, row: Array, level: float) -> float:
-        """Share of the way for which a plane between the pair, carried by either piece, keeps them above `level`."""
+        """Share of the motion for which a plane between the pair, fixed to either piece, keeps them above `level`."""
         first, second = (int(k) for k in self._pairs[index])
         normal = row[1:4]
         if not normal @ normal > 0.25:
@@ -185,9 +185,9 @@ class Sweep:
         return best
 
     def _planes(self, piece: int, normal: Array) -> Array:
-        """Directions (k, 3) to bound a piece in, near a normal of coal's: the normal, and its face that looks there.
+        """Directions (k, 3) in which to bound a piece: a normal of coal's, and that of the face nearest to it.
 
-        Any direction gives a true bound, and a wide face a useless one if it is not met exactly: where faces touch,
+        Every direction gives a valid bound, but a wide face needs its exact normal for a useful one: where faces touch,
         coal's normal can be 1e-4 rad off.
         """
         swept, rotation = self._swept[piece], self._results.oMg[piece].rotation
@@ -198,7 +198,7 @@ class Sweep:
         return face[None] if np.isinf(swept.reach) else np.array([face, normal])
 
     def _planes_keep(self, points: int, plane: int, normals: Array, distance: float, level: float) -> float:
-        """Time until a swept point of `points` can come down to `level` over supporting planes (k, 3) of `plane`."""
+        """Time until a swept point of `points` can reach `level` above supporting planes (k, 3) of `plane`."""
         swept, base = self._swept[points], self._swept[plane]
         at, below = self._results.oMg[points], self._results.oMg[plane]
         if np.isinf(base.reach):
@@ -220,7 +220,7 @@ class Sweep:
         return float(times.min(axis=0).max())
 
     def _velocities(self, piece: int, places: Array) -> Array:
-        """Velocities (k, 3) that points at `places` have with the body that carries the piece."""
+        """Velocities (k, 3) of points at `places` that move with the piece's body."""
         joint = int(self._bounds.joint[piece])
         if joint == 0:
             return np.zeros_like(places)
@@ -232,7 +232,7 @@ class Sweep:
         pin.updateGeometryPlacements(self.model, self._data, self.geometry, self._results)
 
     def _query(self, index: Indices) -> Array:
-        """Ask coal for these pairs: rows of distance, normal and the two nearest points."""
+        """Query coal for these pairs: rows of distance, normal and the two nearest points."""
         if len(self._active):
             first, second = self._pairs[index, 0], self._pairs[index, 1]
             self._active[:] = False
@@ -265,5 +265,5 @@ def first_contact(
     q1: Array,
     tolerance: float = TOLERANCE,
 ) -> FirstContact | None:
-    """One sweep; see `Sweep.first_contact`. Who sweeps often keeps a `Sweep`."""
+    """One sweep; see `Sweep.first_contact`. For many sweeps make a `Sweep`."""
     return Sweep(model, geometry).first_contact(q0, q1, pairs, tolerance)

@@ -1,6 +1,6 @@
-"""Attraction to the tracked posture: parts of the figure move to it in short steps, or else joint by joint.
+"""Attraction to the tracked posture: parts of the figure move towards it in short steps, or joint by joint.
 
-The joints that are displaced are attracted back in every frame, as far as contact allows (the coach and trainee of
+Displaced joints are attracted back in every frame, as far as contact allows (the coach and trainee of
 Boulic and others 1997).
 """
 
@@ -14,23 +14,23 @@ from wholebody.arrays import Array
 from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
 from wholebody.scene import Scene
 
-LEAST_GAIN = 1e-7  # rad^2: a part that gets no nearer than this to the tracked posture stays where it is
-BLOCKED = 0.4  # a part that gains less than this share of what attraction alone would have is blocked (2 is all of it)
-ARRIVED = 1e-12  # rad^2: a part this near is there
+LEAST_GAIN = 1e-7  # rad^2: a part that gets nearer to the tracked posture by less than this stays where it is
+BLOCKED = 0.4  # a part that gains less than this share of the gain without contact is blocked (2 is all of it)
+ARRIVED = 1e-12  # rad^2: a part nearer than this has arrived
 
 
 class Attraction:
-    """Moves the chains of one figure, and what belongs to none (the root and trunk) as one part more.
+    """Moves the chains of one figure, and the remaining joints (the root and trunk) as one more part.
 
     Attributes:
-        parts: degrees of freedom (k,) of each part, and how far from each of them its farthest point can be, (k,).
-        step_length: m that a part's tip moves in one step at the most.
-        free: the wanted posture overlaps nothing: then a part may go a longer way round to it.
-        limit: of work in the resolver's counts, beyond which joints are not tried one by one.
+        parts: degrees of freedom (k,) of each part, and for each the greatest distance of a point of the part, (k,).
+        step_length: largest motion of a part's tip in one step, m.
+        free: whether the wanted posture overlaps nothing: then a part may move away from it for a while.
+        limit: of the work in the resolver's counts; beyond it joints are not tried one by one.
     """
 
     def __init__(self, scene: Scene, resolver: OverlapResolver) -> None:
-        """Say which degrees of freedom are of which chain."""
+        """Find the degrees of freedom of each chain."""
         self._model, self._resolver = scene.model, resolver
         self.step_length, self.limit, self.free = 0.0, 0, False
         self.parts: list[tuple[NDArray[np.intp], Array]] = []
@@ -49,10 +49,10 @@ class Attraction:
         self.parts.append((others, reach))
 
     def step(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
-        """Move every part that is not settled a step towards the wanted posture; None where none is left to move.
+        """Move every part that is not settled a step towards the wanted posture; None if no part can move.
 
         Returns:
-            The posture there, (nq,), and the share of its way that each part went, (parts,).
+            The new posture, (nq,), and the share of its motion that each part made, (parts,).
         """
         way = np.asarray(pin.difference(self._model, q, wanted))
         shares = np.zeros(len(self.parts))
@@ -67,9 +67,9 @@ class Attraction:
         return np.asarray(pin.integrate(self._model, q, way)), shares
 
     def keep_gains(self, q: Array, trial: Array, wanted: Array, shares: Array, settled: list[bool]) -> Array:
-        """Undo what brought a part no nearer to the wanted posture, and move joints one by one where a part is blocked.
+        """Undo changes that brought a part no nearer to the wanted posture; move joints of blocked parts one by one.
 
-        Where pushing undoes what attraction did, single joints may still be free: a shoulder that takes the whole arm
+        If overlap resolution undoes the attraction, single joints may still be free: a shoulder can move the whole arm
         back, although the wrist cannot straighten yet. A part for which this gains nothing either is settled.
         """
         before = np.asarray(pin.difference(self._model, q, wanted))
@@ -95,7 +95,7 @@ class Attraction:
         return trial
 
     def _attract_joints(self, q: Array, wanted: Array, part: int) -> tuple[Array, bool]:
-        """Move one joint after the other, from the root outwards, where that is free; whether any moved."""
+        """Move one joint after the other, from the root outwards, if its motion is free; returns whether any moved."""
         gained = False
         for dof, reach in zip(*self.parts[part], strict=True):
             way = float(pin.difference(self._model, q, wanted)[dof])

@@ -1,8 +1,8 @@
 """Reach cones on plain floats: a limb that has left its cone is turned back to the nearest direction in it.
 
 The polygons are those of `wholebody.figures.reach_cones` (Wilhelms and Van Gelder 2001). The paper projects a limb that
-has left its cone to the nearest place inside; the joints of the ball joint are then turned, each to its best, until the
-limb points there. What this does not bring inside goes back towards the last values that were.
+has left its cone to the nearest direction inside; the joints of the ball joint then turn, each to its best, until the
+limb points there. If the limb is still outside, bisection moves it back towards the last values inside.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from wholebody.methods.ccd.sweep import Aims, sweep
 
 Direction = tuple[float, float, float]
 
-SWEEPS = 12  # over the joints of a ball joint: more than two are needed only near a singularity of theirs
-INWARD = 1e-6  # share of the way to the cone's middle: how far inside a limb is put, above rounding
-HALVINGS = 20  # of the way back to the last values inside: a millionth of it
+SWEEPS = 12  # over the joints of a ball joint: more than two are needed only near a singularity
+INWARD = 1e-6  # margin inside the cone, as a share of the distance to its middle; larger than rounding
+HALVINGS = 20  # of the motion back to the last values inside, to a millionth of it
 
 
 class Polygon:
-    """A reach cone: whether a direction is inside, and the nearest one that is, without arrays."""
+    """A reach cone on plain floats: the test of a direction, and the nearest direction inside."""
 
     def __init__(self, cone: ReachCone) -> None:
         """Copy the planes of the cone."""
@@ -42,7 +42,7 @@ class Polygon:
         ]
 
     def contains(self, direction: Direction) -> bool:
-        """Whether a unit direction is inside: the wedge that holds it is found, then asked for its edge."""
+        """Whether a unit direction is inside: find the wedge that contains it, then test the wedge's edge."""
         x, y, z = direction
         for (a, b, c), (d, e, f), (g, h, i) in self._wedges:
             if a * x + b * y + c * z >= 0.0 > d * x + e * y + f * z:
@@ -76,11 +76,11 @@ class ConeGuard:
     """Keeps one limb in its cone while the nodes of some limbs move.
 
     Attributes:
-        nodes: the nodes that turn the limb in its cone; none where these limbs do not move it there.
+        nodes: the nodes that turn the limb in its cone; none if these limbs do not turn it.
     """
 
     def __init__(self, figure: Figure, limbs: Limbs, name: str) -> None:
-        """Find the nodes between the frame that the cone stands in and the limb."""
+        """Find the nodes between the cone's reference frame and the limb."""
         cone, model = figure.cones[name], figure.model
         limb, base = model.frames[figure.frame_id(cone.limb)], model.frames[figure.frame_id(cone.reference)]
         self._polygon = Polygon(cone.cone)
@@ -97,12 +97,12 @@ class ConeGuard:
         self._last: list[float] | None = None
 
     def holds(self, data: Any) -> bool:
-        """Whether the limb is in its cone where the joints of Pinocchio's data are."""
+        """Whether the limb is in its cone at the joint placements of Pinocchio's data."""
         base = data.oMi[self._base_joint].rotation @ self._base_placement.rotation
         return self._polygon.contains(_three((data.oMi[self._limb_joint].rotation @ self._axis) @ base))
 
     def read(self, data: Any) -> None:
-        """Take from Pinocchio's data what the nodes do not move; `limbs.read` and `limbs.forward` come before."""
+        """Read the placements that the nodes do not change; call `limbs.read` and `limbs.forward` first."""
         if not self.nodes:
             return
         own = self._limbs.joints[self._limb]
@@ -115,9 +115,9 @@ class ConeGuard:
         self._remember()
 
     def keep(self) -> bool:
-        """Bring the limb into its cone if it has left it; true if it is inside then.
+        """Turn the limb back into its cone if it has left it; true if it is inside then.
 
-        Call it after `limbs.forward()`; where it moves something it calls that itself.
+        Call it after `limbs.forward()`; if it moves something, it calls `limbs.forward()` itself.
         """
         if not self.nodes or self._remember():
             return True
@@ -127,7 +127,7 @@ class ConeGuard:
         return self._remember()
 
     def _direction(self) -> Direction:
-        """The limb's direction in the frame that the cone stands in."""
+        """The limb's direction in the cone's reference frame."""
         frames = self._limbs.frames
         world = rotated(frames[self._limb], *self._local)
         return seen_from(self._stand, *seen_from(frames[self._base], *world))
@@ -139,7 +139,7 @@ class ConeGuard:
         return True
 
     def _turn_back(self) -> None:
-        """Turn the joints of the limb until it points where its cone is nearest."""
+        """Turn the joints of the limb until it points to the nearest direction of its cone."""
         limbs = self._limbs
         wanted = rotated(self._stand, *self._polygon.nearest(self._direction()))
         target = rotated(limbs.frames[self._base], *wanted)
@@ -152,7 +152,7 @@ class ConeGuard:
                 return
 
     def _retreat(self, last: list[float]) -> None:
-        """Go from the last values inside as far towards the present ones as the cone allows."""
+        """Move from the last values inside as far towards the present ones as the cone allows."""
         values = self._limbs.values
         wanted = [values[node] for node in self.nodes]
         inside, outside = 0.0, 1.0

@@ -1,8 +1,8 @@
 """Kinematics of some joints of a figure on plain floats.
 
-Cyclic coordinate descent turns one joint at a time, so its inner loop has nothing to gain from arrays: on vectors of
+Cyclic coordinate descent turns one joint at a time, so arrays would not make its inner loop faster: on vectors of
 three, a call into numpy costs more than all the arithmetic. Joints are nodes of a tree, in the model's order (a chain
-is a tree without branches); what lies between two nodes and does not move is part of the later node's placement.
+is a tree without branches); a fixed transform between two nodes is part of the later node's placement.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ Line = tuple[float, float, float, float, float, float]
 
 WORLD: Placement = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 X, Y, Z, OBLIQUE, SLIDE = range(5)
-"""What a joint does: turn about an axis of its own frame (either way round), about any other, or slide."""
+"""Kinds of joints: revolute about an axis of their own frame, revolute about another axis, or prismatic."""
 
-SAME = 1e-12  # an axis or a rotation this near to a simple one is the simple one
+SAME = 1e-12  # an axis or a rotation nearer than this to a simple one is replaced by the simple one
 
 
 class Node(NamedTuple):
     """One joint.
 
     Attributes:
-        parent: place of the node it hangs on; -1 is the world.
-        turn: rotation from the parent, row by row, or None where there is none.
+        parent: index of its parent node; -1 is the world.
+        turn: rotation from the parent, row by row, or None for the identity.
         x, y, z: translation from the parent, metres.
         kind: X, Y, Z, OBLIQUE or SLIDE.
-        sign: -1 where the joint turns about the negative axis.
+        sign: -1 if the joint turns about the negative axis.
         axis: unit axis in the joint's own frame.
     """
 
@@ -49,20 +49,20 @@ class Node(NamedTuple):
 
 
 class Limbs:
-    """Joints with one degree of freedom, their values and limits, and where they are.
+    """Joints with one degree of freedom: their values, limits and placements.
 
     Attributes:
         joints: Pinocchio's index of each node's joint, ascending.
         values: radians or metres, one a node; change them and call `forward`.
-        lower, upper: limits of each node; infinite where there is none.
+        lower, upper: limits of each node; infinite for no limit.
         frames: after `forward`: placement of each node in the world, rotation row by row, then translation; the last
             entry is the world itself.
         lines: after `forward`: unit axis and origin of each node in the world.
-        paths: for each node, the nodes that move it, itself included, from the tip inwards.
+        paths: for each node, the nodes that move it, including itself, from the tip inwards.
     """
 
     def __init__(self, model: pin.Model, joints: Iterable[int]) -> None:
-        """Find how the joints hang together; `read` then says where they are.
+        """Find the tree of the joints; `read` then reads their values.
 
         Args:
             model: Pinocchio's model.
@@ -103,7 +103,7 @@ class Limbs:
         return -1
 
     def read(self, q: Array, data: Any) -> None:
-        """Take values from a posture q (nq,), and from `data` of the same posture where other joints are."""
+        """Read values from a posture q (nq,), and placements of other joints from `data` at the same posture."""
         for node, joint in enumerate(self.joints):
             place = self.model.joints[joint]
             first = place.idx_q
@@ -116,7 +116,7 @@ class Limbs:
             self._nodes[node] = _placed(self._nodes[node], floats(base))
 
     def write(self, q: Array) -> None:
-        """Put the values into a posture q (nq,), in place."""
+        """Write the values into a posture q (nq,), in place."""
         for node, joint in enumerate(self.joints):
             place = self.model.joints[joint]
             value = self.values[node]
@@ -174,12 +174,12 @@ class Limbs:
                 lines[k] = (ux, uy, uz, x, y, z)
 
     def slides(self, node: int) -> bool:
-        """Whether a node slides rather than turns."""
+        """Whether a node is prismatic."""
         return self._nodes[node].kind == SLIDE
 
 
 def movable(model: pin.Model, joint: int) -> bool:
-    """Whether a joint can be a node: it turns about one axis or slides along one."""
+    """Whether a joint can be a node: it is revolute or prismatic with one axis."""
     made = model.joints[joint]
     if made.nv != 1 or made.nq > 2:
         return False
@@ -229,7 +229,7 @@ def _placed(node: Node, placement: Placement) -> Node:
 
 
 def _kind(joint: Any) -> tuple[int, float, tuple[float, float, float]]:
-    """What a joint does, which way round, and its axis."""
+    """Kind, sign and axis of a joint."""
     subspace = np.asarray(joint.createData().S).ravel().tolist()
     sliding = max(abs(value) for value in subspace[3:]) < SAME
     x, y, z = subspace[:3] if sliding else subspace[3:]

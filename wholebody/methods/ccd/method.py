@@ -1,4 +1,4 @@
-"""The method ccd: reaches by cyclic coordinate descent, overlap removed by the loop of the avatar paper."""
+"""The method ccd: it reaches by cyclic coordinate descent and removes overlap by the loop of the avatar paper."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution, TraceEntry
 from wholebody.workspace import Workspace
 
-DISTURBANCES = (0.0, 0.05, 0.2, 0.6)  # rad: of the first starts, from the posture at hand; later ones begin anywhere
-ROUNDS = 6  # reaching and leaving overlap by turns, from one start
-ON_THE_WAY = 1e-3  # m, rad: to which the frames of a motion meet their goals before the end
-HALVINGS = 12  # of the way back to the start, which ends within a 4000th of it
-SHARE = 0.5  # of the tolerance: to what goals are met and overlap is removed, so that the judge agrees
+DISTURBANCES = (0.0, 0.05, 0.2, 0.6)  # rad: of the first starts, from the present posture; later ones begin anywhere
+ROUNDS = 6  # alternations of reaching and overlap resolution, from one start
+ON_THE_WAY = 1e-3  # m, rad: tolerance of the goals in frames of a motion before its end
+HALVINGS = 12  # of the motion back to the start, to a 4000th of it
+SHARE = 0.5  # of the tolerance, to which goals are met and overlap is removed, so that the assessment agrees
 
 
 @dataclass
 class _Trial:
-    """A posture with its deepest overlap [m], the largest error of its goals, and whether its search came to rest."""
+    """A posture with its deepest overlap [m], the largest error of its goals, and whether its search converged."""
 
     q: Array
     overlap: float
@@ -50,23 +50,23 @@ class _Trial:
 
 @dataclass(frozen=True)
 class CCD:
-    """Cyclic coordinate descent: one joint at a time, each to its best, from the tip inwards.
+    """Cyclic coordinate descent: one joint at a time, each to its best value, from the tip inwards.
 
     Takes Point, Frame and Orientation goals. A goal on a chain of the figure moves the joints of that chain up to its
-    frame, any other goal all joints between its frame and the root; the root itself stays. Limits are kept always,
-    reach cones where the problem asks for `ReachCones`, clearances by the loop of Schmidl and Lin, which may turn
-    other chains too. `Hold` is taken where nothing that moves can move it, `Freeze` and `StepLimit` as they are.
+    frame; any other goal moves all joints between its frame and the root; the root itself stays. Limits always hold,
+    reach cones if the problem has `ReachCones`, clearances by the loop of Schmidl and Lin, which may turn
+    other chains too. `Hold` is taken if no moving joint can move its frame; `Freeze` and `StepLimit` are taken.
 
-    Everything else (Balance, Plane, Axis, CenterOfMass, Relative, measures) is refused by name. There is no objective
-    beside the goals: a problem that gives no measures is taken as it is, although it then means `Effort()`, since the
-    descent begins at the start and stops at the first posture that serves. That is near to the start and not the
-    nearest; `assessment.measure` says what it costs.
+    Other terms (Balance, Plane, Axis, CenterOfMass, Relative, measures) are refused by name. The method has no
+    objective beside the goals. A problem without measures is taken although its default is `Effort()`: the descent
+    begins at the start and stops at the first posture that meets the goals, which is near the start and not the
+    nearest; `assessment.measure` gives its effort.
 
     Attributes:
         tolerance: metres and radians to which goals are met.
         iterations: most sweeps from one start.
-        restarts: most further starts, first near the posture at hand, then anywhere within the limits.
-        seed: of the restarts and of the order in which chains leave overlap.
+        restarts: most further starts, first near the present posture, then anywhere within the limits.
+        seed: of the restarts and of the order of the chains in overlap resolution.
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
             ends after four seconds of processor time.
     """
@@ -92,7 +92,7 @@ class CCD:
         return "ccd"
 
     def accepts(self, problem: Problem) -> str | None:
-        """None where this method can take all terms; else the sentence that names those that it cannot."""
+        """None if this method can take all terms; otherwise the sentence that names those that it cannot."""
         try:
             read(check_problem(problem, "CCD.accepts: problem"))
         except UnsupportedTermError as error:
@@ -105,12 +105,12 @@ class CCD:
         Goals out of reach and starts in penetration are answers, not errors.
 
         Args:
-            problem: what is asked.
+            problem: the problem.
             progress: see `wholebody.methods.control.Progress`.
 
         Raises:
             UnsupportedTermError: the problem has terms that this method cannot take.
-            InputError: the scene changed after the problem was stated.
+            InputError: the scene changed after the problem was made.
         """
         check_problem(problem, "CCD.solve: problem")
         began = time.perf_counter()
@@ -130,21 +130,21 @@ class CCD:
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
-        """What follows the goals of a problem by solving every step anew; frames on the way to a millimetre.
+        """A tracker that solves the problem anew at every step; frames during a motion to a millimetre.
 
         Raises:
-            InputError: dt is not a positive finite number, or the scene changed after the problem was stated.
+            InputError: dt is not a positive finite number, or the scene changed after the problem was made.
         """
         return _CCDTracker(self, problem, dt, replace(self, tolerance=ON_THE_WAY))
 
     def pushed_out(self, problem: Problem, q: Array) -> Array:
-        """Where pushing the posture q (nq,) out of what it overlaps ends, whatever the goals are.
+        """The result of overlap resolution at the posture q (nq,), without regard to the goals.
 
-        It may be inside of something still, where nothing leads out.
+        It may still overlap, if overlap resolution fails.
 
         Raises:
             UnsupportedTermError: the problem has terms that this method cannot take.
-            InputError: the scene changed after the problem was stated.
+            InputError: the scene changed after the problem was made.
         """
         check_problem(problem, "CCD.pushed_out: problem")
         q = posture(q, problem.scene.model.nq)
@@ -153,19 +153,19 @@ class CCD:
 
 
 class _CCDTracker(SolvingTracker):
-    """Follows by solves; pushes the figure out of what came into it."""
+    """Follows by solves; its ways out resolve overlap with things that were moved into the figure."""
 
     def __init__(self, method: CCD, problem: Problem, dt: float, rough: CCD) -> None:
         super().__init__(method, problem, dt, rough)
         self._ccd = method
 
     def ways_out(self, q: Array) -> Sequence[Array]:
-        """Where pushing the posture q (nq,) out ends."""
+        """The result of overlap resolution at the posture q (nq,)."""
         return (self._ccd.pushed_out(self.problem, q),)
 
 
 class _Search:
-    """One solve: starts, and from each of them reaching and leaving overlap by turns."""
+    """One solve: starts, and from each of them reaching and overlap resolution in alternation."""
 
     def __init__(self, method: CCD, problem: Problem, workspace: Workspace, control: Control) -> None:
         self._method, self._problem, self._control = method, problem, control
@@ -188,7 +188,7 @@ class _Search:
         self.trace: list[TraceEntry] = []
 
     def run(self) -> _Trial:
-        """The best of all starts, or the first that serves."""
+        """The best result of all starts, or the first that meets goals and clearances."""
         start = self._problem.scene.figure.clamp(self._problem.start)
         self._resolver.query(start)
         free = start if self._resolver.deepest <= self._tolerance else None
@@ -212,7 +212,7 @@ class _Search:
         return best if not self._control.over else replace(best, rested=False)
 
     def pushed_out(self, q: Array) -> Array:
-        """Where pushing a posture q (nq,) out ends, or pushing one a little beside it, where that leads farther out."""
+        """The result of overlap resolution at a posture q (nq,), or at one beside it, if that is better."""
         least, out = inf, q
         for size in (0.0, *PERTURBATIONS):
             perturbed = self._reach.disturbed(q, size, self._rng) if size else q
@@ -227,7 +227,7 @@ class _Search:
         return trial.error <= SHARE * self._method.tolerance and trial.overlap <= self._tolerance
 
     def _attempt(self, q: Array, free: Array | None, note: str) -> _Trial:
-        """Reach, leave overlap, reach again: until both hold, or neither gains."""
+        """Reach and resolve overlap in alternation, until goals and clearances are met, or neither step gains."""
         best: _Trial | None = None
         for turn in range(ROUNDS):
             before = q

@@ -17,14 +17,14 @@ from wholebody.methods.ccd.sweep import Aims, sweep
 from wholebody.methods.ccd.terms import Request, Wish
 from wholebody.methods.control import Control
 
-LEVER = 0.3  # m per radian: how far from its origin a frame's axes are held; about the length of a forearm
+LEVER = 0.3  # m per radian: weight of orientation against position; about the length of a forearm
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-WINDOW = 25  # sweeps over which progress is judged: near a goal the descent is linear, and sometimes slow
-PROGRESS = 0.97  # a window that leaves more than this share of the error is at rest
+WINDOW = 25  # sweeps over which progress is judged: near a goal convergence is linear, and sometimes slow
+PROGRESS = 0.97  # the descent ends if a window leaves more than this share of the error
 
 
 class Reached(NamedTuple):
-    """Where a descent ended: the largest error left (metres or radians), sweeps used, and whether it came to rest."""
+    """End of a descent: the largest remaining error (metres or radians), sweeps used, and whether it converged."""
 
     error: float
     sweeps: int
@@ -32,7 +32,7 @@ class Reached(NamedTuple):
 
 
 class _Aim(NamedTuple):
-    """One goal: its node, the point and axes in the node's frame, where they should be, and its place in the aims."""
+    """One goal: its node, the point and axes in the node's frame, their targets, and its index in the aims."""
 
     node: int
     local: tuple[float, float, float]
@@ -87,12 +87,12 @@ class Reach:
         return q, Reached(error, sweeps, rested)
 
     def disturbed(self, q: Array, size: float, rng: np.random.Generator) -> Array:
-        """Copy of a posture q (nq,) with its joints drawn at random, about where they are or anywhere.
+        """Copy of a posture q (nq,) with random joints, near their values or anywhere.
 
         Args:
             q: (nq,) posture.
             size: standard deviation, radians or metres; infinite for anywhere within the limits.
-            rng: where the numbers come from.
+            rng: the random generator.
         """
         q = q.copy()
         limbs = self.limbs
@@ -106,7 +106,7 @@ class Reach:
         return q
 
     def _carry(self, aims: Aims, goals: Sequence[_Aim]) -> None:
-        """Write where the points and axes are now."""
+        """Write the present positions of the points and axes."""
         k = 0
         for goal in goals:
             frame = self.limbs.frames[goal.node]
@@ -134,7 +134,7 @@ def _aim(model: Any, limbs: Limbs, data: Any, wish: Wish) -> _Aim:
 def _aims(goals: Sequence[_Aim]) -> Aims:
     """Points with the weight of their goal, axes with half of it.
 
-    The squared distances of three axes from themselves turned by a small angle add up to twice its square.
+    Rotating three axes by a small angle gives squared distances whose sum is twice the square of the angle.
     """
     aims, nowhere = Aims(), (0.0, 0.0, 0.0)
     for goal in goals:
@@ -146,7 +146,7 @@ def _aims(goals: Sequence[_Aim]) -> Aims:
 
 
 def _error(aims: Aims, goals: Sequence[_Aim]) -> float:
-    """Largest distance or angle left."""
+    """Largest remaining distance or angle."""
     worst, k = 0.0, 0
     for goal in goals:
         if goal.place is not None:

@@ -6,10 +6,10 @@ of all points, weighted by w, are a constant minus 2 (A cos phi + B sin phi) wit
 
     A = sum w r' . t' = sum w (r . t - (u . r) (u . t)),        B = sum w u . (r x t),
 
-so the best turn is phi = atan2(B, A). For one point it is the signed angle between the two projections; their equation
-5, an arc cosine, has no sign and holds for unit vectors only. Directions count like points, without the joint's origin:
-with them a frame is turned as well as moved (Wang and Chen 1991, A Combined Optimization Method for Solving the Inverse
-Kinematics Problem of Mechanical Manipulators, IEEE Transactions on Robotics and Automation 7(4)).
+so the best rotation is phi = atan2(B, A). For one point it is the signed angle between the two projections; equation 5
+of the paper, an arc cosine, has no sign and holds for unit vectors only. Directions count like points at the origin:
+with them a frame is rotated as well as moved (Wang and Chen 1991, A Combined Optimization Method for Solving the
+Inverse Kinematics Problem of Mechanical Manipulators, IEEE Transactions on Robotics and Automation 7(4)).
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from math import atan2, ceil, cos, floor, hypot, inf, pi, sin
 from wholebody.methods.ccd.limbs import Limbs
 
 TURN = 2.0 * pi
-FLAT = 1e-12  # m^2: below this a joint cannot change the distances, and the angle would be that of rounding
+FLAT = 1e-12  # m^2: below this a joint cannot change the distances, and the angle would be rounding error
 
 
 class Aims:
-    """Points and directions carried by nodes, with the place each should come to.
+    """Points and directions carried by nodes, with their targets.
 
     Attributes:
-        here: where they are now, three floats each.
-        there: where they should be.
+        here: their present values, three floats each.
+        there: their targets.
         weights: factor on each squared distance.
     """
 
     def __init__(self) -> None:
-        """Nothing is asked yet."""
+        """Make an empty set."""
         self.here: list[tuple[float, float, float]] = []
         self.there: list[tuple[float, float, float]] = []
         self.weights: list[float] = []
@@ -49,7 +49,7 @@ class Aims:
         weight: float = 1.0,
         direction: bool = False,
     ) -> None:
-        """Ask for a point, or a direction, that a node carries; both in the world."""
+        """Add a point, or a direction, of a node with its target; both in the world."""
         self.here.append(here)
         self.there.append(there)
         self.weights.append(weight)
@@ -57,13 +57,13 @@ class Aims:
         self._direction.append(direction)
 
     def plan(self, limbs: Limbs, nodes: Iterable[int] | None = None) -> list[tuple[int, tuple[int, ...], int]]:
-        """Nodes that move something, from the tips inwards: (node, what it moves, how many of these are points).
+        """Nodes that move an aim, from the tips inwards: (node, aims that it moves, number of points among them).
 
-        Points come before directions in what a node moves.
+        In the aims of a node, points come before directions.
 
         Args:
-            limbs: whose nodes.
-            nodes: those that may move; all that move something where None.
+            limbs: the limbs of the nodes.
+            nodes: the nodes that may move; None for all that move an aim.
         """
         allowed = range(len(limbs.joints)) if nodes is None else nodes
         steps = []
@@ -76,7 +76,7 @@ class Aims:
         return steps
 
     def distance(self) -> float:
-        """Root of the weighted sum of squared distances left."""
+        """Root of the weighted sum of squared remaining distances."""
         total = 0.0
         for (x, y, z), (tx, ty, tz), weight in zip(self.here, self.there, self.weights, strict=True):
             total += weight * ((tx - x) ** 2 + (ty - y) ** 2 + (tz - z) ** 2)
@@ -84,10 +84,10 @@ class Aims:
 
 
 def sweep(limbs: Limbs, aims: Aims, steps: Sequence[tuple[int, tuple[int, ...], int]]) -> float:
-    """Give each joint its best value, within its limits, and carry the aims along.
+    """Give each joint its best value, within its limits, and move the aims with it.
 
-    The joints outside the one at work have moved, but its axis has not, so only the aims need to follow: one sweep is
-    linear in the number of joints. Call `limbs.forward()` before the next one.
+    When a joint is processed, the joints farther out have moved, but its axis has not, so only the aims are updated: a
+    sweep is linear in the number of joints. Call `limbs.forward()` before the next one.
 
     Returns:
         The largest change of a joint, radians or metres.
@@ -145,7 +145,7 @@ def sweep(limbs: Limbs, aims: Aims, steps: Sequence[tuple[int, tuple[int, ...], 
 def within(best: float, lower: float, upper: float) -> float:
     """The allowed angle nearest to the best one on the circle: the same after whole turns, or the nearer limit.
 
-    The objective is A cos + B sin of the angle, so it falls with the distance on the circle from the best.
+    The objective A cos + B sin, which is maximised, decreases with the angular distance from the best angle.
     """
     turns = ceil((lower - best) / TURN) if lower > -inf else floor((upper - best) / TURN)
     angle = best + TURN * turns
@@ -155,7 +155,7 @@ def within(best: float, lower: float, upper: float) -> float:
 
 
 def _slide(limbs: Limbs, aims: Aims, node: int, mine: tuple[int, ...], points: int) -> float:
-    """The best displacement of a sliding joint is the mean distance of its points from their targets, along it."""
+    """The best displacement of a prismatic joint: the mean distance of its points from their targets along it."""
     ux, uy, uz, _, _, _ = limbs.lines[node]
     total = weight = 0.0
     for k in mine[:points]:

@@ -1,4 +1,4 @@
-"""What cyclic coordinate descent can take of a problem; everything else is refused by name before it starts."""
+"""The terms of a problem that cyclic coordinate descent can take; all others are refused by name before it starts."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from wholebody.tasks.inputs import target_rotation
 from wholebody.tasks.point import Point
 from wholebody.tasks.reach_cones import ReachCones
 
-HELD = 1e-6  # m, rad: a hold that is this near to its place at the start is kept by what does not move
+HELD = 1e-6  # m, rad: a hold that is met to this at the start is kept by joints that do not move
 
 
 @dataclass(frozen=True)
 class Wish:
-    """A frame, or a point of it, and where it should be.
+    """A frame, or a point of it, and its target.
 
     Attributes:
         frame: index in the model.
         offset: the point in the frame, metres.
-        place: where in the world; None where only the orientation counts.
-        rotation: (3, 3) rotation in the world; None where only the place counts.
+        place: target position in the world; None if only the orientation counts.
+        rotation: (3, 3) target rotation in the world; None if only the position counts.
         weight: factor on the squared error.
     """
 
@@ -45,12 +45,12 @@ class Wish:
 
 @dataclass(frozen=True)
 class Request:
-    """A problem as cyclic coordinate descent sees it.
+    """A problem in the form that cyclic coordinate descent takes.
 
     Attributes:
         wishes: the goals.
-        joints: Pinocchio's indices of the joints that reach for them.
-        fixed: joints that must not move, also not to leave an overlap.
+        joints: Pinocchio's indices of the joints that move for the goals.
+        fixed: joints that must not move, not even to resolve overlap.
         cones: names of the reach cones to keep.
     """
 
@@ -61,7 +61,7 @@ class Request:
 
 
 def read(problem: Problem) -> Request:
-    """Take a problem apart.
+    """Convert a problem.
 
     Raises:
         UnsupportedTermError: it has terms that this method cannot take; all of them are listed.
@@ -112,10 +112,10 @@ def read(problem: Problem) -> Request:
 
 
 def reaching(figure: Figure, frame: str) -> tuple[int, ...]:
-    """The joints that bring a frame to its goal.
+    """The joints that move a frame to its goal.
 
-    Those of the chain that carries it, from the chain's beginning to the frame; where no chain does, all joints
-    between the frame and the root.
+    These are the joints of the chain that carries it, from the chain's beginning to the frame; without a chain, all
+    joints between the frame and the root.
     """
     carrier = _joint(figure, frame)
     for chain in figure.chains.values():

@@ -1,1 +1,1 @@
-"""Posing by Newton's method in full coordinates: seven numbers a body, joints as equations, sparse linear algebra."""
+"""Newton's method in full coordinates: seven variables a body, joints as equations, sparse linear algebra."""

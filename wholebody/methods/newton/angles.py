@@ -11,7 +11,7 @@ from wholebody.methods.newton.batches import OTHER_TURN, TURN, Batch
 class Angle(Batch):
     """Angle of a revolute joint about z of its axes: sign (2 atan2(z, w) of conj(e1 f1) (e2 f2) - bound).
 
-    As an inequality it is a limit. The angle is taken on the turn nearest `center`.
+    As an inequality it is a limit. Multiples of a full turn are chosen so that the angle is nearest to `center`.
     """
 
     size = 1

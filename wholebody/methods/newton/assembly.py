@@ -1,9 +1,10 @@
-"""Assemblies: bodies and joints that no URDF can say, such as closed chains, rings, stars and loose parts."""
+"""Assemblies: bodies and joints that URDF cannot describe, such as closed chains, rings, stars and loose parts."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,42 +18,72 @@ from wholebody.geometry.pieces import check_length
 from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE
 from wholebody.methods.newton.assembly_solution import AssemblySolution, solved
-from wholebody.methods.newton.equations import EquationSet, axes_along
+from wholebody.methods.newton.batches import Batch, Key
+from wholebody.methods.newton.equations import EquationSet, axes_along, unit_lengths
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.joint_register import JointRegister
+from wholebody.methods.newton.kkt import kkt_algebra
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
 from wholebody.methods.newton.linear_algebra.choice import NAMES, linear_algebra
+from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.system import ActiveSystem, System, unit
 from wholebody.pool import OneAtATime
 from wholebody.tasks.inputs import direction, point, target_placement
 
 WORLD = "world"
-UNIT_TOLERANCE = 1e-3  # how far a quaternion may be from unit length before it is taken for a mistake
-FINEST = 1e-12  # m, rad: least tolerance, where all is exact but for rounding
+UNIT_TOLERANCE = 1e-3  # largest deviation of a quaternion from unit length; more is refused as a mistake
+FINEST = 1e-12  # m, rad: least tolerance; below it only rounding remains
+
+
+@dataclass
+class _Prepared:
+    """What solves of one pattern share.
+
+    Attributes:
+        algebra: name of the factorisation that was asked for.
+        laid: types and bodies of the goals.
+        held: batches of what must hold.
+        system: all equations; their numbers follow the goals.
+        factor: the analysed factorisation.
+    """
+
+    algebra: str
+    laid: tuple[tuple[Key, bytes], ...]
+    held: list[tuple[Batch, Key]]
+    system: System
+    factor: LinearAlgebra
+    _nearest: QuasiDefinite | None = None
+
+    def nearest(self) -> QuasiDefinite:
+        """The analysed factorisation for the nearest place."""
+        if self._nearest is None:
+            self._nearest = kkt_algebra(self.system)
+        return self._nearest
 
 
 class Assembly:
     """Rigid bodies, joints between them and with the world, and goals; solved in full coordinates.
 
-    Joints are given at the bodies' present placements: `at` and `axis` in the world. Where the two sides do not fit
-    yet, `at_first` and `at_second` say the place in either body's frame instead. Bodies need not be connected.
+    Joints are given at the bodies' present placements: `at` and `axis` in the world. If the two sides do not fit
+    yet, `at_first` and `at_second` give the position in either body's frame instead. Bodies need not be connected.
 
-    A solve moves the bodies, so an assembly is for one thread at a time. It can be pickled, and a copy is independent.
+    A solve moves the bodies, so an assembly serves one thread at a time. It can be pickled; a copy is independent.
     """
 
     def __init__(self) -> None:
-        """Begin with the world alone."""
+        """Make an assembly with the world alone."""
         self._names: dict[str, int] = {}
         self._places: list[Array] = []
         self._sizes: list[float] = []
         self._joints = JointRegister()
-        self._equations = EquationSet()
-        self._prepared: tuple[str, System, LinearAlgebra] | None = None
+        self._holding, self._goals = EquationSet(), EquationSet()
+        self._prepared: _Prepared | None = None
+        self._retargeted = False
         self._alone = OneAtATime("assembly")
         self.structures = 0
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what was stated and where the bodies are; what a solve prepares is prepared anew."""
+        """Return the bodies, joints and goals, and the placements; data that a solve prepares are prepared anew."""
         return {name: value for name, value in self.__dict__.items() if name not in ("_prepared", "_alone")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -70,10 +101,10 @@ class Assembly:
         Args:
             name: one that no other body has.
             at: (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3.
-            size: metres from its origin to its rim; turning it counts as moving the rim.
+            size: metres from its origin to its rim; a rotation of the body counts as the motion of the rim.
 
         Raises:
-            InputError: the name is taken, the size is not positive, or the placement cannot be read.
+            InputError: the name exists already, the size is not positive, or the placement cannot be read.
         """
         if text(name, "the name of a body") == WORLD or name in self._names:
             raise InputError(f"body {name!r}: the name is taken; give another one")
@@ -91,7 +122,7 @@ class Assembly:
         return tuple(self._names)
 
     def placement(self, name: str) -> Any:
-        """Where a body is (pin.SE3)."""
+        """Placement of a body (pin.SE3)."""
         return pin.XYZQUATToSE3(self._place(self._index(name, "placement")))
 
     # ---- joints
@@ -100,7 +131,7 @@ class Assembly:
         """A point of one body stays at a point of the other. Takes `at`, or `at_first` and `at_second`."""
         a, b = self._pair(first, second, "spherical joint")
         ends = self._ends(a, b, "spherical joint", first, second, **where)
-        self._equations.coincide(a, b, f"the spherical joint of {first!r} and {second!r}", *ends)
+        self._holding.coincide(a, b, f"the spherical joint of {first!r} and {second!r}", *ends)
         return self._changed()
 
     def revolute(
@@ -134,53 +165,53 @@ class Assembly:
         low, high = (-np.inf, np.inf) if limits is None else numbers(limits, (2,), f"{what}: limits").tolist()
         if low >= high:
             raise InputError(f"{what}: limits {low:g} and {high:g} leave no room; give the lower one first")
-        ends = self._ends(a, b, "revolute joint", first, second, **where)  # remembers the joint, when all else is right
+        ends = self._ends(a, b, "revolute joint", first, second, **where)  # registers the joint, after all other checks
         basis_a = axes_along(ours)
         # the second body's axes agree with the first's at the present placements, so that the angle is zero now
         basis_b = (turn_b.inverse() * turn_a * basis_a) if axis_second is None else axes_along(theirs)
-        self._equations.coincide(a, b, what, *ends)
-        self._equations.turn(a, b, what, basis_a, basis_b, 2)
+        self._holding.coincide(a, b, what, *ends)
+        self._holding.turn(a, b, what, basis_a, basis_b, 2)
         if limits is not None:
-            self._equations.limit(a, b, f"the limit of {what[4:]}", basis_a, basis_b, low, high)
+            self._holding.limit(a, b, f"the limit of {what[4:]}", basis_a, basis_b, low, high)
         return self._changed()
 
     def prismatic(self, first: str, second: str, *, axis: ArrayLike) -> Assembly:
-        """Two bodies slide along one direction (3,) in the world, without turning."""
+        """Two bodies translate along one direction (3,) in the world, without rotation."""
         what = f"the prismatic joint of {shown(first)} and {shown(second)}"
         a, b = self._pair(first, second, "prismatic joint")
         along = direction(axis, f"{what}: axis")
         self._joints.add("prismatic joint", first, second)
         turn_a, turn_b = pin.Quaternion(self._place(a)[3:]), pin.Quaternion(self._place(b)[3:])
         basis = axes_along(turn_a.inverse() * along)
-        self._equations.turn(a, b, what, basis, turn_b.inverse() * turn_a * basis, 3)
+        self._holding.turn(a, b, what, basis, turn_b.inverse() * turn_a * basis, 3)
         way = turn_a.inverse() * (self._place(b)[:3] - self._place(a)[:3])
         for side in basis.toRotationMatrix().T[:2]:
-            self._equations.slide(a, b, what, side, np.zeros(3), float(side @ way))
+            self._holding.slide(a, b, what, side, np.zeros(3), float(side @ way))
         return self._changed()
 
     def fixed(self, first: str, second: str, *, placement_second: PlacementLike | None = None) -> Assembly:
-        """Two bodies keep their placement to each other: the present one, or the second's in the first's frame."""
+        """Two bodies keep their relative placement: the present one, or the second's given one in the first's frame."""
         what = f"the fixed joint of {shown(first)} and {shown(second)}"
         a, b = self._pair(first, second, "fixed joint")
         here = pin.XYZQUATToSE3(self._place(a)).actInv(pin.XYZQUATToSE3(self._place(b)))
         wanted = here if placement_second is None else target_placement(placement_second, what)
         self._joints.add("fixed joint", first, second)
-        self._equations.coincide(a, b, what, np.array(wanted.translation), np.zeros(3))
-        self._equations.turn(a, b, what, pin.Quaternion(wanted.rotation), pin.Quaternion.Identity(), 3)
+        self._holding.coincide(a, b, what, np.array(wanted.translation), np.zeros(3))
+        self._holding.turn(a, b, what, pin.Quaternion(wanted.rotation), pin.Quaternion.Identity(), 3)
         return self._changed()
 
     def on_plane(
         self, body: str, place: ArrayLike, *, normal: ArrayLike, through: ArrayLike, of: str = WORLD, side: str = "on"
     ) -> Assembly:
-        """A point of a body, (3,) in its frame, stays in a plane that the world or another body carries.
+        """A point of a body, (3,) in its frame, stays in a plane that is fixed to the world or to another body.
 
         Args:
             body: name.
             place: (3,) the point, metres.
             normal: (3,) of the plane, in the frame of `of`.
             through: (3,) a point of the plane, in the frame of `of`.
-            of: which body carries the plane.
-            side: "on", or "above" where the point may leave along the normal.
+            of: name of the body to which the plane is fixed.
+            side: "on", or "above" if the point may move along the normal.
         """
         what = f"the plane of {shown(body)} and {shown(of)}"
         choice(side, ("on", "above"), f"{what}: side")
@@ -189,51 +220,50 @@ class Assembly:
             raise InputError(f"{what}: a body cannot stay on a plane of its own; name another one")
         unit = direction(normal, f"{what}: normal")
         height = float(unit @ point(through, f"{what}: through"))
-        self._equations.slide(a, b, what, unit, point(place, f"{what}: place"), height, above=side == "above")
+        self._holding.slide(a, b, what, unit, point(place, f"{what}: place"), height, above=side == "above")
         return self._changed()
 
     # ---- goals
 
     def point_goal(self, body: str, target: ArrayLike, *, place: ArrayLike = (0.0, 0.0, 0.0)) -> Assembly:
-        """Bring a point of a body, (3,) in its frame, to a place in the world (3,), if it can be."""
+        """Move a point of a body, (3,) in its frame, to a position in the world (3,), if possible."""
         what = f"the goal of {shown(body)}"
         ends = point(place, f"{what}: place"), point(target, f"{what}: target")
-        self._equations.coincide(self._moved(body, what), -1, what, *ends, goal=True)
-        return self._changed()
+        self._goals.coincide(self._moved(body, what), -1, what, *ends, goal=True)
+        return self._changed_goals()
 
     def frame_goal(self, body: str, target: PlacementLike) -> Assembly:
-        """Bring a body to a placement in the world, if it can be."""
+        """Move a body to a placement in the world, if possible."""
         what = f"the goal of {shown(body)}"
         wanted, index = target_placement(target, what), self._moved(body, what)
-        self._equations.coincide(index, -1, what, np.zeros(3), np.array(wanted.translation), goal=True)
+        self._goals.coincide(index, -1, what, np.zeros(3), np.array(wanted.translation), goal=True)
         identity = pin.Quaternion.Identity()
-        self._equations.turn(index, -1, what, identity, pin.Quaternion(wanted.rotation), 3, goal=True)
-        return self._changed()
+        self._goals.turn(index, -1, what, identity, pin.Quaternion(wanted.rotation), 3, goal=True)
+        return self._changed_goals()
 
     def drop_goals(self) -> Assembly:
-        """Take all goals out."""
-        self._equations = self._equations.without_goals()
-        return self._changed()
+        """Take all goals out.
+
+        Where others of the same bodies come in their place, what earlier solves laid out and analysed serves again.
+        """
+        self._goals = EquationSet()
+        return self._changed_goals()
 
     # ---- solving
 
     def system(self) -> System:
         """The equations as they stand."""
-        if not self._places:
-            raise InputError("the assembly has no bodies; add some with body(...)")
-        rims = np.repeat((2.0 * np.array(self._sizes)) ** 2, 4).reshape(-1, 4)
-        weight = np.concatenate([np.ones((len(rims), 3)), rims], axis=1).ravel()
-        return self._equations.system(len(self._places), list(self._names), weight)
+        return System(len(self._places), [*self._held(), *self._goals.batches(len(self._places))], self._weight())
 
     def variables(self) -> Array:
-        """(7 n,) where the bodies are."""
+        """(7 n,) the placements of the bodies."""
         return np.concatenate(self._places)
 
     def place(self, variables: ArrayLike) -> Assembly:
-        """Put the bodies elsewhere.
+        """Set the placements of the bodies.
 
         Args:
-            variables: (7 n,) as `variables` returns them: of each body its origin [m] and its quaternion (x, y, z, w).
+            variables: (7 n,) as `variables` returns them: for each body its origin [m] and quaternion (x, y, z, w).
 
         Raises:
             InputError: another number of values, one that is not finite, or a quaternion that is not of unit length.
@@ -253,14 +283,14 @@ class Assembly:
         inequalities: Kind = "slack",
         nearest: bool = False,
     ) -> AssemblySolution:
-        """Move the bodies until joints and goals hold, each step the least motion; they stay there.
+        """Move the bodies until joints and goals hold; each step is the least motion. They keep their new placements.
 
         Args:
             tolerance: metres and radians, from 1e-12.
             iterations: most Newton iterations.
             algebra: "auto", "normal", "llt", "kkt", "schur", "dense" or "svd".
             inequalities: "slack" or "barrier".
-            nearest: look for the place nearest to where the bodies were (eq. 1), which many least steps miss by a
+            nearest: find the placements nearest to those before (eq. 1), which many least steps miss by a
                 little; without inequalities only.
 
         Raises:
@@ -273,22 +303,51 @@ class Assembly:
         choice(inequalities, KINDS, "inequalities")
         flag(nearest, "nearest")
         with self._alone:
-            if self._prepared is None or self._prepared[0] != algebra:
-                system = self.system()
-                self._prepared = (algebra, system, linear_algebra(system.pattern, algebra))
-                self.structures += 1
-            _, system, factor = self._prepared
-            if nearest and system.inequality.any():
+            prepared = self._ready(algebra)
+            if nearest and prepared.system.inequality.any():
                 raise InputError("nearest is for assemblies without limits and one-sided planes; leave it out")
             x, solution = solved(
-                list(self._names), ActiveSystem(system, factor), self.variables(),
-                tolerance=tolerance, iterations=iterations, kind=inequalities, nearest=nearest,
+                list(self._names), ActiveSystem(prepared.system, prepared.factor), self.variables(),
+                tolerance=tolerance, iterations=iterations, kind=inequalities,
+                nearest=prepared.nearest() if nearest else None,
             )  # fmt: skip
             self._places = list(x.reshape(-1, 7))
             return solution
 
+    def _ready(self, algebra: str) -> _Prepared:
+        """The equations as they stand; what was laid out and analysed serves while their pattern stays."""
+        found = self._prepared
+        if found is not None and not self._retargeted and found.algebra == algebra:
+            return found
+        goals = self._goals.batches(len(self._places))
+        laid = tuple((key, batch.bodies.tobytes()) for batch, key in goals)
+        if found is None or (found.algebra, found.laid) != (algebra, laid):
+            held = self._held()
+            system = System(len(self._places), [*held, *goals], self._weight())
+            found = self._prepared = _Prepared(algebra, laid, held, system, linear_algebra(system.pattern, algebra))
+            self.structures += 1
+        else:
+            found.system.renew([*found.held, *goals])
+        self._retargeted = False
+        return found
+
+    def _held(self) -> list[tuple[Batch, Key]]:
+        """What must hold, in batches."""
+        if not self._places:
+            raise InputError("the assembly has no bodies; add some with body(...)")
+        return [unit_lengths(list(self._names)), *self._holding.batches(len(self._places))]
+
+    def _weight(self) -> Array:
+        """(7 n,) of each variable in the least motion."""
+        rims = np.repeat((2.0 * np.array(self._sizes)) ** 2, 4).reshape(-1, 4)
+        return np.concatenate([np.ones((len(rims), 3)), rims], axis=1).ravel()
+
     def _changed(self) -> Assembly:
         self._prepared = None
+        return self
+
+    def _changed_goals(self) -> Assembly:
+        self._retargeted = True
         return self
 
     def _index(self, name: str, where: str) -> int:
@@ -321,7 +380,7 @@ class Assembly:
         at_first: Any = None,
         at_second: Any = None,
     ) -> tuple[Array, Array]:
-        """The joint's place in either body."""
+        """The joint's position in either body."""
         where = f"{kind} of {first!r} and {second!r}"
         if (at is None) == (at_first is None) or (at_first is None) != (at_second is None):
             raise InputError(f"{where}: give its place as at=(x, y, z) in the world, or as at_first and at_second")

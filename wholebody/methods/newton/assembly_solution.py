@@ -1,4 +1,4 @@
-"""What an assembly answers."""
+"""The solution of an assembly."""
 
 from __future__ import annotations
 
@@ -12,28 +12,29 @@ from wholebody.arrays import Array
 from wholebody.methods.newton.feasibility import reach
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.kkt import settle
+from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.system import ActiveSystem, unit
 from wholebody.solution import Status
 
-FINEST = 1e-9  # least error of the KKT system that is asked for: redundant equations leave about a tenth of it
+FINEST = 1e-9  # least tolerance of the KKT system: redundant equations leave an error of about a tenth of it
 
 
 @dataclass(frozen=True)
 class AssemblySolution:
-    """Where the bodies of an assembly end.
+    """The solution of an assembly.
 
     Attributes:
         placements: name to pin.SE3.
         status: "solved", "unreachable" (goals missed, all joints hold), "infeasible" (joints cannot all hold; the least
             residual) or "stalled".
         goal_error: largest goal error, metres or radians.
-        joint_error: largest error of what must hold, metres or radians.
+        joint_error: largest error of a joint or constraint, metres or radians.
         residuals: largest error before each iteration and at the end.
         systems: linear systems solved.
         algebra: name of the factorisation.
-        nearness: largest error of the KKT system before each iteration towards the nearest place and at the end; empty
-            where that was not asked for. If the last is above the tolerance, the place is a near one, not the nearest.
-        message: one sentence for a reader, with the bodies concerned.
+        nearness: largest error of the KKT system before each iteration of `nearest` and at the end; empty
+            without it. If the last is above the tolerance, the placements are near the start, but not the nearest.
+        message: one sentence that explains the status and names bodies.
     """
 
     placements: dict[str, Any]
@@ -60,14 +61,17 @@ def solved(
     tolerance: float,
     iterations: int,
     kind: Kind,
-    nearest: bool,
+    nearest: QuasiDefinite | None,
 ) -> tuple[Array, AssemblySolution]:
-    """Solve from the variables `before` (7 n,); where the bodies end, as variables and in words."""
+    """Solve from the variables `before` (7 n,); where the bodies end, as variables and in words.
+
+    With `nearest`, the factorisation of the system's KKT matrix, they end at the place nearest to `before`.
+    """
     found = reach(active_system, before, tolerance=tolerance, iterations=iterations, kind=kind)
     system, x = active_system.system, found.x
     nearness: tuple[float, ...] = ()
-    if nearest and found.met:
-        settled = settle(system, x, before, tolerance=max(tolerance, FINEST), iterations=iterations)
+    if nearest is not None and found.met:
+        settled = settle(system, nearest, x, before, tolerance=max(tolerance, FINEST), iterations=iterations)
         x, nearness = (unit(settled.x) if settled.met else x), settled.errors
     residual = system.residual(x)
     size = np.abs(np.where(system.inequality, np.minimum(residual, 0.0), residual))

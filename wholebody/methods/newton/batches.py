@@ -1,7 +1,7 @@
-"""Equations of bodies, many of one type at once: residuals, Jacobians and second derivatives as arrays.
+"""Equations of bodies, all of one type together: residuals, Jacobians and second derivatives as arrays.
 
-A body has seven variables: its place r [m] and its Euler parameters e. Bodies are rows of an array (N + 1, 7) whose
-last row is the world, which does not move. Each batch has k equations groups of `size` rows between one or two bodies.
+A body has seven variables: its position r [m] and its Euler parameters e. Bodies are rows of an array (N + 1, 7) whose
+last row is the world, which does not move. Each batch has k groups of `size` equations between one or two bodies.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ OTHER_PLACE, OTHER_TURN = slice(7, 10), slice(10, 14)
 
 
 OBJECTIVE = "objective"
-"""Kind of batches whose squares are to be small, in place of holding."""
+"""Kind of batches whose squares are minimised; their equations need not hold."""
 
 
 class Key(NamedTuple):
-    """What a batch has in common: its type, whether it may be missed or is one-sided, and its weight."""
+    """Type of a batch, whether it is a goal or an inequality, and its weight."""
 
     kind: str
     goal: bool
@@ -36,12 +36,12 @@ class Batch(ABC):
     """Equations of one type.
 
     Attributes:
-        bodies: (k, b) which bodies each is about; b is 1 or 2.
-        size: rows of each.
-        pattern: (size, 7 b) where the Jacobian can be other than zero.
-        labels: (k,) what each is called in messages.
+        bodies: (k, b) indices of the bodies of each equation group; b is 1 or 2.
+        size: rows of each group.
+        pattern: (size, 7 b) structural non-zeros of the Jacobian.
+        labels: (k,) names of the groups in messages.
 
-    Residual and Jacobian at one array of bodies share their work, so such an array is not to be changed in place.
+    Residual and Jacobian at the same array of bodies share their work, so do not change such an array in place.
     """
 
     size: int
@@ -58,17 +58,17 @@ class Batch(ABC):
 
     @abstractmethod
     def residual(self, x: Array) -> Array:
-        """(k, size) of the bodies x (N + 1, 7); metres and radians."""
+        """(k, size) residuals at the bodies x (N + 1, 7); metres and radians."""
 
     @abstractmethod
     def jacobian(self, x: Array) -> Array:
-        """(k, size, 7 b) its derivative."""
+        """(k, size, 7 b) derivative of the residual."""
 
     def curvature(self, x: Array, force: Array) -> Array:
         """(k, 7 b, 7 b) second derivative of the sum over rows of force (k, size) times residual.
 
         Raises:
-            InputError: this type has none; assemblies use only types that have.
+            InputError: this type has none; assemblies use only types that have one.
         """
         raise InputError(f"{self.labels[0]}: it has no second derivatives; leave the nearest place out")
 
@@ -96,7 +96,7 @@ class Unit(Batch):
 
 
 class Coincide(Batch):
-    """A point of one body is a point of another, along given directions: n . (r1 + R1 c1 - r2 - R2 c2) - h = 0.
+    """Points of two bodies coincide along given directions: n . (r1 + R1 c1 - r2 - R2 c2) - h = 0.
 
     With the three axes of the world this is the spherical joint and the point goal; with one normal it is the gap of a
     contact, h being the clearance.
@@ -150,10 +150,10 @@ class Coincide(Batch):
 
 
 class Turn(Batch):
-    """Axes carried by two bodies agree: rows of 2 conj(e1 f1) (e2 f2), which is bilinear.
+    """Axes fixed to two bodies agree: rows of 2 conj(e1 f1) (e2 f2), which is bilinear.
 
-    The x and y components vanish where the z axes point the same way (revolute joint; the opposite way is no solution),
-    all three where the axes agree (fixed and prismatic joint). To first order a row is an angle [rad].
+    The x and y components vanish if the z axes agree (revolute joint; the opposite direction is no solution),
+    all three if all axes agree (fixed and prismatic joint). To first order a row is an angle [rad].
     """
 
     def __init__(self, bodies: Indices, labels: list[str], forms: Array) -> None:
@@ -190,7 +190,7 @@ class Turn(Batch):
 
 
 class Slide(Batch):
-    """A point of one body in a plane that another carries: (R1 u) . (r2 + R2 c2 - r1) - h = 0.
+    """A point of one body in a plane fixed to another: (R1 u) . (r2 + R2 c2 - r1) - h = 0.
 
     One row is a point on a surface; two, with orientation rows, a prismatic joint.
     """

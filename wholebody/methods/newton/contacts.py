@@ -9,30 +9,31 @@ import numpy as np
 from wholebody.arrays import Array, Indices
 from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.geometry.continuous.passing_through import passes_through
+from wholebody.geometry.proximity import Joints
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Coincide
 from wholebody.problem import Problem
 from wholebody.workspace import Workspace
 
-ENTER = 0.03  # m beyond the clearance: nearer pairs become inequalities; larger = more rows, fewer steps made anew
-LEAVE = 0.06  # m beyond the clearance: farther pairs are let go; the difference keeps the structure still
+ENTER = 0.03  # m beyond the clearance: nearer pairs become inequalities; larger = more rows, fewer repeated steps
+LEAVE = 0.06  # m beyond the clearance: farther pairs cease to be; the difference avoids changes of the structure
 SLOTS = 4  # rows a pair: its witness points and the ends of its contact patch
-FAR = 1.0  # m: gap of a slot that has no row
-OVERLAP = 1e-3  # m: deeper than this a pair that was no inequality sends the step back
-DEEPEST = 0.01  # m: overlap that linearised contacts may leave after a step; deeper ones shorten it
-SHALLOW = 0.25  # share of the thinner piece's width that it may be at most
-MORE = 1e-4  # m: by which an overlap that was there before the step may grow
+FAR = 1.0  # m: gap of an unused slot
+OVERLAP = 1e-3  # m: a step is undone if a pair that was no inequality gets deeper than this
+DEEPEST = 0.01  # m: largest overlap of linearised contacts after a step; a deeper one shortens the step
+SHALLOW = 0.25  # largest such overlap as a share of the thinner piece's width
+MORE = 1e-4  # m: growth of an existing overlap that a step is allowed
 
 
 class ContactSet:
-    """Pairs that are inequalities now, and their rows at a posture.
+    """The pairs that are inequalities at present, and their rows at a posture.
 
     Attributes:
-        pairs: (k,) places among the collision pairs.
+        pairs: (k,) indices among the collision pairs.
     """
 
     def __init__(self, problem: Problem, workspace: Workspace) -> None:
-        """Begin without any."""
+        """Make an empty set."""
         self.workspace, self.clearances = workspace, problem.clearances
         self.pairs: Indices = np.zeros(0, dtype=np.intp)
         self.structures = 0
@@ -50,10 +51,10 @@ class ContactSet:
 
     def look(self, data: Any) -> None:
         """Measure at the joints' places in `data` (Pinocchio's), where a step leads."""
-        self._there = Placed(self.workspace.proximity.near(data, self._within), self._within)
+        self._there = Placed(self.workspace.proximity.query(Joints(data), self._within), self._within)
 
     def runs_into(self) -> bool:
-        """Whether a pair that is no inequality overlaps where the step leads; such pairs are from now on."""
+        """Whether a pair that is no inequality overlaps at the end of the step; such pairs become inequalities."""
         assert self._there is not None
         contacts = self._there.contacts
         lack = self.clearances[contacts.number] - contacts.distance
@@ -66,7 +67,7 @@ class ContactSet:
         return True
 
     def passes(self, before: Array, after: Array) -> bool:
-        """Whether a step from the posture before (nq,) to the one after jumps over nothing and ends in nothing."""
+        """Whether a step between two postures (nq,) neither jumps over something nor ends deep in it."""
         assert self._here is not None
         assert self._there is not None
         here, there = self._here.contacts, self._there.contacts
@@ -78,10 +79,10 @@ class ContactSet:
         return not passes_through(self.workspace, self._here, self._there, before, after)
 
     def renew(self, data: Any, bodies: Array, world: int) -> Coincide:
-        """The inequalities where `look` has just been.
+        """The inequalities at the posture of the last `look`.
 
         Args:
-            data: Pinocchio's, with the joints' places there.
+            data: Pinocchio's, with the joint placements there.
             bodies: (n + 1, 7) the same as variables.
             world: index of the world among the bodies.
         """
@@ -89,7 +90,7 @@ class ContactSet:
         self._here = self._there
         contacts = self._here.contacts
         if len(self._forced) and not np.isin(self._forced, contacts.number).all():
-            contacts = self.workspace.proximity.near(data, FAR + self._largest)
+            contacts = self.workspace.proximity.query(Joints(data), FAR + self._largest)
         spare = contacts.distance - self.clearances[contacts.number]
         member = np.zeros(len(self.clearances), dtype=bool)
         member[self.pairs] = True
@@ -127,7 +128,7 @@ class ContactSet:
         normal[at] = wrench[:, :3]
         place[at] = quat.cross(wrench[:, :3], wrench[:, 3:])  # n x (p x n): the point, up to a shift along n
         gap[at] = rows.gap[order] - clearance[rows.contact[order]]
-        # a point of both bodies, now at the same place: its gap grows by n . (v_second - v_first)
+        # a point of both bodies, at the same position now: its gap grows by n . (v_second - v_first)
         first, second = (
             quat.rotate(quat.conjugate(bodies[side, 3:]), place - bodies[side, :3]) for side in (pair[:, 0], pair[:, 1])
         )

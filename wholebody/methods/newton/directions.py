@@ -1,4 +1,4 @@
-"""Directions of bodies: towards a place in the world, and inside a reach cone."""
+"""Directions of bodies: towards a point in the world, and inside a reach cone."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from wholebody.arrays import Array, Indices
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import OTHER_TURN, PLACE, TURN, Batch
 
-OPPOSITE = 1e-6  # of 1 + cosine: nearer to the opposite direction the error grows no more
-TOUCHING = 1e-6  # m: nearer to the place than this any direction will do
+OPPOSITE = 1e-6  # least value of 1 + cosine: nearer to the opposite direction the error is constant
+TOUCHING = 1e-6  # m: nearer to the point than this every direction counts as right
 CONJUGATE = np.array((-1.0, -1.0, -1.0, 1.0))
 
 
 class Toward(Batch):
-    """An axis of a body points to a place: x and y of u sqrt(2 / (1 + z)), u the unit vector to it, the axis being z.
+    """An axis of a body points to a point: x and y of u sqrt(2 / (1 + z)), u the unit vector to it, the axis being z.
 
-    Their norm is 2 sin(angle / 2), to first order the angle [rad], and largest at the opposite direction, which is no
+    Their norm is 2 sin(angle / 2), to first order the angle [rad]. It is largest at the opposite direction, which is no
     solution: Lambert's azimuthal equal-area projection (Snyder 1987, "Map Projections: A Working Manual", chapter 24).
     """
 
@@ -26,12 +26,12 @@ class Toward(Batch):
     pattern = np.ones((2, 7), dtype=bool)
 
     def __init__(self, bodies: Indices, labels: list[str], axes: Array, points: Array, places: Array) -> None:
-        """Take axes (k, 3, 3), rows in the body with the third one to point, points (k, 3) in it, places (k, 3)."""
+        """Take axes (k, 3, 3) as rows in the body, the third one points; points (k, 3) in the body; targets (k, 3)."""
         super().__init__(bodies, labels)
         self.axes, self.points, self.places = axes, points, places
 
     def _way(self, x: Array) -> tuple[Array, Array, Array, Array]:
-        """Unit vectors (k, 3) to the places in the axes, distances (k,), factors (k,), and ways (k, 3) in the world."""
+        """Unit vectors (k, 3) to the targets in the axes, distances (k,), factors (k,), vectors (k, 3) in the world."""
         body = x[self.bodies[:, 0]]
         way = self.places - body[:, PLACE]
         local = quat.rotate(quat.conjugate(body[:, TURN]), way) - self.points
@@ -61,7 +61,7 @@ class Toward(Batch):
 
 
 class Cone(Batch):
-    """A direction of one body inside a spherical polygon that another carries: the angle to its nearest edge [rad]."""
+    """A direction of one body inside a spherical polygon fixed to another: the angle to its nearest edge [rad]."""
 
     size = 1
     pattern = np.array([([False] * 3 + [True] * 4) * 2])

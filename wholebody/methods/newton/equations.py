@@ -1,4 +1,4 @@
-"""Equations as they are collected one by one, before they are batched by type."""
+"""Collection of equations one by one, which are then batched by type."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ from wholebody.arrays import Array
 from wholebody.methods.newton.angles import Angle
 from wholebody.methods.newton.batches import Batch, Coincide, Key, Slide, Turn, Unit
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
-from wholebody.methods.newton.system import System
 
 
 class Row(NamedTuple):
-    """One group of equations: its bodies (-1 is the world), its label and its numbers."""
+    """One group of equations: its bodies (-1 is the world), its label and its parameters."""
 
     first: int
     second: int
@@ -25,7 +24,7 @@ class Row(NamedTuple):
 
 
 class EquationSet:
-    """Groups of equations by type and by whether they may be missed or are one-sided."""
+    """Groups of equations by type, and by whether they are goals or inequalities."""
 
     def __init__(self) -> None:
         self.rows: dict[Key, list[Row]] = {}
@@ -40,19 +39,19 @@ class EquationSet:
         one_sided: bool = False,
         weight: float = 1.0,
     ) -> None:
-        """A batch of its own, made when the index of the world among the bodies is known."""
+        """Add a separate batch, which is made when the index of the world among the bodies is known."""
         self.made.append((make, Key(kind, goal, one_sided, weight)))
 
     def coincide(
         self, a: int, b: int, label: str, first: Array, second: Array, *, goal: bool = False, weight: float = 1.0
     ) -> None:
-        """A point (3,) of one body at a point of the other."""
+        """A point (3,) of one body coincides with a point of the other."""
         self._add("coincide", a, b, label, first, second, goal=goal, weight=weight)
 
     def turn(
         self, a: int, b: int, label: str, first: Any, second: Any, size: int, *, goal: bool = False, weight: float = 1.0
     ) -> None:
-        """Axes (pin.Quaternion) of two bodies agree: in z (size 2) or wholly (size 3)."""
+        """Axes (pin.Quaternion) of two bodies agree: in z (size 2) or in all axes (size 3)."""
         self._add(f"turn{size}", a, b, label, first.coeffs(), second.coeffs(), goal=goal, weight=weight)
 
     def slide(
@@ -72,7 +71,7 @@ class EquationSet:
         self._add("slide", a, b, label, normal, place, height, one_sided=above, goal=goal, weight=weight)
 
     def limit(self, a: int, b: int, label: str, first: Any, second: Any, low: float, high: float) -> None:
-        """The angle about z of two axes (pin.Quaternion) stays between bounds; infinite ones are none."""
+        """The angle about z of two axes (pin.Quaternion) stays between bounds, which may be infinite."""
         center = 0.5 * (low + high) if np.isfinite(low + high) else 0.0
         for bound, sign in ((low, 1.0), (high, -1.0)):
             if np.isfinite(bound):
@@ -82,16 +81,9 @@ class EquationSet:
     def angle(
         self, a: int, b: int, label: str, first: Any, second: Any, center: float, value: float, weight: float
     ) -> None:
-        """A goal: the angle about z of two axes (pin.Quaternion), on the turn nearest the center, has a value."""
+        """A goal: the angle about z of two axes (pin.Quaternion), chosen nearest to the center, has a value."""
         parts = (first.coeffs(), second.coeffs(), center, value, 1.0)
         self._add("angle", a, b, label, *parts, goal=True, weight=weight)
-
-    def without_goals(self) -> EquationSet:
-        """A copy that has none."""
-        result = EquationSet()
-        result.rows = {key: list(rows) for key, rows in self.rows.items() if not key.goal}
-        result.made = [(make, key) for make, key in self.made if not key.goal]
-        return result
 
     def yielding(self) -> EquationSet:
         """A copy whose equalities are goals."""
@@ -100,12 +92,6 @@ class EquationSet:
             result.rows.setdefault(key._replace(goal=not key.one_sided), []).extend(rows)
         result.made = [(make, key._replace(goal=not key.one_sided)) for make, key in self.made]
         return result
-
-    def system(self, count: int, names: list[str], weight: Array) -> System:
-        """All of it for `count` bodies."""
-        units = [f"the Euler parameters of {name!r}" for name in names]
-        first = (Unit(np.arange(count)[:, None], units), Key("unit", False, False, 1.0))
-        return System(count, [first, *self.batches(count)], weight)
 
     def batches(self, count: int) -> list[tuple[Batch, Key]]:
         """The groups of `count` bodies in batches."""
@@ -126,6 +112,12 @@ class EquationSet:
         self.rows.setdefault(Key(kind, goal, one_sided, weight), []).append(Row(a, b, label, numbers))
 
 
+def unit_lengths(names: list[str]) -> tuple[Batch, Key]:
+    """Euler parameters of unit length, of all bodies with these names."""
+    labels = [f"the Euler parameters of {name!r}" for name in names]
+    return Unit(np.arange(len(names))[:, None], labels), Key("unit", False, False, 1.0)
+
+
 def _batch(kind: str, rows: list[Row], count: int) -> Batch:
     bodies = np.array([(row.first, row.second) for row in rows], dtype=np.intp)
     bodies[bodies < 0] = count
@@ -144,5 +136,5 @@ def _batch(kind: str, rows: list[Row], count: int) -> Batch:
 
 
 def axes_along(direction: Array) -> Any:
-    """Axes (pin.Quaternion) whose z is a unit direction (3,)."""
+    """Axes (pin.Quaternion) whose z axis is a unit direction (3,)."""
     return pin.Quaternion(axes_with_z(direction[None])[0])

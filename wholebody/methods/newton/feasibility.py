@@ -1,4 +1,4 @@
-"""Newton steps towards equations until they hold, or come as near as goes."""
+"""Newton steps until the equations hold, or their error is as small as possible."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.system import ActiveSystem
 
-MENDING = 30  # most steps that only mend what must hold, where the goals were not met
+MENDING = 30  # most steps that only restore the constraints, after the goals were not met
 
 
 class FeasibilityResult(NamedTuple):
-    """Where the iteration ended.
+    """The end of the iteration.
 
     Attributes:
         x: (7 n,) the variables.
         met: whether all equations hold to the tolerance.
-        hard: largest error of what must hold.
+        hard: largest error of a joint or constraint.
         goal: largest error of the goals.
         residuals: largest error before each iteration, and at the end.
         systems: linear systems solved.
@@ -49,16 +49,16 @@ def reach(
     goal_tolerance: float | None = None,
     early_exit: bool = False,
 ) -> FeasibilityResult:
-    """Meet all equations from x (7 n,), or come as near as goes.
+    """Satisfy all equations from x (7 n,), or reduce their error as far as possible.
 
     Args:
         active_system: the equations.
-        x: where to begin.
+        x: the start.
         tolerance: metres and radians.
-        iterations: most of them.
-        kind: how inequalities are dealt with.
-        goal_tolerance: of the goals, where it is another.
-        early_exit: end at the first steps that bring little, and do not look for the nearest point of goals not met.
+        iterations: most iterations.
+        kind: treatment of inequalities.
+        goal_tolerance: of the goals, if it differs.
+        early_exit: end at the first steps that gain little, and do not minimise the error of goals that are not met.
     """
     run = Iteration(active_system, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
     run.iterate(iterations, goals=True, measures="lower", early_exit=early_exit)

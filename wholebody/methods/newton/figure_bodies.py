@@ -1,4 +1,4 @@
-"""A figure in full coordinates: its joints as equations, and postures in and out."""
+"""A figure in full coordinates: its joints as equations, and conversion of postures to and from variables."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from wholebody.methods.newton.equations import EquationSet
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
-SMALLEST = 0.1  # m: size of a body without anything on it; smaller = turns of such bodies cost less
+SMALLEST = 0.1  # m: size of a body without pieces; smaller = rotations of such bodies have less weight
 
 
 class FigureBodies:
-    """Bodies of a figure: one for each joint, at the joint's place. Body k moves with Pinocchio's joint k + 1.
+    """Bodies of a figure: one for each joint, at the joint's placement. Body k moves with Pinocchio's joint k + 1.
 
     Attributes:
-        count: bodies.
+        count: number of bodies.
         weight: (7 count,) weight of each variable in the least motion.
         names: of the joints.
         equations: the joints.
@@ -74,18 +74,18 @@ class FigureBodies:
 
     @property
     def uncharted(self) -> tuple[str, ...]:
-        """Names of the joints whose degrees of freedom `tangent_rows` does not have."""
+        """Names of the joints whose degrees of freedom `tangent_rows` omits."""
         return tuple(self.names[joint - 1] for joint in self._others if not (joint == 1 and self.floating))
 
     @property
     def start_state(self) -> State:
-        """The state that `state_at` moves, wherever it is."""
+        """The state that `state_at` moves, at its present posture."""
         if self._state is None:
             self._state = State(self.model)
         return self._state
 
     def state_at(self, x: Array) -> State:
-        """The figure where the bodies x (count + 1, 7) have it."""
+        """The kinematic state at the bodies x (count + 1, 7)."""
         if self._state_of is not x:
             self.start_state.update(self.posture(x[:-1].ravel()))
             self._state_of = x
@@ -99,20 +99,20 @@ class FigureBodies:
         if self.floating:
             a, b, c, w = x[0, 3:].tolist()
             result[:3, :3] = pin.Quaternion(x[0, 3:]).toRotationMatrix().T
-            # the turn is 2 vec(conj(e) de), in the root's own axes
+            # the rotation is 2 vec(conj(e) de), in the root's own axes
             result[3:6, 3:7] = 2.0 * np.array(((w, c, -b, -a), (-c, w, a, -b), (b, -a, w, -c)))
         return result[:, : 7 * self.count]
 
     def bound_step(self, q: Array, lower: Array, upper: Array) -> None:
-        """Keep postures within tangent displacements (nv,) of the posture q (nq,) from now on: a frame's speeds."""
+        """Keep later postures within tangent displacements (nv,) of q (nq,), for the velocity bounds of a frame."""
         self._step = (q, lower, upper)
 
     def free_step(self) -> None:
-        """Bound postures by limits alone."""
+        """Bound later postures by limits alone."""
         self._step = None
 
     def limits(self) -> Angle:
-        """One row for each limited joint, the nearer of its two limits; `aim` chooses which."""
+        """One row for each limited joint, for the nearer of its two limits; `aim` chooses it."""
         limited = np.flatnonzero(np.isfinite(self.low) | np.isfinite(self.high))
         part = self.angles
         labels = [part.labels[k] for k in limited]
@@ -121,17 +121,17 @@ class FigureBodies:
         return Angle(part.bodies[limited], labels, part.forms[limited], part.center[limited], bound, sign)
 
     def distance(self, q: Array) -> tuple[Angle, Indices]:
-        """One row for each turning joint, its angle from that at q (nq,); and the joints' tangent places."""
+        """One row for each revolute joint, its angle relative to q (nq,); and the joints' tangent indices."""
         part = self.angles
         bound, sign = q[self._places].copy(), np.ones(len(part))
         return Angle(part.bodies, part.labels, part.forms, part.center, bound, sign), self._tangent
 
     def angles_at(self, q: Array) -> Array:
-        """(k,) angles of the turning joints at the posture q (nq,)."""
+        """(k,) angles of the revolute joints at the posture q (nq,)."""
         return q[self._places]
 
     def aim(self, limits: Angle, q: Array) -> None:
-        """Turn the rows of `limits` to the limits that are nearer at q (nq,)."""
+        """Set the rows of `limits` to the limits that are nearer at q (nq,)."""
         value = q[self._places[self._limited]]
         low, high = self.low[self._limited], self.high[self._limited]
         upper = high - value < value - low
@@ -152,7 +152,7 @@ class FigureBodies:
         return result
 
     def posture(self, x: Array) -> Array:
-        """The posture (nq,), within limits, of the bodies x (7 count,): each joint read off its own two bodies."""
+        """The posture (nq,), within limits, of the bodies x (7 count,): each joint from its own two bodies."""
         bodies = np.concatenate([x, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)]).reshape(-1, 7)
         q = pin.neutral(self.model)
         q[self._places] = self.angles.angle(bodies)
@@ -173,7 +173,7 @@ class FigureBodies:
         if self._step is not None:
             start, lower, upper = self._step
             way = np.asarray(pin.difference(self.model, start, q))
-            # all joints by the same share: clipped one by one they would go another way
+            # all joints by the same share: clipping them one by one would change the direction of the motion
             room = np.where(way > 0.0, upper, -lower)
             share = float(np.min(room / np.maximum(np.abs(way), 1e-300), initial=1.0))
             q = pin.integrate(self.model, start, share * way)
@@ -181,7 +181,7 @@ class FigureBodies:
         return result
 
     def ask(self, equations: EquationSet, label: str, q: Array, dofs: set[int], weight: float) -> None:
-        """Goals that bring the joints of some degrees of freedom to where the posture q (nq,) has them."""
+        """Add goals that move the joints of some degrees of freedom to their values in the posture q (nq,)."""
         model = self.model
         turning = {row[0]: k for k, row in enumerate(self._turning)}
         for joint in range(1, model.njoints):
@@ -243,7 +243,7 @@ class FigureBodies:
             raise UnsupportedTermError("newton", [f"{label}, a {name} (figure.reduced can lock it)"])
 
     def _weight(self) -> Array:
-        """Turning a body costs what moving the farthest thing on it does."""
+        """Weights: a rotation of a body counts as the motion of its farthest point."""
         size = np.full(self.count, SMALLEST)
         for joint in range(1, self.model.njoints):
             parent = int(self.model.parents[joint])
@@ -264,7 +264,7 @@ def _axis(kind: Any) -> Array:
         known = getattr(kind.extract(), "axis", None)
         if known is not None:
             return np.array(known)
-        data = kind.createData()  # of unbounded joints Pinocchio shows the axis only as their motion
+        data = kind.createData()  # Pinocchio gives the axis of unbounded joints only as their motion
         kind.calc(data, np.array([1.0, 0.0]))
         return np.array(data.S).ravel()[3:]
     return np.array(AXES[name[-1]])

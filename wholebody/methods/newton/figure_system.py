@@ -1,4 +1,4 @@
-"""The equations of a problem on its way: joints, constraints and goals stay, limits and contacts are renewed."""
+"""The equations of a problem during a solve: joints, constraints and goals stay, limits and contacts are renewed."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ from wholebody.methods.newton.terms import bound_equations, constraint_equations
 from wholebody.problem import Problem
 from wholebody.workspace import Workspace
 
-LONGEST = 0.08  # m: longest way of a body in a step where there are pairs that can touch; larger = faster, less seen
-REMEMBERED = 32  # structures that are kept, for contacts that come and go; more = more memory
+LONGEST = 0.08  # m: largest motion of a body in a step if pairs can touch; larger = faster, fewer contacts seen
+REMEMBERED = 32  # cached structures, for contacts that come and go; more = more memory
 HARD = Key("", False, False, 1.0)
 ONE_SIDED = Key("", False, True, 1.0)
 
 
 class FigureSystem(ActiveSystem):
-    """A problem's equations, at one posture after the other.
+    """A problem's equations, renewed from posture to posture.
 
-    After every step the posture is read off the bodies and the bodies are put where it has them, so that joints never
-    drift, limits always hold, and what is reached is a posture.
+    After every step the posture is computed from the bodies, and the bodies are placed by forward kinematics, so joints
+    never drift, limits always hold, and every iterate is a posture.
 
     Attributes:
-        algebra_name: as asked for.
-        structures: how often a pattern was laid out and analysed.
-        laying: processor's time that took [s].
+        algebra_name: name of the factorisation in the settings.
+        structures: number of patterns that were analysed.
+        laying: processor's time of these analyses [s].
     """
 
     def __init__(self, problem: Problem, workspace: Workspace, algebra: str, *, yielding: bool = False) -> None:
-        """State the equations.
+        """Build the equations.
 
         Args:
-            problem: what is asked.
+            problem: the problem.
             workspace: of the run, for as long as this is used.
             algebra: name of the factorisation.
-            yielding: look for the least violation of the constraints, in place of the goals.
+            yielding: minimise the violation of the constraints, in place of the goals.
 
         Raises:
             InputError: a term or a joint that has no equations here.
@@ -73,7 +73,7 @@ class FigureSystem(ActiveSystem):
         self.arrive(self.variables(problem.start))
 
     def variables(self, q: Array) -> Array:
-        """Go to the posture q (nq,); the bodies there."""
+        """Move to the posture q (nq,); returns its variables."""
         self.q = q
         self._ordered = self.bodies.variables(q)
         if self.contacts is not None:
@@ -85,7 +85,7 @@ class FigureSystem(ActiveSystem):
         return self.q if x is self._ordered else self.bodies.posture(x)
 
     def retarget(self) -> None:
-        """Take the problem's new goals."""
+        """Update to the problem's new goals."""
         problem = self.problem
         if self._yielding:
             asked = constraint_equations(problem, self.bodies).yielding()
@@ -94,19 +94,19 @@ class FigureSystem(ActiveSystem):
         self._goals = asked.batches(self.bodies.count)
 
     def retract(self, x: Array) -> Array:
-        """The bodies of the nearest posture."""
+        """The variables of the nearest posture."""
         return x if x is self._ordered else self.variables(self.bodies.posture(x))
 
     def runs_into(self) -> bool:
-        """Whether a pair that is no inequality overlaps where `retract` has just been."""
+        """Whether a pair that is no inequality overlaps at the result of the last `retract`."""
         return self.contacts is not None and self.contacts.runs_into()
 
     def passes(self) -> bool:
-        """Whether nothing is jumped over or entered on the way to where `retract` has just been."""
+        """Whether the motion to the result of the last `retract` neither jumps over something nor ends deep in it."""
         return self.contacts is None or self.contacts.passes(self._left, self.q)
 
     def arrive(self, x: Array) -> bool:
-        """Renew limits and contacts at x; whether the pattern changed."""
+        """Renew limits and contacts at x; returns whether the pattern changed."""
         if x is not self._ordered:
             x = self.retract(x)
         self._left = self.q

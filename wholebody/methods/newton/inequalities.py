@@ -1,6 +1,6 @@
-"""Inequalities as equations with a slack each: squared slacks (eq. 15) or a logarithmic barrier (eqs. 13 and 14).
+"""Inequalities as equations with one slack each: squared slacks (eq. 15) or a logarithmic barrier (eqs. 13 and 14).
 
-Either way the slack's own equation is scalar and is eliminated by hand. What is left of an inequality is one row with
+In both cases the slack's own equation is scalar and is eliminated analytically. An inequality becomes one row with
 an entry on the diagonal,
 
     grad phi . d + M y = -c,
@@ -16,13 +16,13 @@ import numpy as np
 
 from wholebody.arrays import Array
 
-FREE = 1e12  # diagonal of an inequality that is not at work: it takes part in the pattern, and in nothing else
-RELEASE = 1e-12  # multiplier below which an active inequality is let go; larger = held longer
+FREE = 1e12  # diagonal of an inactive inequality: it is in the pattern, but has no effect
+RELEASE = 1e-12  # an active inequality with a multiplier below minus this is released; larger = held longer
 CROSSED = 1e-9  # m or rad: predicted values below minus this make an inequality active
-TOGETHER = 0.01  # of a step: inequalities that are met this much after the first become active with it
-STAYS = 1e-2  # m or rad: an active inequality that finds itself farther away than this is free
-FRACTION = 0.95  # of the way to the edge that a barrier step may go; larger = faster and nearer to the edge
-LEAST_BARRIER = 1e-11  # m: product of slack and multiplier at which the barrier has done its work
+TOGETHER = 0.01  # of a step: inequalities that become zero at most this much after the first become active with it
+STAYS = 1e-2  # m or rad: an active inequality whose value is larger than this is released
+FRACTION = 0.95  # of the distance to the boundary that a barrier step may move; larger = faster, nearer to it
+LEAST_BARRIER = 1e-11  # m: product of slack and multiplier at which the barrier method ends
 BARRIER_FALL = 0.15  # factor of the barrier from step to step; smaller = fewer steps, less centred
 Kind = Literal["slack", "barrier"]
 KINDS = ("slack", "barrier")
@@ -38,35 +38,35 @@ class Inequalities(Protocol):
         """A new step begins at values phi (k,)."""
 
     def correct(self, predicted: Array, multiplier: Array) -> tuple[float, bool]:
-        """Look at the phi (k,) that a linear solution leads to, and its multipliers (k,).
+        """Update the active set from the phi (k,) and the multipliers (k,) of a linear solution.
 
         Returns:
-            How far to go from the last solution to this one, and whether to solve again.
+            Share of the motion from the last solution to this one, and whether to solve again.
         """
 
     def share(self) -> float:
         """Share of the step that keeps the slacks positive."""
 
     def accept(self, share: float, phi: Array) -> None:
-        """Go this share of the step; phi (k,) are the new values."""
+        """Take this share of the step; phi (k,) are the new values."""
 
     def finished(self) -> bool:
-        """Whether the iteration may stop as far as the inequalities go."""
+        """Whether the inequalities allow the iteration to stop."""
 
 
 class SquaredSlacks:
     """phi - Y^2 = 0.
 
     The derivative by Y is -2 Y, so Newton never moves a slack that is zero: the row is then an equation, phi = 0, and
-    stays one whatever its multiplier says. So a slack at zero is looked at after each linear solution: a negative
-    multiplier pulls where it may only push, and the slack is set free. A slack that the step would take through zero is
-    set to zero, the step goes that far, and the rest of it is solved again. Away from zero the multiplier of a slack
-    vanishes (2 y Y = 0) and so does its row. The objective of the step falls from system to system, so none is met
-    twice (Nocedal and Wright 2006, "Numerical Optimization", section 16.5).
+    stays one whatever the sign of its multiplier. So slacks at zero are tested after each linear solution: if the
+    multiplier is negative, the slack is released. A slack that the step would take through zero is set to zero; the
+    step is shortened to that point, and the remainder is solved again. Away from zero the multiplier of a slack
+    vanishes (2 y Y = 0) and so does its row. The objective of the step decreases from system to system, so no active
+    set repeats (Nocedal and Wright 2006, "Numerical Optimization", section 16.5).
     """
 
     def __init__(self, phi: Array) -> None:
-        """Begin with the slacks that fit the values phi (k,); violated inequalities begin at zero."""
+        """Begin with the slacks of the values phi (k,); violated inequalities begin at zero."""
         self.slack = np.sqrt(np.maximum(phi, 0.0))
         self._at = phi
 
@@ -76,12 +76,12 @@ class SquaredSlacks:
         self.slack[phi <= 0.0] = 0.0
 
     def rows(self, phi: Array) -> tuple[Array, Array]:
-        """A slack at zero: an equation. Any other: a row that is not at work."""
+        """A slack at zero gives an equation, any other an inactive row."""
         active = self.slack == 0.0
         return np.where(active, phi, 0.0), np.where(active, 0.0, FREE)
 
     def correct(self, predicted: Array, multiplier: Array) -> tuple[float, bool]:
-        """Set slacks to zero, or free."""
+        """Set slacks to zero, or release them."""
         active = self.slack == 0.0
         crossing = ~active & (predicted < -CROSSED)
         if crossing.any():
@@ -101,7 +101,7 @@ class SquaredSlacks:
         return 1.0, True
 
     def share(self) -> float:
-        """All of it."""
+        """The whole step."""
         return 1.0
 
     def accept(self, share: float, phi: Array) -> None:
@@ -115,10 +115,10 @@ class SquaredSlacks:
 
 
 class LogBarrier:
-    """phi - s = 0 with -mu log s in the objective, mu falling to nothing; s y = mu linearised in both (primal-dual)."""
+    """phi - s = 0 with -mu log s in the objective, mu decreasing to zero; s y = mu linearised in both (primal-dual)."""
 
     def __init__(self, phi: Array) -> None:
-        """Begin inside; values phi (k,) that are not positive are reached through the equation phi = s."""
+        """Begin with positive slacks; the equation phi = s corrects values phi (k,) that are not positive."""
         self.slack = np.maximum(phi, 1e-2)
         self.barrier = 1e-3
         self.multiplier = self.barrier / self.slack
@@ -126,14 +126,14 @@ class LogBarrier:
         self._multiplier_step = np.zeros(len(phi))
 
     def rows(self, phi: Array) -> tuple[Array, Array]:
-        """The slack's step (mu - s y) / y put into the row."""
+        """Rows after substitution of the slack's step (mu - s y) / y."""
         return phi - self.slack - self.barrier / self.multiplier, self.slack / self.multiplier
 
     def begin(self, phi: Array) -> None:
         """Nothing to prepare."""
 
     def correct(self, predicted: Array, multiplier: Array) -> tuple[float, bool]:
-        """Remember the steps; nothing to solve again."""
+        """Store the steps; no second solution is needed."""
         self._slack_step = (self.barrier - self.slack * multiplier) / self.multiplier
         self._multiplier_step = multiplier - self.multiplier
         return 1.0, False
@@ -153,10 +153,10 @@ class LogBarrier:
         self.barrier = max(BARRIER_FALL * self.barrier, 0.1 * LEAST_BARRIER)
 
     def finished(self) -> bool:
-        """Once the barrier is gone."""
+        """Whether the barrier is below `LEAST_BARRIER`."""
         return len(self.slack) == 0 or float((self.slack * self.multiplier).max()) <= 10.0 * LEAST_BARRIER
 
 
 def inequalities(kind: Kind, phi: Array) -> Inequalities:
-    """The state to begin with at values phi (k,)."""
+    """The first state at values phi (k,)."""
     return LogBarrier(phi) if kind == "barrier" else SquaredSlacks(phi)

@@ -1,9 +1,9 @@
-"""One Newton iteration: at each step the least motion that meets the equations to first order (eqs. 5 to 7).
+"""The Newton iteration: each step is the least motion that meets the equations to first order (eqs. 5 to 7).
 
 The previous state of the objective 1/2 |x - x0|^2 is the last iterate, so the multipliers vanish at the solution, the
-KKT matrix [D, -J'; -J, 0] is exact there, and convergence is quadratic. Goals that are far are asked for in pieces
-(B8); a step that does not near them, or moves far more than was asked, is damped, which leads to least squares
-where goals conflict.
+KKT matrix [D, -J'; -J, 0] is exact there, and convergence is quadratic. Steps towards distant goals aim at intermediate
+targets (B8). A step that does not reduce the errors, or moves far more than its target, is damped, which leads to least
+squares if goals conflict.
 """
 
 from __future__ import annotations
@@ -21,33 +21,35 @@ from wholebody.solution import TraceEntry
 
 Measures = Literal["lower", "keep", "ignore"]
 
-HARD_DAMPING = 1e-10  # of what must hold: redundant equations are tolerated at this loss of accuracy
-GOAL_DAMPING = 1e-7  # of goals, far above, so that they give way first
-FIRST_DAMPING = 1e-5  # what a failed step begins with
+HARD_DAMPING = 1e-10  # of joints and constraints: redundant equations are tolerated at this loss of accuracy
+GOAL_DAMPING = 1e-7  # of goals, far larger, so that they give way first
+FIRST_DAMPING = 1e-5  # first damping after a failed step
 MOST_DAMPING = 1e4
-GOOD, POOR = 0.75, 0.25  # shares of the promised progress above and below which the damping falls and rises
-AMPLIFIED = 6.0  # motion for a metre asked, beyond which a step is damped: the equations are nearly singular there
-FAR = 0.05  # m or rad: of a goal, from which that is looked at; nearer, the measures may move more than the goals
-ENOUGH = 1.0  # damping that serves in any case
+GOOD, POOR = 0.75, 0.25  # shares of the predicted reduction above and below which the damping falls and rises
+AMPLIFIED = 6.0  # motion per metre of target beyond which a step is damped: the equations are nearly singular there
+FAR = 0.05  # m or rad: goal error from which that is tested; nearer, the measures may move more than the goals
+ENOUGH = 1.0  # largest damping
 DAMPING_UP, DAMPING_DOWN = 8.0, 0.1
-HARD_SHARE = 1e-6  # of the squared damping goes to what must hold, which only conflicts among that need
-PULL = 0.3  # m or rad: of a goal farther away, a step asks for this much; larger = fewer steps, more of them failed
-LARGEST_TURN = 0.35  # change of Euler parameters in a step, twice that in radians; beyond it the linearisation is idle
-FUNNEL = 0.5  # m or rad of equations that a step may leave for a metre of goal; larger = longer steps, more to mend
-WIDEST = 0.5  # m or rad of equations that any step may leave
-MEND = 0.7  # share of the funnel from which a step only mends; larger = fewer such steps, more damped ones
-MENDING_DAMPING = 0.03  # of goals in such a step: they stay where they are, but not at any price
-NARROW = 0.7  # what is left of the funnel after a step that only mended
-WORTH = 0.05  # share of the promised progress that a step must make
-MENDED = 0.2  # the same where it only mends what must hold
-STAGNANT = 1e-6  # relative progress below which steps count as none
-LEAST_PROGRESS = 0.1  # the same where frames wait
-STALLED = 1  # steps that bring less than that, after which a frame ends
-PATIENCE = 12  # such steps in a row before the nearest point counts as found
-REFUSALS = 6  # times in a row that a step is made anew because it runs into something; after that it is shortened
-SHORTENINGS = 8  # halvings of a step whose way is not free before it counts as failed
-SYSTEMS = 25  # most linear systems a step, while inequalities come and go
-NEAR = 1e-2  # m or rad: errors below which the damping of equations is made good by the last multipliers
+HARD_SHARE = 1e-6  # of the squared damping applies to constraints, for conflicts among them
+PULL = 0.3  # m or rad: largest reduction of a goal's error in a step; larger = fewer steps, more of them fail
+LARGEST_TURN = (
+    0.35  # change of Euler parameters in a step, twice that in radians; beyond it the linearisation is useless
+)
+FUNNEL = 0.5  # m or rad of violation allowed for a metre of goal; larger = longer steps, more to restore
+WIDEST = 0.5  # m or rad: largest violation allowed after any step
+MEND = 0.7  # share of the funnel from which a step only restores; larger = fewer such steps, more damped ones
+MENDING_DAMPING = 0.03  # of goals in such a step: they keep their errors, but may give way
+NARROW = 0.7  # factor on the funnel after such a step
+WORTH = 0.05  # least ratio of actual to predicted reduction of a step
+MENDED = 0.2  # the same for a step that only restores the constraints
+STAGNANT = 1e-6  # relative reduction below which a step counts as no progress
+LEAST_PROGRESS = 0.1  # the same in frames
+STALLED = 1  # number of steps with less reduction than that after which a frame ends
+PATIENCE = 12  # number of steps without progress in a row after which the iteration counts as converged
+REFUSALS = 6  # times in a row that a step is repeated because of a new contact; after that it is shortened
+SHORTENINGS = 8  # halvings of a step whose motion is not free before it counts as failed
+SYSTEMS = 25  # most linear systems a step, while the active set changes
+NEAR = 1e-2  # m or rad: errors below which the last multipliers compensate the damping of equations
 
 
 class Iteration:
@@ -68,7 +70,7 @@ class Iteration:
         return self.hard <= self.tolerance and self.goal <= self.goal_tolerance
 
     def begin(self, x: Array) -> None:
-        """Take the equations as they are now, at x."""
+        """Use the present equations at x."""
         self.active_system.arrive(x)
         self.system, self.algebra = self.active_system.system, self.active_system.algebra
         self.goal_rows = np.flatnonzero(self.system.goal)
@@ -97,10 +99,10 @@ class Iteration:
         """Step until everything holds, nothing moves any more, or the iterations are spent.
 
         Args:
-            iterations: most of them.
-            goals: whether goals are asked for.
-            measures: to be lowered, to grow little, or not to be looked at.
-            early_exit: end at the first step that brings little, as in a frame whose goal lies in something.
+            iterations: most iterations.
+            goals: whether goals are pursued.
+            measures: minimised, kept from growing, or ignored.
+            early_exit: end at the first step that gains little, as in a frame whose goal lies inside something.
         """
         damping, share, pull, stagnant = 0.0, 1.0, PULL, 0
         self.stationary = False
@@ -128,7 +130,7 @@ class Iteration:
             length = self.length(step)
             trial = self.active_system.retract(self.x + length * step)
             if refused < REFUSALS and self.active_system.runs_into():
-                refused += 1  # what was run into is an equation now: the step is made anew from where it began
+                refused += 1  # the new contact is an inequality now: repeat the step from its start
                 self.residuals.append(self.residuals[-1])
                 self.begin(self.x)
                 continue
@@ -168,14 +170,14 @@ class Iteration:
                 return
 
     def length(self, step: Array) -> float:
-        """Share of a step (7 n,) that the linearisation and the active_system are good for."""
+        """Share of a step (7 n,) for which the linearisation is valid and which the active system allows."""
         length = min(1.0, LARGEST_TURN / max(largest_turn(step), 1e-300)) * self.state.share()
         if np.isfinite(self.active_system.longest):
             length = min(length, self.active_system.longest / max(self._motion(step), 1e-300))
         return length
 
     def shorten(self, trial: Array, step: Array, length: float) -> tuple[Array, float, bool]:
-        """The trial and its length, halved until the way to it is free; and whether it is."""
+        """The trial and its length, halved until the motion to it is free; and whether it is."""
         for _ in range(SHORTENINGS):
             if self.active_system.passes():
                 return trial, length, True
@@ -184,7 +186,7 @@ class Iteration:
         return trial, length, self.active_system.passes()
 
     def advance(self, trial: Array, length: float) -> None:
-        """Take the equations at a trial, which this share of the last step led to."""
+        """Accept a trial, which is this share of the last step, and evaluate its equations."""
         if self.active_system.arrive(trial):
             self.begin(trial)
         else:
@@ -195,14 +197,14 @@ class Iteration:
     def step(
         self, damping: float, share: float, pull: float, goals: bool, measures: Measures, proximity: float = 1.0
     ) -> Array:
-        """The step of one iteration; inequalities come and go until the linear solution agrees with them.
+        """The step of one iteration; the active set changes until the linear solution agrees with it.
 
         Args:
-            damping: of the goals; its square of what must hold.
-            share: of what must hold, that is asked for.
-            pull: share of the goals.
-            goals: whether they are asked for at all.
-            measures: to be lowered, to grow little, or not to be looked at.
+            damping: of the goals; its square applies to constraints.
+            share: of the constraints' errors that the step corrects.
+            pull: share of the goals' errors that the step corrects.
+            goals: whether goals are pursued at all.
+            measures: minimised, kept from growing, or ignored.
             proximity: factor of the least motion, against the measures.
         """
         asked = self.residual * share
@@ -239,28 +241,28 @@ class Iteration:
         return at
 
     def _norms(self, residual: Array) -> tuple[float, float]:
-        """Norms of the errors of what must hold, and of the goals."""
+        """Norms of the errors of the constraints, and of the goals."""
         error = self._error(residual)
         goal = error[self.goal_rows] * self.system.share[self.goal_rows]
         error[self.goal_rows] = 0.0
         return sqrt(float(error @ error)), sqrt(float(goal @ goal))
 
     def _motion(self, step: Array) -> float:
-        """About the longest way of any part of a body in a step, metres: the weights of turns are squared sizes."""
+        """Approximate largest motion of a part of a body in a step, metres; weights of rotations are squared sizes."""
         bodies = (step * np.sqrt(self.system.weight)).reshape(-1, 7)
         return float(np.sqrt((bodies * bodies).sum(axis=1).max(initial=0.0)))
 
     def _better(
         self, before: tuple[float, float], after: tuple[float, float], promised: tuple[float, float], funnel: float
     ) -> bool:
-        """Whether a step nears the goals without leaving the funnel, or mends what must hold (Gould and Toint 2010)."""
+        """Whether a step reduces goal errors in the funnel, or restores the constraints (Gould and Toint 2010)."""
         hard, goal = after
         if not np.isfinite(hard + goal):
             return False
         if hard + goal <= 0.1 * self.tolerance:
             return True
         gain = before[1] - promised[1]
-        bend = min(before[1] * before[1], WIDEST)  # what a full step towards the goals leaves of equations that bend
+        bend = min(before[1] * before[1], WIDEST)  # violation of curved equations after a full step towards the goals
         if hard <= max(funnel, bend) and gain > 0.0 and before[1] - goal >= WORTH * gain:
             return True
         mended = before[0] - hard >= MENDED * max(before[0] - promised[0], 0.0) and hard < before[0]

@@ -1,4 +1,4 @@
-"""Which joints an assembly has already, so that the same one given twice is named."""
+"""The joints of an assembly, so that a joint given twice is refused."""
 
 from __future__ import annotations
 
@@ -7,28 +7,28 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 
-SAME_PLACE = 1e-9  # m: joints of one kind between two bodies that are nearer than this are one
+SAME_PLACE = 1e-9  # m: joints of one kind between two bodies that are nearer than this are the same joint
 
 
 class JointRegister:
-    """Joints by kind and pair of bodies, with their places in both."""
+    """Joints by kind and pair of bodies, with their positions in both."""
 
     def __init__(self) -> None:
-        """Begin without any."""
+        """Make an empty register."""
         self._known: dict[tuple[str, frozenset[str]], list[dict[str, Array]]] = {}
 
     def add(self, kind: str, first: str, second: str, places: tuple[Array, Array] | None = None) -> None:
-        """Remember a joint.
+        """Add a joint.
 
         Args:
             kind: such as "revolute joint".
             first: name of a body.
             second: another.
-            places: (3,) where the joint is, in either body; two at different places are two, as of a door's hinges.
-                None for joints that say all there is to say at any place.
+            places: (3,) positions of the joint in either body; joints at different positions are different, such as two
+                hinges. None for joints without a position.
 
         Raises:
-            InputError: there is this joint already.
+            InputError: the joint exists already.
         """
         listed = self._known.setdefault((kind, frozenset((first, second))), [])
         at = (np.zeros(3), np.zeros(3)) if places is None else places

@@ -1,12 +1,12 @@
-"""Newton on the Karush-Kuhn-Tucker system: the placement nearest to an anchor among all that meet the equations.
+"""Newton on the Karush-Kuhn-Tucker system: the state nearest to an anchor among all that satisfy the equations.
 
 With L(x, y) = 1/2 (x - a)' D (x - a) - y . c(x), the step solves eqs. 4 to 7 with second derivatives of the equations,
 
     [H, -J'; -J, 0] [d; y] = [-D (x - a); c],        H = D - sum_i y_i c_i''.
 
 Without the second derivatives, as in eq. 6, the equations converge quadratically and the multipliers only linearly.
-After each step Newton steps lead back to the equations, and the distances there are compared: a merit of distance and
-errors would refuse good long steps where the equations bend (Maratos; Nocedal and Wright 2006, section 15.4).
+After each step Newton steps return to the equations, and the distances there are compared: a merit of distance and
+errors would refuse good long steps along curved equations (Maratos; Nocedal and Wright 2006, section 15.4).
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.system import System
 
 DAMPING = 1e-10  # redundant equations are tolerated at this loss of accuracy
-HALVINGS = 12  # of a step that does not serve
+HALVINGS = 12  # of a step that is not accepted
 BACK = 8  # most Newton steps back to the equations after a step along them
-ROUNDING = 1e-12  # relative difference of squared distances that says nothing
-FIRST_CONVEXITY = 1e-2  # of D that is added where the second derivatives are not convex along the equations
-MORE, LESS = 4.0, 0.3  # what it is multiplied by until they are, and from one step to the next
+ROUNDING = 1e-12  # relative difference of squared distances that is rounding
+FIRST_CONVEXITY = 1e-2  # share of D that is added if the second derivatives are not convex along the equations
+MORE, LESS = 4.0, 0.3  # factors on it until they are, and from one step to the next
 MOST_CONVEXITY = 1e6
-DECREASE = 1e-4  # share of the promised decrease that a step must bring (Armijo)
+DECREASE = 1e-4  # least share of the predicted decrease of a step (Armijo)
 
 
 class Settled(NamedTuple):
-    """Where it ended.
+    """The end of the iteration.
 
     Attributes:
         x: (7 n,) the variables.
@@ -44,18 +44,25 @@ class Settled(NamedTuple):
     met: bool
 
 
-def settle(system: System, x: Array, anchor: Array, *, tolerance: float, iterations: int) -> Settled:
+def kkt_algebra(system: System) -> QuasiDefinite:
+    """The factorisation of the KKT matrix of a system's equations, analysed."""
+    rows, columns, _ = system.curvature(system.weight, np.zeros(system.pattern.height))
+    return QuasiDefinite(system.pattern, (rows, columns))
+
+
+def settle(
+    system: System, algebra: QuasiDefinite, x: Array, anchor: Array, *, tolerance: float, iterations: int
+) -> Settled:
     """Move x, which meets the equations or nearly so, to the nearest place to the anchor (both (7 n,)).
 
     Args:
         system: equations; those with inequalities are not for this iteration.
+        algebra: `kkt_algebra` of the system.
         x: where to begin.
         anchor: what it is to be near to, by the system's weights.
         tolerance: of every equation of the KKT system.
-        iterations: most of them.
+        iterations: most iterations.
     """
-    rows, columns, _ = system.curvature(x, np.zeros(system.pattern.height))
-    algebra = QuasiDefinite(system.pattern, (rows, columns))
     damping = np.full(system.pattern.height, DAMPING)
     y = np.zeros(system.pattern.height)
     residual, values = system.residual(x), system.values(x)
@@ -72,7 +79,7 @@ def settle(system: System, x: Array, anchor: Array, *, tolerance: float, iterati
             second = -system.curvature(x, y)[2]
             step, multiplier = algebra.solve(task, second)
             convexity = max(FIRST_CONVEXITY, LESS * convexity) if not algebra.convex() else 0.0
-            while convexity and convexity < MOST_CONVEXITY:  # far from the answer: more of D, until there is a way down
+            while convexity and convexity < MOST_CONVEXITY:  # far from the answer: more of D, until it is convex
                 raised = task._replace(weight=(1.0 + convexity) * system.weight)
                 step, multiplier = algebra.solve(raised, second)
                 if algebra.convex():

@@ -1,4 +1,4 @@
-"""The centre of mass in full coordinates: linear in the bodies' places, quadratic in their Euler parameters."""
+"""The centre of mass in full coordinates: linear in the bodies' positions, quadratic in their Euler parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wholebody.methods.newton.batches import PLACE, TURN, Batch
 class MassCenter(Batch):
     """The centre of mass along directions: n . sum_j s_j (r_j + R_j c_j) - h = 0, with s_j the bodies' shares of mass.
 
-    One group of equations about all bodies that have mass. As an inequality it keeps the centre of mass over a polygon.
+    One group of equations of all bodies with mass. As an inequality it keeps the centre of mass above a polygon.
     """
 
     def __init__(

@@ -23,20 +23,20 @@ from wholebody.solution import Solution
 class Newton:
     """Newton's method in full coordinates (Choi and Cremer 1999), for trees and closed loops alike.
 
-    Every body has seven variables, every joint is an equation, and each step is the least motion that meets all of
-    them. Measures of the turning joints, your own among them, are minimised on the way, up to what the stopping of the
-    iteration leaves; one that depends on the root's place or on other joints is reported only, and the solution's
-    message says so. Goals and constraints of your own are taken where all joints turn but a free root. Where the goals
-    cannot be met, their least squares are sought with everything else held.
+    Every body has seven variables, every joint is an equation, and each step is the least motion that satisfies all of
+    them. The iteration minimises measures of the revolute joints, your own included, to the accuracy of its
+    termination. A measure that depends on the root's position or on other joints is only reported, and the message
+    names it. Goals and constraints of your own are taken if all joints are revolute except a free root. If the goals
+    cannot be met, the method minimises their squares subject to the constraints.
 
-    These are settings alone: one object serves any number of problems and threads at the same time.
+    The object has only settings and serves any number of problems and threads at the same time.
 
     Attributes:
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most Newton iterations.
         algebra: "auto", "normal", "llt", "kkt", "schur", "dense" or "svd".
         inequalities: "slack" (squared slacks) or "barrier" (logarithmic).
-        restarts: most seeded starts that are tried where the straight way does not serve.
+        restarts: most seeded starts that are tried if the descent from the start does not solve the problem.
         seed: of the restarts.
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
             ends after four seconds of processor time.
@@ -68,7 +68,7 @@ class Newton:
         return f"newton/{self.algebra}"
 
     def accepts(self, problem: Problem) -> str | None:
-        """None where all terms and joints have equations here; else the sentence that names what has none."""
+        """None if all terms and joints have equations here; otherwise the sentence that names the others."""
         check_problem(problem, "Newton.accepts: problem")
         with problem.lend() as workspace:
             try:
@@ -81,7 +81,7 @@ class Newton:
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
 
         Args:
-            problem: what is asked.
+            problem: the problem.
             progress: see `wholebody.methods.control.Progress`.
 
         Raises:
@@ -97,19 +97,19 @@ class Newton:
             return search.solution(found, began)
 
     def tracker(self, problem: Problem, dt: float | None = None) -> NewtonTracker:
-        """What follows the goals of a problem that move from call to call; its equations are laid out once.
+        """A tracker of goals that move from call to call; it analyses its equations once.
 
         Args:
-            problem: what is asked.
-            dt: seconds a frame, for bounds on speeds; none hold where it is None.
+            problem: the problem.
+            dt: seconds a frame, for velocity bounds; None for no velocity bounds.
 
         Raises:
             InputError: the problem has a term that this method has no equations for, dt is not a positive finite
-                number, or the scene changed after the problem was stated.
+                number, or the scene changed after the problem was made.
         """
         return NewtonTracker(problem, self.algebra, self.settings, dt, self)
 
     @property
     def settings(self) -> Settings:
-        """What a search is bounded by."""
+        """The settings of a search."""
         return Settings(self.tolerance, self.iterations, self.restarts, self.seed, self.inequalities)

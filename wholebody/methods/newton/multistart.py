@@ -1,6 +1,6 @@
-"""The ways that are tried for one problem: straight from the start, from bent limbs, from other postures.
+"""The search for one problem: iterations from the start, from bent limbs, and from other postures.
 
-They are bounded by counts of iterations and not by seconds, so that the answer does not depend on the machine's load.
+Counts of iterations bound it, not seconds, so that the answer does not depend on the machine's load.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from wholebody.methods.newton.refinement import polish
 from wholebody.methods.starts import Minima, bent, restarts
 from wholebody.solution import Solution, TraceEntry
 
-SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessment adds the rows of a goal up
-TRIAL = 30  # iterations that another start is given to come nearer than the best so far
-FOR_STARTS = 0.5  # share of the time limit that other starts may take: to come nearest takes its time too
-ALIKE = 1e-5  # share of a goal's error by which two ends may differ and count as equally near
+SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessment uses norms over the rows of a goal
+TRIAL = 30  # iterations in which another start must come nearer than the best so far
+FOR_STARTS = 0.5  # share of the time limit for other starts: the last iteration, towards the nearest, takes time too
+ALIKE = 1e-5  # relative difference of goal errors up to which two results count as equally near
 
 
 class Settings(NamedTuple):
-    """What a search is bounded by; see `Newton`."""
+    """The settings of a search; see `Newton`."""
 
     tolerance: float
     iterations: int
@@ -43,13 +43,13 @@ class Settings(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Where one way ended.
+    """The result from one start.
 
     Attributes:
         q: (nq,) the posture.
         judgement: its assessment.
         reached: how the iteration ended.
-        how: from where it came, in words.
+        how: the start, in words.
     """
 
     q: Array
@@ -59,21 +59,21 @@ class Found(NamedTuple):
 
 
 class Search:
-    """All ways for one problem, remembering the best end."""
+    """The search for one problem, which keeps the best result."""
 
     def __init__(self, active_system: FigureSystem, settings: Settings) -> None:
-        """Set up for the problem of a active_system."""
+        """Prepare for the problem of an active system."""
         self.active_system, self.settings = active_system, settings
         self.iterations = 0
         self.residuals: list[float] = []
         self.contradictions: tuple[Contradiction, ...] = ()
 
     def from_here(self, q: Array) -> Found:
-        """The end of the straight way from a posture (nq,)."""
+        """The result from a posture (nq,) alone."""
         return self._go(q, "", self.settings.iterations)
 
     def everywhere(self, q: Array) -> Found:
-        """The best end of all ways, the measures brought to their least there if it serves."""
+        """The best result of all starts; if it solves the problem, its measures are minimised."""
         self.contradictions = contradictions(self.active_system.problem, self.active_system.workspace)
         hopeless = least_left(self.contradictions) is None
         best = self._go(q, "", TRIAL) if hopeless else self.from_here(q)
@@ -105,7 +105,7 @@ class Search:
         return best
 
     def solution(self, found: Found, began: float) -> Solution:
-        """What was found as a solution; the search began at `began` by `time.perf_counter`."""
+        """The solution of a result; the search began at `began` by `time.perf_counter`."""
         reported = ", ".join(self.active_system.objective.reported)
         ending = Ending(
             found.q,
@@ -149,7 +149,7 @@ class Search:
         return self._judged(reached, how)
 
     def _polished(self, found: Found) -> Found:
-        """The same with lower measures, if they can be lowered."""
+        """The same with lower measures, if possible."""
         active_system, tolerance = self.active_system, self.settings.tolerance
         x, spent = polish(active_system, found.reached.x, active_system.objective.value, tolerance=tolerance)
         self.iterations += spent
@@ -157,7 +157,7 @@ class Search:
         return lower if self._serves(lower) and self._better(lower, found) else found
 
     def _least_violation(self, best: Found, q: Array) -> Found:
-        """The nearest to all constraints, if that breaks less: where they cannot all hold."""
+        """The posture with the least violation of the constraints, if it violates them less than the best so far."""
         whole = self.active_system
         self.active_system = FigureSystem(whole.problem, whole.workspace, whole.algebra_name, yielding=True)
         self.active_system.control = whole.control
@@ -175,7 +175,7 @@ class Search:
         return found.judgement.holds(self.settings.counted) and found.judgement.met(self.settings.counted)
 
     def _better(self, one: Found, other: Found) -> bool:
-        """Whether one end is better: in what must hold, then in the goals, then in the measures."""
+        """Whether one result is better: in the violation, then in the goal errors, then in the measures."""
         enough = self.settings.counted
         for left, right in ((_broken(one), _broken(other)), (_missed(one), _missed(other))):
             left, right = max(left, enough), max(right, enough)

@@ -1,9 +1,9 @@
-"""The measures as rows of joint angles whose squares are to be small.
+"""The measures as rows of joint angles whose squares are minimised.
 
 A measure f with gradient g and diagonal second derivative h at angles theta is, to second order, a sum of squares of
-angles from theta - g / h, with the factors h / 2. For `Effort` and `Displacement` that is exact. Any measure of the
-turning joints is taken like this; one that depends on the root's place or on other joints is reported, and the
-solution's message says so.
+angles from theta - g / h, with the factors h / 2. For `Effort` and `Displacement` that is exact. This applies to every
+measure of the revolute joints. A measure that depends on the root's position or on other joints is only reported, and
+the solution's message names it.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from wholebody.problem import Problem
 from wholebody.tasks import Discomfort, Displacement, Effort
 from wholebody.tasks.base import Measure
 
-CAN = (Effort, Displacement, Discomfort)  # sums over joints: what the others of them cost does not hinder
-SAMPLES = 3  # postures at which a measure is asked what it depends on
-STIFFNESS = 10.0  # m^2 a unit of effort [rad^2]: what bodies' motion counts against it; larger = nearer to least effort
-LEAST_STIFFNESS = 0.03  # rad^-2: half of the least second derivative that a joint counts as having
+CAN = (Effort, Displacement, Discomfort)  # sums over joints: minimised over the revolute ones alone
+SAMPLES = 3  # postures at which the dependence of a measure on joints is tested
+STIFFNESS = 10.0  # m^2 per unit of effort [rad^2]: weight of effort against motion; larger = nearer to least effort
+LEAST_STIFFNESS = 0.03  # rad^-2: half of the least second derivative of a joint
 
 
 class Objective:
     """Rows for the measures of a problem.
 
     Attributes:
-        rows: the joints' angles, each from where the measures ask it to be.
-        minimised: the measures in it.
+        rows: the joints' angles, each relative to its minimiser.
+        minimised: the measures that are minimised.
         reported: names of the others.
     """
 
     def __init__(self, problem: Problem, bodies: FigureBodies, state: State) -> None:
-        """Lay the rows out for the figure's turning joints.
+        """Prepare the rows for the figure's revolute joints.
 
         Args:
-            problem: what is asked.
+            problem: the problem.
             bodies: of its figure.
             state: of the run; it is moved.
         """
@@ -60,22 +60,22 @@ class Objective:
         return sum(term.weight * term.value(state) for term in self.minimised)
 
     def anchor(self, q: Array) -> None:
-        """Count from the posture q (nq,) from now on, by the measures' second derivatives: the last state of a drag."""
+        """Use displacements from q (nq,), the last state of a drag, with the measures' second derivatives."""
         self._model_at(q)
         self.rows.bound = self._bodies.angles_at(q)
         self._follows = False
 
     def follow(self) -> None:
-        """Model the measures anew wherever the figure is."""
+        """Model the measures anew at every posture."""
         self._follows = True
 
     def renew(self, q: Array) -> None:
-        """Model the measures at the posture q (nq,), unless they are counted from another."""
+        """Model the measures at the posture q (nq,), unless an anchor is set."""
         if self._follows:
             self._model_at(q)
 
     def enter(self, system: System) -> None:
-        """Put the present factors into a system."""
+        """Write the present factors into a system."""
         system.stiffness[system.objective] = self.stiffness
 
     def _model_at(self, q: Array) -> None:

@@ -4,7 +4,7 @@ Quaternions are (x, y, z, w). For e = (v, w) of any length,
 
     R(e) c = (w^2 - v.v) c + 2 (v.c) v + 2 w v x c,          l . R(e) c = e' Q(c, l) e,
 
-which is a rotation where e has unit length (a constraint of its own keeps it there), and has constant second
+which is a rotation if e has unit length (a separate constraint keeps it there), and has constant second
 derivatives. A relative orientation conj(a) b is bilinear, so the equations of joints need no trigonometry.
 """
 
@@ -84,7 +84,7 @@ RELATIVE = np.array([[product(conjugate(a), b) for b in _BASIS] for a in _BASIS]
 
 
 def relative_forms(first: Array, second: Array) -> Array:
-    """Bilinear forms of the relative orientation of two axes systems that are carried by two bodies.
+    """Bilinear forms of the relative orientation of two frames that are fixed to two bodies.
 
     Args:
         first: (k, 4) orientation of the axes in the first body.
@@ -99,7 +99,7 @@ def relative_forms(first: Array, second: Array) -> Array:
 
 
 def axes_with_z(direction: Array) -> Array:
-    """Quaternions (k, 4) of the shortest turns that bring z to unit directions (k, 3)."""
+    """Quaternions (k, 4) of the smallest rotations that turn z to unit directions (k, 3)."""
     x, y, z = direction.T
     result = np.stack([-y, x, np.zeros_like(x), 1.0 + z], axis=1)
     back = z < -1.0 + 1e-9

@@ -1,7 +1,7 @@
-"""From a place that meets the equations to the least of the measures among such places.
+"""Minimises the measures subject to the equations, from a state that satisfies the equations.
 
-Each round makes one step with the least motion counting little against the measures, comes back to the equations by
-Newton steps, and is kept if the measures fell; else the next one goes half as far. With the Jacobians alone,
+Each round makes one step in which the motion has little weight against the measures, and returns to the equations by
+Newton steps. It is kept if the measures decreased; otherwise the next round is half as long. With the Jacobians alone,
 convergence is linear.
 """
 
@@ -16,13 +16,13 @@ from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra.base import SingularSystemError
 from wholebody.methods.newton.system import ActiveSystem
 
-ROUNDS = 40  # most of them
-LONGER, SHORTER = 1.3, 0.5  # what a step's share is multiplied by after a round that served, and one that did not
-FINER = 0.1  # of the tolerances, to which a round comes back: what is missed would look like lower measures
-MOTION = 1e-2  # factor of the least motion; smaller = faster, less sure where nothing else says which way
-SHORTEST = 0.02  # of a step that does not lower the measures, before the last place counts as the least
+ROUNDS = 40  # most rounds
+LONGER, SHORTER = 1.3, 0.5  # factors on the length of a step after a round that was kept, and one that was not
+FINER = 0.1  # of the tolerances, to which a round returns to the equations: larger errors would lower the measures
+MOTION = 1e-2  # weight of the motion; smaller = faster, less stable for degrees of freedom without measures
+SHORTEST = 0.02  # least length of a step; if shorter ones do not lower the measures, the last state is the minimum
 BACK = 6  # most Newton steps back to the equations
-ROUNDING = 1e-13  # relative change of the measures that says nothing
+ROUNDING = 1e-13  # relative change of the measures that is rounding
 
 
 def polish(
@@ -32,12 +32,12 @@ def polish(
 
     Args:
         active_system: the equations.
-        x: where to begin.
-        measure: what the measures are at variables (7 n,).
+        x: the start.
+        measure: the measures as a function of the variables (7 n,).
         tolerance: of the equations; a round that moves nothing by more, metres and radians, is the last.
 
     Returns:
-        The variables, and how many iterations it took.
+        The variables, and the number of iterations.
     """
     run = Iteration(active_system, x, FINER * tolerance, FINER * tolerance, "slack")
     run.iterate(BACK, goals=True, measures="keep")

@@ -1,4 +1,4 @@
-"""All equations of an assembly as one sparse system: its pattern once, its values at every iteration."""
+"""All equations of an assembly as one sparse system: the pattern is made once, the values at every iteration."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ class System:
 
     Attributes:
         batches: the equations.
-        pattern: where the Jacobian (m, 7 n) can be other than zero.
-        goal: (m,) rows that may be missed where they cannot be met.
-        inequality: (m,) rows that are to be at least zero.
-        share: (m,) root of each goal's weight, as a share of the greatest; 1 for what must hold.
-        objective: (m,) rows whose squares are to be small, the pluggable part of the objective.
-        stiffness: (m,) their factors, 1 until others are written into it.
+        pattern: structural non-zeros of the Jacobian (m, 7 n).
+        goal: (m,) rows of goals, which may be violated.
+        inequality: (m,) rows that must be at least zero.
+        share: (m,) root of each goal's weight, as a share of the greatest; 1 for constraints.
+        objective: (m,) rows whose squares are minimised.
+        stiffness: (m,) their factors, 1 by default.
         weight: (7 n,) weight of each variable in the least motion.
     """
 
     def __init__(self, count: int, batches: Sequence[tuple[Batch, Key]], weight: Array) -> None:
-        """Lay out rows and pattern.
+        """Build rows and pattern.
 
         Args:
-            count: bodies, without the world.
-            batches: equations; those without members are left out.
+            count: number of bodies, without the world.
+            batches: equations; empty batches are left out.
             weight: (7 count,).
         """
         keys = [key for batch, key in batches if len(batch)]
@@ -41,6 +41,7 @@ class System:
         self.batches = [batch for batch, _ in batches if len(batch)]
         self.weight = weight
         self._seen: tuple[Array, Array] | None = None
+        self._found: tuple[Array, Array] | None = None
         sizes = [len(batch) * batch.size for batch in self.batches]
         self.starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
         self.goal = np.repeat([key.goal for key in keys], sizes).astype(bool)
@@ -64,6 +65,7 @@ class System:
 
     def renew(self, batches: Sequence[tuple[Batch, Key]]) -> None:
         """Take other numbers for equations of the same pattern."""
+        self._found = None
         self.batches = [batch for batch, _ in batches if len(batch)]
 
     def bodies(self, x: Array) -> Array:
@@ -73,9 +75,13 @@ class System:
         return self._seen[1]
 
     def residual(self, x: Array) -> Array:
-        """(m,) metres and radians."""
-        bodies = self.bodies(x)
-        return np.concatenate([np.zeros(0), *(batch.residual(bodies).ravel() for batch in self.batches)])
+        """(m,) metres and radians; read only, as the same array answers the same question until `renew`."""
+        if self._found is None or self._found[0] is not x:
+            bodies = self.bodies(x)
+            found = np.concatenate([np.zeros(0), *(batch.residual(bodies).ravel() for batch in self.batches)])
+            found.flags.writeable = False
+            self._found = (x, found)
+        return self._found[1]
 
     def values(self, x: Array) -> Array:
         """Values (nnz,) of the Jacobian in the order of the pattern."""
@@ -96,7 +102,7 @@ class System:
         return rows, columns, np.concatenate(values)
 
     def label(self, row: int) -> str:
-        """What a row is called."""
+        """Name of a row in messages."""
         index = int(np.searchsorted(self.starts, row, side="right")) - 1
         batch = self.batches[index]
         return batch.labels[(row - int(self.starts[index])) // batch.size]
@@ -121,13 +127,13 @@ def _columns(batch: Batch) -> Indices:
 
 
 class ActiveSystem:
-    """Equations that stay as they are; others derive from it.
+    """A system whose equations do not change; subclasses renew theirs.
 
     Attributes:
         system: the equations.
-        algebra: for the system's pattern.
-        longest: metres that any part of a body may move in a step.
-        control: what may end the iteration.
+        algebra: factorisation for the system's pattern.
+        longest: largest motion of any part of a body in a step, metres.
+        control: may end the iteration early.
     """
 
     longest = np.inf
@@ -138,19 +144,19 @@ class ActiveSystem:
         self.system, self.algebra = system, algebra
 
     def retract(self, x: Array) -> Array:
-        """The variables (7 n,) after a step, put in order."""
+        """The variables (7 n,) after a step, projected to valid states."""
         return unit(x)
 
     def runs_into(self) -> bool:
-        """Whether the last retraction ran into something new; then it is an equation now, and the step is made anew."""
+        """Whether the last retraction has a new contact, which is an inequality now; then the step is repeated."""
         return False
 
     def passes(self) -> bool:
-        """Whether the way to the last retraction is free; if not, the step is shortened."""
+        """Whether the motion to the last retraction is free; if not, the step is shortened."""
         return True
 
     def arrive(self, x: Array) -> bool:
-        """Renew the equations at x, where a step ended; whether their number or pattern changed."""
+        """Renew the equations at x, the end of a step; returns whether their number or pattern changed."""
         return False
 
 

@@ -1,7 +1,8 @@
-"""Equations that are stated in the tangent of postures, as rows of bodies: goals and constraints of anybody's own.
+"""Users' goals and constraints, whose derivatives are with respect to the tangent space of postures, as rows of bodies.
 
-A term says its derivative J by the tangent displacement (nv,) of a posture. Every degree of freedom of turning joints
-and of a free root is in turn a function of one or two bodies, with derivative D (nv, 7 n), so the term's rows are J D.
+A term gives its derivative J with respect to the tangent displacement (nv,) of a posture. Every degree of freedom of
+revolute joints and of a free root is a function of one or two bodies, with derivative D (nv, 7 n), so the term's rows
+are J D.
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ class TangentRows(Batch):
         """Take a function with its derivative.
 
         Args:
-            bodies: of the figure; its joints are turning ones, and a free root.
-            label: what it is called in messages.
+            bodies: of the figure, whose joints are revolute ones and a free root.
+            label: its name in messages.
             value: (m,) at a state.
             jacobian: (m, nv) at a state.
-            chosen: (size,) which of the m rows.
+            chosen: (size,) indices of the used rows among the m.
             sign: (size,) 1 or -1.
-            bound: (size,) what is taken off the value.
+            bound: (size,) subtracted from the value.
         """
         super().__init__(np.arange(bodies.count)[None], [label])
         self._figure, self._value, self._slope = bodies, value, jacobian
@@ -70,7 +71,7 @@ def goal_rows(bodies: FigureBodies, goal: Goal, label: str) -> TangentRows:
 def constraint_rows(
     bodies: FigureBodies, term: Constraint, label: str
 ) -> tuple[TangentRows | None, TangentRows | None]:
-    """Rows of a constraint that are equalities, and those that are to be at least zero; None where there are none."""
+    """Rows of a constraint that are equalities, and those that must be at least zero; None if there are none."""
     size = np.atleast_1d(term.value(bodies.start_state)).shape
     lower, upper = np.broadcast_to(term.lower, size), np.broadcast_to(term.upper, size)
     equal = np.flatnonzero(lower == upper)
@@ -95,7 +96,7 @@ def _dense(part: Wrench | Array, state: State) -> Array:
 
 
 def _reads(bodies: FigureBodies) -> Mask:
-    """(7 n,) which variables the tangent depends on: all turns, and the place of a free root."""
+    """(7 n,) the variables on which the tangent depends: all rotations, and the position of a free root."""
     result = np.zeros((bodies.count, 7), dtype=bool)
     result[:, 3:] = True
     if bodies.floating:

@@ -1,4 +1,4 @@
-"""Goals and constraints of a problem as equations of bodies; terms of other classes by their rows in the tangent."""
+"""Goals and constraints of a problem as equations of bodies; terms of users' classes by their rows in the tangent."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ from wholebody.tasks.residuals import PlacementResidual
 
 
 def state_equations(problem: Problem, state: State) -> None:
-    """State all equations of a problem once, for what it may be refused for.
+    """Build all equations of a problem once, to find unsupported terms.
 
     Args:
-        problem: what is asked.
+        problem: the problem.
         state: it is moved to the problem's start.
 
     Raises:
@@ -59,7 +59,7 @@ def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]
     """Equations of goals.
 
     Raises:
-        UnsupportedTermError: a goal that has none here.
+        UnsupportedTermError: a goal has no equations here.
     """
     result = EquationSet()
     for number, goal in enumerate(goals):
@@ -88,7 +88,7 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
     """Equations of constraints.
 
     Raises:
-        UnsupportedTermError: one that has none here.
+        UnsupportedTermError: one has no equations here.
     """
     result = EquationSet()
     for number, term in enumerate(problem.constraints):
@@ -117,17 +117,17 @@ def bound_equations(problem: Problem, state: State) -> EquationSet:
     """Equations of bounds.
 
     Args:
-        problem: whose bounds.
+        problem: gives the bounds.
         state: of the run; it is moved to the problem's start.
 
     Raises:
-        UnsupportedTermError: one that has none here.
+        UnsupportedTermError: one has no equations here.
     """
     result = EquationSet()
     for number, bound in enumerate(problem.bounds):
         if isinstance(bound, Freeze):
             _frozen(result, problem, bound, state)
-        elif not isinstance(bound, StepLimit):  # a solve is not tied to time, so a step limit bounds nothing
+        elif not isinstance(bound, StepLimit):  # a solve has no time step, so a step limit bounds nothing
             raise UnsupportedTermError(
                 "newton", [f"bounds[{number}], {type(bound).__name__} (it takes Freeze and StepLimit)"]
             )
@@ -135,7 +135,7 @@ def bound_equations(problem: Problem, state: State) -> EquationSet:
 
 
 def _axis(equations: EquationSet, problem: Problem, goal: Axis, label: str) -> None:
-    """An axis along a direction, or towards a place."""
+    """An axis along a direction, or towards a point."""
     local, joint = _local(problem, goal.place.frame), goal.place.joint
     if goal.toward is None:
         ours = pin.Quaternion(axes_with_z((local.rotation @ goal.basis[2])[None])[0])
@@ -189,7 +189,7 @@ def _placement(
 
 
 def _frozen(equations: EquationSet, problem: Problem, bound: Freeze, state: State) -> None:
-    """Joints that keep their placement to their parent."""
+    """Joints that keep their placement relative to their parent."""
     figure, model = problem.scene.figure, problem.scene.model
     state.update(problem.start)
     for name in figure.joint_names(bound.joints):
@@ -198,7 +198,7 @@ def _frozen(equations: EquationSet, problem: Problem, bound: Freeze, state: Stat
         here = state.data.oMi[parent].actInv(state.data.oMi[joint])
         label = f"Freeze, {name!r}"
         if model.joints[joint].nv == 1 and model.joints[joint].shortname().startswith("JointModelR"):
-            # the joint's own equations leave only this turn: one of the three rows, the others tolerated as redundant
+            # the joint's own equations leave only this rotation: one of the three rows, the others are redundant
             equations.turn(parent - 1, joint - 1, label, pin.Quaternion(here.rotation), pin.Quaternion.Identity(), 3)
         else:
             equations.coincide(parent - 1, joint - 1, label, np.array(here.translation), np.zeros(3))
@@ -215,10 +215,10 @@ def _as_made(batch: Batch) -> Callable[[int], Batch]:
 
 
 def _check_own(bodies: FigureBodies, label: str) -> None:
-    """Refuse a term of another class where a figure's tangent is not a function of its bodies here.
+    """Refuse a term of a user's class if the figure's tangent is not a function of its bodies here.
 
     Raises:
-        UnsupportedTermError: it has joints other than turning ones and one free root.
+        UnsupportedTermError: the figure has joints other than revolute ones and one free root.
     """
     if bodies.uncharted:
         reason = f"its rows need turning joints and one free root, and {bodies.uncharted[0]!r} is neither"

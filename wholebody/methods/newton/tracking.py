@@ -1,4 +1,4 @@
-"""Goals that move, followed by Newton's method: what was laid out for a problem is kept from frame to frame."""
+"""Tracking of moving goals by Newton's method: the equations and their analysis are kept from frame to frame."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
 
-FRAME_TOLERANCE = 1e-4  # m, rad: on the way of a drag; its end is solved to the method's own
-FRAME_ITERATIONS = 12  # most of one frame; a goal that asks for more is followed over the next frames
+FRAME_TOLERANCE = 1e-4  # m, rad: in the frames of a drag; its end is solved to the method's tolerance
+FRAME_ITERATIONS = 12  # most iterations of one frame; a farther goal is followed over several frames
 
 
 class NewtonStep(NamedTuple):
@@ -33,7 +33,7 @@ class NewtonStep(NamedTuple):
         q: (nq,) the next posture.
         iterations: Newton iterations.
         systems: linear systems solved.
-        structures: how often the pattern has been laid out since the tracker was made.
+        structures: number of patterns analysed since the tracker was made.
     """
 
     q: Array
@@ -46,13 +46,13 @@ class NewtonTracker:
     """Follows the goals of one problem, frame by frame.
 
     Goals, other terms and clearances of the problem may be replaced between calls, and things may be moved. A tracker
-    remembers the frame before, so it is for one figure and one thread at a time.
+    remembers the previous frame, so it serves one motion and one thread at a time.
 
     Attributes:
-        problem: whose goals are followed.
-        dt: seconds a frame; None where frames are not tied to time.
-        workspace: its own; between calls it may be moved.
-        unswept: radians and metres: shorter ways go into nothing, as every iteration of a frame was looked after.
+        problem: the problem whose goals it follows.
+        dt: seconds a frame; None for frames without a time step.
+        workspace: its own workspace; between calls others may move it.
+        unswept: radians and metres: shorter motions need no sweep, because every iteration of a frame was tested.
         leaves_overlap: True.
     """
 
@@ -60,14 +60,14 @@ class NewtonTracker:
     leaves_overlap = True
 
     def __init__(self, problem: Problem, algebra: str, settings: Settings, dt: float | None, method: Method) -> None:
-        """Lay out the equations.
+        """Build the equations.
 
         Args:
-            problem: whose goals are followed.
+            problem: the problem whose goals it follows.
             algebra: name of the factorisation.
             settings: of whole solves.
-            dt: seconds a frame; None where frames are not tied to time.
-            method: for solves whose measures count from elsewhere.
+            dt: seconds a frame; None for frames without a time step.
+            method: for solves with measures relative to another posture.
 
         Raises:
             InputError: the problem has a term that this method has no equations for, or dt is not positive and finite.
@@ -83,12 +83,12 @@ class NewtonTracker:
         """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
 
         Args:
-            q: where the frame begins.
+            q: posture at the beginning of the frame.
             tolerance: of the goals, metres and radians.
 
         Raises:
-            InputError: objects came to or left the scene, a new term has no equations, or another thread is within a
-                call of this tracker.
+            InputError: objects were added to or removed from the scene, a new term has no equations, or another thread
+                is within a call of this tracker.
         """
         q = posture(q, self.workspace.model.nq)
         tolerance = number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
@@ -115,16 +115,16 @@ class NewtonTracker:
         return self.step(q, FRAME_TOLERANCE if tolerance is None else tolerance)
 
     def nearest(self, q: Array) -> Solution:
-        """The method's answer from q (nq,), with measures that count from there."""
+        """The method's answer from q (nq,), with measures relative to q."""
         return self._method.solve(nearest_to(self.problem, q))
 
     def ways_out(self, q: Array) -> Sequence[Array]:
-        """None: the steps lead out."""
+        """No postures: the steps lead out."""
         posture(q, self.workspace.model.nq)
         return ()
 
     def solve(self, q: Array) -> Solution:
-        """The straight way from the posture q (nq,) to the problem's present goals; no other starts are tried.
+        """Solve for the problem's present goals from the posture q (nq,), without other starts.
 
         Raises:
             InputError: as for `step`.
@@ -137,12 +137,12 @@ class NewtonTracker:
 
     @property
     def pattern(self) -> Pattern:
-        """Where the Jacobian can be other than zero."""
+        """Structural non-zeros of the Jacobian."""
         return self._course.system.pattern
 
     @property
     def laid_out(self) -> tuple[int, float]:
-        """How many patterns were needed, and the processor's time to lay them out and analyse them [s]."""
+        """Number of patterns, and the processor's time of their analysis [s]."""
         return self._course.structures, self._course.laying
 
     def _lay_out(self) -> None:
@@ -151,7 +151,7 @@ class NewtonTracker:
         self._terms = (problem.constraints, problem.bounds, problem.measures)
 
     def _renewed(self) -> FigureSystem:
-        """The equations of the problem with its present goals; laid out anew where other terms were replaced."""
+        """The equations of the problem with its present goals; built anew if other terms were replaced."""
         problem = self.problem
         problem.check_fresh()
         self.workspace.refresh()

@@ -1,1 +1,1 @@
-"""The method placo: the tasks of placo's KinematicsSolver, iterated until a problem is solved."""
+"""The method placo: placo's KinematicsSolver, iterated until a problem is solved."""

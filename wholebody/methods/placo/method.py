@@ -6,33 +6,22 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-import pinocchio as pin
-
 from wholebody.arrays import Array
-from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.differential import COMFORT, REGULAR, Iteration, Settings, StepError
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, named_frames, unsupported
 from wholebody.problem import Problem
-from wholebody.solution import Solution, TraceEntry
+from wholebody.solution import Solution
 from wholebody.workspace import Workspace
 
 STEP = 0.05  # rad, m: most that a joint or the root moves in one iteration
 NEAR = 0.1  # m: pairs nearer than this have a row; placo's trigger
-SHARE = 0.5  # of the tolerance: to what everything is met, so that the judge, who rounds otherwise, agrees
 LET_IN = 0.4  # share of the tolerance by which pairs may be nearer than their clearance
-REST = 1e-2  # share of the tolerance: a step smaller than this has come to rest
-COMFORT = 1e-2  # weight of the measures at the beginning, against goals of weight 1
-DECAY = 0.75  # of that weight from one iteration to the next; less ends sooner and with more effort
-LEAST = 1e-3  # share of the tolerance: least weight of the measures, which goals then miss by less than the tolerance
-REGULAR = 1e-3  # share of the measures' weight: what moving itself costs
-DAMPING = 1e-3  # what moving costs once a step goes back on the one before, against goals of weight 1
-STIFFER, LOOSER = 4.0, 0.5  # factors on that, after another such step and after any other
-MOST_DAMPING = 10.0
+DECAY = 0.75  # of the measures' weight from one iteration to the next; less ends sooner and with more effort
 
 
 @dataclass(frozen=True)
@@ -105,12 +94,12 @@ class Placo:
             problem.scene.built.pool(_Room, _Room).lend() as room,
             Control(self.time_limit, progress) as control,
         ):
-            run = _Run(problem, workspace, room.robot(problem, workspace), self, control)
+            stepper = _Programs(problem, room.robot(problem, workspace), self.tolerance)
+            settings = Settings(self.tolerance, self.iterations, STEP, DECAY)
+            run = Iteration(problem, workspace, stepper, settings, control)
             run.go()
-        failure = f"placo gave up at program {run.programs} ({run.failure})" if run.failure else ""
-        ending = Ending(
-            run.q, run.rested, run.programs, tuple(run.trace), f"in {run.programs} programs", failure=failure
-        )
+        failure = f"placo gave up at program {run.steps} ({run.failure})" if run.failure else ""
+        ending = Ending(run.q, run.rested, run.steps, tuple(run.trace), f"in {run.steps} programs", failure=failure)
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
@@ -140,25 +129,13 @@ class _Room:
         return self._robot
 
 
-class _Run:
-    """One solve.
+class _Programs:
+    """placo's programs for one problem."""
 
-    Attributes:
-        q: (nq,) the present posture.
-        programs: how many were solved.
-        rested: whether it ended because nothing moves any more.
-        failure: placo's words where it found no solution.
-    """
-
-    def __init__(self, problem: Problem, workspace: Workspace, robot: Robot, method: Placo, control: Control) -> None:
+    def __init__(self, problem: Problem, robot: Robot, tolerance: float) -> None:
         import placo
 
-        self._problem, self._robot, self._method, self._control = problem, robot, method, control
-        self._proximity, self._state = workspace.proximity, workspace.state
-        self.q: Array = problem.scene.figure.clamp(problem.start)
-        self.trace: list[TraceEntry] = []
-        self.programs, self.rested, self.failure = 0, False, ""
-        self._damping, self._last = 0.0, np.zeros(problem.scene.model.nv)
+        self._robot = robot
         self._solver: Any = placo.KinematicsSolver(robot.wrapper)
         self._tasks = add_terms(self._solver, robot, problem)
         self._regular = self._solver.add_regularization_task(REGULAR * COMFORT)
@@ -168,70 +145,17 @@ class _Run:
         self._solver.enable_velocity_limits(True)
         apart = self._solver.add_avoid_self_collisions_constraint()
         # rounding alone makes a held foot on a floor infeasible
-        apart.self_collisions_margin = -SWELL - LET_IN * method.tolerance
+        apart.self_collisions_margin = -SWELL - LET_IN * tolerance
         apart.self_collisions_trigger = NEAR - SWELL
         apart.configure("apart", "hard", 1.0)
 
-    def go(self) -> None:
-        """TraceEntry until everything is met, nothing moves, placo gives up or the programs run out."""
-        method, model = self._method, self._problem.scene.model
-        step = 0.0
-        while True:
-            error, violation = self._look()
-            self.trace.append(TraceEntry(error, violation, 0.0, step))
-            self._control.tell(self.trace[-1])
-            enough = SHARE * method.tolerance
-            if max(error, violation) <= enough and self._apart(enough):
-                return
-            if self.programs and step <= REST * method.tolerance:
-                self.rested = True
-                return
-            if self.programs == method.iterations or self._control.over:
-                return
-            move = self._program()
-            if move is None:
-                return
-            moved = self._problem.scene.figure.clamp(np.asarray(pin.integrate(model, self.q, move)))
-            step = float(np.abs(pin.difference(model, self.q, moved)).max(initial=0.0))
-            self.q = moved
-
-    def _look(self) -> tuple[float, float]:
-        """The largest error of a goal and of a constraint, metres or radians."""
-        state = self._state.update(self.q)
-        errors, violations = [0.0], [0.0]
-        for goal in self._problem.goals:
-            error = np.atleast_1d(goal.error(state))
-            angular = np.broadcast_to(goal.angular, error.shape)
-            errors += [float(np.linalg.norm(error[angular])), float(np.linalg.norm(error[~angular]))]
-        for term in self._problem.constraints:
-            value = np.atleast_1d(term.value(state))
-            violations.append(float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0)))
-        return max(errors), max(violations)
-
-    def _apart(self, tolerance: float) -> bool:
-        """Whether all pairs keep their clearance."""
-        clearances = self._problem.clearances
-        near = self._proximity.near(self._state.data, float(clearances.max(initial=0.0)))
-        return bool((near.distance >= clearances[near.number] - tolerance - COAL_ACCURACY).all())
-
-    def _program(self) -> Array | None:
-        """Displacement (nv,) by one of placo's programs, or None where it has no solution."""
-        weight = max(COMFORT * DECAY**self.programs, LEAST * self._method.tolerance)
+    def step(self, q: Array, weight: float, damping: float) -> Array:
+        """Displacement (nv,) by one program; see `wholebody.methods.differential.Stepper`."""
         self._tasks.weigh(weight)
-        self._regular.set_weight(max(REGULAR * weight, self._damping))
-        self._robot.move(self.q)
-        self.programs += 1
+        self._regular.set_weight(damping)
+        self._robot.move(q)
         try:
             theirs = self._solver.solve(False)
         except RuntimeError as error:
-            self.failure = " ".join(str(error).split())
-            return None
-        move = self._robot.displacement(theirs)
-        if not np.isfinite(move).all():
-            self.failure = "a displacement that is not a number"
-            return None
-        move = move * min(1.0, STEP / max(float(np.abs(move).max(initial=0.0)), STEP))
-        back = float(move @ self._last) < 0.0
-        self._damping = min(max(STIFFER * self._damping, DAMPING), MOST_DAMPING) if back else LOOSER * self._damping
-        self._last = move
-        return move
+            raise StepError(" ".join(str(error).split())) from None
+        return self._robot.displacement(theirs)

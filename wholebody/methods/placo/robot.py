@@ -1,8 +1,8 @@
-"""A scene as placo sees it: a robot with a floating base, whose collision model holds the objects too.
+"""placo's robot for a scene: it has a floating base, and its collision model includes the objects.
 
-placo reads robots from URDF. What it reads here is a skeleton: links, the kinds and axes of joints, and a link for
-every frame that a task names. Placements, limits and inertias, which a URDF rounds, and the pieces are then copied from
-our model.
+placo reads robots from URDF. Here it reads a skeleton: links, the kinds and axes of joints, and a link for every frame
+that a task names. Placements, limits and inertias, which a URDF would round, and the pieces are then copied from our
+model.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from wholebody.methods.base import UnsupportedTermError
 from wholebody.problem import Problem
 
 SWELL = 0.005
-"""Metres by which pieces are swollen beyond their clearance, and which placo's margin takes off again.
+"""Metres by which pieces are enlarged beyond their clearance, and which placo's margin subtracts again.
 
-placo takes the direction of a row from the two nearest points. Where pieces just touch these are one and it has none;
-swollen pieces overlap there instead.
+placo computes the direction of a row from the two nearest points. Where pieces just touch, these coincide and give no
+direction; enlarged pieces overlap there instead.
 """
 
 ENDLESS = 1e6  # rad, m: limit of a joint that has none
@@ -36,14 +36,14 @@ class Robot:
 
     Attributes:
         wrapper: the placo.RobotWrapper.
-        frames: the frames that tasks can name -> the index of the joint and the place in it.
+        frames: the frames that tasks can name -> the index of the joint and the placement in it.
     """
 
     def __init__(self, problem: Problem, frames: Mapping[str, tuple[int, pin.SE3]]) -> None:
         """Build it.
 
         Args:
-            problem: its scene, and the clearances of its pairs.
+            problem: gives the scene, and the clearances of its pairs.
             frames: names of the frames that tasks use -> joint of our model and placement in it.
 
         Raises:
@@ -72,18 +72,18 @@ class Robot:
         return self._root == "free"
 
     def move(self, q: Array) -> None:
-        """Take our posture q (nq,)."""
+        """Move to our posture q (nq,)."""
         theirs = pin.neutral(self.wrapper.model)
         theirs[self._idx_q] = q
         self.wrapper.state.q = theirs
         self.wrapper.update_kinematics()
 
     def serves(self, problem: Problem, frames: Mapping[str, tuple[int, pin.SE3]]) -> bool:
-        """Whether it was built for such a problem of the same scene: its clearances, and these frames or more."""
+        """Whether it fits another problem of the same scene: the same clearances, and these frames or more."""
         return set(frames) <= set(self.frames) and np.array_equal(self._clearances, problem.clearances)
 
     def place_objects(self, ours: pin.GeometryModel) -> None:
-        """Move the pieces to where a geometry model like the scene's has them."""
+        """Copy the placements of the pieces from a geometry model like the scene's."""
         model = self.wrapper.collision_model
         for index, number in enumerate(self._pieces):
             model.geometryObjects[index].placement = ours.geometryObjects[number].placement
@@ -124,8 +124,8 @@ class Robot:
     def _copy_pieces(self, problem: Problem) -> list[int]:
         """Add the pieces of all pairs; return the number of each one in our geometry model.
 
-        placo asks one margin of all pairs, a problem a clearance of each: so the first piece of a pair is swollen by
-        the clearance, once for every clearance that it has.
+        placo has one margin for all pairs, but a problem has a clearance for each. So the first piece of a pair is
+        enlarged by the clearance, once for every clearance that it has.
         """
         scene, model = problem.scene.geometry, self.wrapper.collision_model
         numbers: list[int] = []
@@ -149,7 +149,7 @@ class Robot:
 
 
 def _skeleton(figure: Figure, frames: Mapping[str, tuple[int, pin.SE3]]) -> ElementTree.Element:
-    """URDF of links and joints without places, and of a link for every frame."""
+    """URDF of links and joints without placements, and of a link for every frame."""
     model = figure.model
     robot = ElementTree.Element("robot", name="figure")
     root = 1 if figure.root == "free" else 0
@@ -177,7 +177,7 @@ def _joint(robot: ElementTree.Element, name: str, kind: str, parent: str, child:
 
 
 def unsupported_joints(figure: Figure) -> list[str]:
-    """The first joint of a kind that placo's robots do not have, with the reason; empty without one."""
+    """The first joint of a kind that placo's robots do not have, with the reason; empty if there is none."""
     model = figure.model
     for index in range(2 if figure.root == "free" else 1, model.njoints):
         if _urdf_kind(model.joints[index]) is None:

@@ -1,4 +1,4 @@
-"""A problem's terms as placo's tasks and constraints; what it has no class for is refused by name."""
+"""A problem's terms as placo's tasks and constraints; terms without a class in placo are refused by name."""
 
 from __future__ import annotations
 
@@ -39,27 +39,27 @@ REASONS = {
     "Plane": "placo has no half-spaces for frames",
     "ReachCones": "placo's cones are circular",
 }
-"""Why a term is refused where its class alone does not say it."""
+"""Reasons of refusals that the name of the term's class does not explain."""
 
 
 @dataclass
 class Tasks:
-    """What was added to a solver that changes while it runs.
+    """The tasks whose weight changes while the solver runs.
 
     Attributes:
-        comfort: the tasks that stand for the measures, with the share of the weight that each has.
+        comfort: the tasks of the measures, with the share of the weight of each.
     """
 
     comfort: list[tuple[Any, float]] = field(default_factory=list)
 
     def weigh(self, weight: float) -> None:
-        """Give the measures a weight against the goals."""
+        """Set the weight of the measures against the goals."""
         for number, (task, share) in enumerate(self.comfort):
             task.configure(f"measure {number}", "soft", weight * share)
 
 
 def unsupported(problem: Problem) -> list[str]:
-    """What placo has no class for, each with the reason: terms, and joints of another kind than its robots have."""
+    """Terms and joints without a class in placo, each with the reason."""
     refused = []
     for where, term in named_terms(problem):
         if not _takes(term):
@@ -78,7 +78,7 @@ def _takes(term: object) -> bool:
 
 
 def named_frames(problem: Problem) -> Frames:
-    """The frames that the tasks will name: joint and placement in it."""
+    """The frames that the tasks name: joint and placement in it."""
     found: Frames = {}
     for term in (*problem.goals, *problem.constraints):
         if isinstance(term, Point):
@@ -104,14 +104,14 @@ def _name(place: Place, offset: Array | None = None) -> str:
 
 
 def add_terms(solver: Any, robot: Robot, problem: Problem) -> Tasks:
-    """Give placo's solver the goals as soft tasks, what must hold as hard ones, and the measures."""
+    """Add the goals to placo's solver as soft tasks, constraints as hard ones, and the measures."""
     tasks = Tasks()
     for number, goal in enumerate(problem.goals):
         _goal(solver, robot, problem, f"goal {number}", goal)
     for number, term in enumerate(problem.constraints):
         _constraint(solver, f"constraint {number}", term)
     for bound in problem.bounds:
-        if isinstance(bound, Freeze):  # a solve is not tied to time, so a step limit bounds nothing
+        if isinstance(bound, Freeze):  # a solve has no time step, so a step limit bounds nothing
             _freeze(solver, robot, problem, bound)
     if not robot.floating:
         solver.mask_fbase(True)
@@ -193,7 +193,7 @@ def _freeze(solver: Any, robot: Robot, problem: Problem, bound: Freeze) -> None:
 
 
 def _measure(solver: Any, robot: Robot, problem: Problem, measure: Effort | Displacement, tasks: Tasks) -> None:
-    """Weighted squared distance from a posture: a joints task for every weight that occurs."""
+    """Weighted squared distance from a posture: a joints task for every distinct weight."""
     weights = measure.distance.weights
     for value in sorted(set(weights[weights > 0.0].tolist())):
         values = _joint_values(robot, problem, measure.distance.reference, np.flatnonzero(weights == value).tolist())

@@ -61,13 +61,17 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
     program.check_shapes(guess)
     x = np.empty(program.size)
     active = ActiveSet(guess.lower.copy(), guess.upper.copy(), guess.elastic.copy())
+    kernel = compiled_kernel()
     parts = (
         program.diagonal, program.linear, program.rows, program.target, program.weight, program.elastic, program.least,
         program.elastic_weight, program.lower, program.upper,
     )  # fmt: skip
-    settled = compiled_kernel().settle(
-        *map(np.ascontiguousarray, parts), *active, corrections, FULL_CORRECTIONS, BOUND_TOLERANCE, ROW_TOLERANCE, x
-    )
+    elastic = len(program.least)
+    settled = kernel.settle(
+        *map(np.ascontiguousarray, parts), np.arange(elastic), *active, corrections, FULL_CORRECTIONS, BOUND_TOLERANCE,
+        ROW_TOLERANCE, np.empty(kernel.work_size(program.size, len(program.target), elastic)),
+        np.empty(elastic, dtype=np.intp), x,
+    )  # fmt: skip
     return QPSolution(x, active, True, 0) if settled else None
 
 
@@ -77,10 +81,15 @@ def compiled_kernel() -> Any:
     from wholebody.methods.qp import active_set_kernel
 
     none, one, mask = np.zeros(0), np.ones(1), np.zeros(1, dtype=bool)
+    program = (one, one, np.zeros((0, 1)), none, none, np.zeros((0, 1)), none, none, -one, one)
+    index, row = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=bool)
+    work = np.empty(active_set_kernel.work_size(1, 0, 0))
     active_set_kernel.settle(
-        one, one, np.zeros((0, 1)), none, none, np.zeros((0, 1)), none, none, -one, one, mask, mask.copy(),
-        np.zeros(0, dtype=bool), 1, 1, BOUND_TOLERANCE, ROW_TOLERANCE, np.zeros(1),
-    )  # fmt: skip
+        *program, index, mask, mask.copy(), row, 1, 1, BOUND_TOLERANCE, ROW_TOLERANCE, work, index, np.zeros(1)
+    )
+    active_set_kernel.solve_growing(
+        *program, index, index, mask, mask.copy(), row, row, np.ones(6), work, np.zeros(1, dtype=np.intp), np.zeros(1)
+    )
     return active_set_kernel
 
 

@@ -4,8 +4,76 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
+
+
+@compiled(error_model="numpy")
+def solve_growing(
+    diagonal: Array,
+    linear: Array,
+    rows: Array,
+    target: Array,
+    weight: Array,
+    elastic: Array,
+    least: Array,
+    elastic_weight: Array,
+    lower: Array,
+    upper: Array,
+    key: Indices,
+    known: Indices,
+    at_lower: Mask,
+    at_upper: Mask,
+    pushing: Mask,
+    chosen: Mask,
+    limits: Array,
+    work: Array,
+    places: Indices,
+    x: Array,
+) -> int:
+    """Solve a program from the active set of the one before, with the elastic rows that matter; see `WorkingSet`.
+
+    The first ten arguments are the program. `key` (k,) names its elastic rows, `known` the rows that pushed in the
+    program before, in ascending order. `at_lower` and `at_upper` (n,) are the bounds that held x then; they become
+    those that hold it now. `pushing` and `chosen` (k,), `work` (see `work_size`) and `places` (2 k,) are room; x (n,)
+    becomes the minimiser. `limits` are the violation below which a row is left out, rounds, corrections, corrections of
+    everything at once, and the tolerances of bounds and of rows.
+
+    Returns:
+        How often rows were added, or -1 where the active set of a round did not settle.
+    """
+    k = len(least)
+    for j in range(k):
+        place = np.searchsorted(known, key[j])
+        pushing[j] = place < len(known) and known[place] == key[j]
+        chosen[j] = least[j] > -limits[0] or pushing[j]
+    rounds = int(limits[1])
+    for attempt in range(rounds + 1):
+        count = 0
+        for j in range(k):
+            if chosen[j] or attempt == rounds:
+                chosen[j] = True
+                places[count] = j
+                count += 1
+        settled = settle(
+            diagonal, linear, rows, target, weight, elastic, least, elastic_weight, lower, upper, places[:count],
+            at_lower, at_upper, pushing, int(limits[2]), int(limits[3]), limits[4], limits[5], work, places[k:], x,
+        )  # fmt: skip
+        if not settled:
+            return -1
+        missed = False
+        for j in range(k):
+            if not chosen[j] and _dot(elastic[j], x) < least[j] - 1e-9:
+                chosen[j] = missed = True
+        if not missed:
+            return attempt
+    return rounds
+
+
+def work_size(variables: int, soft: int, elastic: int) -> int:
+    """Floats that `settle` needs for a program of so many variables, soft rows and elastic rows."""
+    rows = soft + elastic
+    return 2 * rows * variables + rows * rows + 3 * rows + elastic + 3 * variables
 
 
 @compiled(error_model="numpy")
@@ -20,6 +88,7 @@ def settle(
     elastic_weight: Array,
     lower: Array,
     upper: Array,
+    places: Indices,
     at_lower: Mask,
     at_upper: Mask,
     pushing: Mask,
@@ -27,30 +96,44 @@ def settle(
     full_corrections: int,
     bound_tolerance: float,
     row_tolerance: float,
+    work: Array,
+    active: Indices,
     x: Array,
 ) -> bool:
     """Correct an active set, in place, until it is right; x (n,) becomes the minimiser.
 
+    The first ten arguments are the program, of which the elastic rows `places` (c,) count. `at_lower` and `at_upper`
+    (n,) say which bounds hold x, `pushing` (k,) which elastic rows push. Of at most `corrections` sets the first
+    `full_corrections` put right all that is wrong, the others only the worst entry. An x may be out of its bounds by
+    `bound_tolerance`, a row violated by `row_tolerance`. `work` (see `work_size`) and `active` (c,) are room.
+
     Returns:
         Whether it is right: false after so many corrections, and where a set has no finite minimiser.
     """
-    n, m, k = len(diagonal), len(target), len(least)
-    stacked = np.empty((m + k, n))
-    stacked[:m] = rows
-    scaled = np.empty((m + k, n))
-    right, compliance = np.empty(m + k), np.empty(m + k)
-    right[:m] = target
-    for i in range(m):
-        compliance[i] = 1.0 / weight[i]
-    inverse, gradient, trial, multiplier = np.empty(n), np.empty(n), np.empty(n), np.empty(m + k)
-    push, active = np.empty(k), np.empty(k, dtype=np.int64)
-    next_lower, next_upper, next_pushing = np.empty(n, np.bool_), np.empty(n, np.bool_), np.empty(k, np.bool_)
+    n, m, k = len(diagonal), len(target), len(places)
+    most = m + k
+    stacked = work[: most * n].reshape((most, n))
+    scaled = work[most * n : 2 * most * n].reshape((most, n))
+    begin = 2 * most * n
+    table = work[begin : begin + most * most]
+    begin += most * most
+    right, compliance, multiplier = work[begin:][:most], work[begin + most :][:most], work[begin + 2 * most :][:most]
+    begin += 3 * most
+    reached, begin = work[begin:][:k], begin + k
+    inverse, gradient, trial = work[begin:][:n], work[begin + n :][:n], work[begin + 2 * n :][:n]
+    for r in range(m):
+        compliance[r] = 1.0 / weight[r]
+        right[r] = target[r]
+        for i in range(n):
+            stacked[r, i] = rows[r, i]
     for attempt in range(corrections):
         count = 0
-        for j in range(k):
+        for c in range(k):
+            j = places[c]
             if pushing[j]:
-                active[count] = j
-                stacked[m + count] = elastic[j]
+                active[count] = c
+                for i in range(n):
+                    stacked[m + count, i] = elastic[j, i]
                 right[m + count] = least[j]
                 compliance[m + count] = 1.0 / elastic_weight[j]
                 count += 1
@@ -62,26 +145,32 @@ def settle(
             gradient[i] = linear[i]
         in_columns = size > n
         if 0 < size <= n:
+            system = table[: size * size].reshape((size, size))
             for r in range(size):
                 for i in range(n):
                     scaled[r, i] = stacked[r, i] * inverse[i]
-            system = np.dot(scaled[:size], stacked[:size].T)
-            multiplier[:size] = np.dot(stacked[:size], x) - np.dot(scaled[:size], linear) - right[:size]
+                multiplier[r] = _dot(stacked[r], x) - _dot(scaled[r], linear) - right[r]
+            _gram(scaled, stacked, size, system)
             for r in range(size):
                 system[r, r] += compliance[r]
             in_columns = not _solve(system, multiplier[:size])
             if not in_columns:
-                pull = linear + np.dot(multiplier[:size], stacked[:size])
                 for i in range(n):
-                    trial[i] = x[i] - inverse[i] * pull[i]
-                left = np.dot(stacked[:size], trial) - right[:size] - compliance[:size] * multiplier[:size]
-                in_columns = not np.abs(left).max() <= row_tolerance
+                    trial[i] = linear[i]
+                for r in range(size):
+                    _add(multiplier[r], stacked[r], trial)
+                for i in range(n):
+                    trial[i] = x[i] - inverse[i] * trial[i]
+                worst = 0.0
+                for r in range(size):
+                    left = abs(_dot(stacked[r], trial) - right[r] - compliance[r] * multiplier[r])
+                    if not left <= worst:
+                        worst = left
+                in_columns = not worst <= row_tolerance
         if in_columns:
             _minimise_in_columns(stacked, right, compliance, size, diagonal, linear, inverse, x, multiplier)
-        if size:
-            gradient += np.dot(multiplier[:size], stacked[:size])
-        for j in range(count):
-            push[j] = -multiplier[m + j]
+        for r in range(size):
+            _add(multiplier[r], stacked[r], gradient)
         for i in range(n):
             if not in_columns:
                 x[i] -= inverse[i] * gradient[i]
@@ -90,46 +179,103 @@ def settle(
                 return False
         same = True
         for i in range(n):
-            next_lower[i] = gradient[i] >= 0.0 if at_lower[i] else x[i] < lower[i] - bound_tolerance
-            next_upper[i] = gradient[i] <= 0.0 if at_upper[i] else x[i] > upper[i] + bound_tolerance
-            same = same and next_lower[i] == at_lower[i] and next_upper[i] == at_upper[i]
-        reached = np.dot(elastic, x)
-        for j in range(k):
-            next_pushing[j] = reached[j] < least[j] - row_tolerance
-        for j in range(count):
-            next_pushing[active[j]] = push[j] >= 0.0
-        for j in range(k):
-            same = same and next_pushing[j] == pushing[j]
+            if at_lower[i]:
+                same = same and gradient[i] >= 0.0
+            elif at_upper[i]:
+                same = same and gradient[i] <= 0.0
+            else:
+                same = same and lower[i] - bound_tolerance <= x[i] <= upper[i] + bound_tolerance
+        for c in range(k):
+            j = places[c]
+            reached[c] = _dot(elastic[j], x)
+            same = same and (pushing[j] or reached[c] >= least[j] - row_tolerance)
+        for a in range(count):
+            same = same and multiplier[m + a] <= 0.0
         if same:
             for i in range(n):
                 x[i] = min(max(x[i], lower[i]), upper[i])
             return True
         if attempt < full_corrections:
-            at_lower[:], at_upper[:], pushing[:] = next_lower, next_upper, next_pushing
+            for i in range(n):
+                held_low, held_high = at_lower[i], at_upper[i]
+                at_lower[i] = gradient[i] >= 0.0 if held_low else x[i] < lower[i] - bound_tolerance
+                at_upper[i] = gradient[i] <= 0.0 if held_high else x[i] > upper[i] + bound_tolerance
+            following = 0
+            for c in range(k):
+                j = places[c]
+                if pushing[j]:
+                    pushing[j] = multiplier[m + following] <= 0.0
+                    following += 1
+                else:
+                    pushing[j] = reached[c] < least[j] - row_tolerance
             continue
         # only the entry that is most wrong, in units of x
         worst, kind, place = -np.inf, 0, 0
         for i in range(n):
             pull = abs(gradient[i]) / diagonal[i]
-            if next_lower[i] != at_lower[i]:
+            next_lower = gradient[i] >= 0.0 if at_lower[i] else x[i] < lower[i] - bound_tolerance
+            next_upper = gradient[i] <= 0.0 if at_upper[i] else x[i] > upper[i] + bound_tolerance
+            if next_lower != at_lower[i]:
                 wrong = pull if at_lower[i] else lower[i] - x[i]
                 if wrong > worst:
                     worst, kind, place = wrong, 0, i
-            if next_upper[i] != at_upper[i]:
+            if next_upper != at_upper[i]:
                 wrong = pull if at_upper[i] else x[i] - upper[i]
                 if wrong > worst:
                     worst, kind, place = wrong, 1, i
         following = 0
-        for j in range(k):
-            violated = least[j] - reached[j]
+        for c in range(k):
+            j = places[c]
+            violated = least[j] - reached[c]
+            flips = violated > row_tolerance
             if pushing[j]:
-                violated = -push[following] * np.sum(elastic[j] ** 2 / diagonal)
+                flips = not multiplier[m + following] <= 0.0
+                norm = 0.0
+                for i in range(n):
+                    norm += elastic[j, i] * elastic[j, i] / diagonal[i]
+                violated = multiplier[m + following] * norm
                 following += 1
-            if next_pushing[j] != pushing[j] and violated > worst:
+            if flips and violated > worst:
                 worst, kind, place = violated, 2, j
         mask = at_lower if kind == 0 else (at_upper if kind == 1 else pushing)
         mask[place] = not mask[place]
     return False
+
+
+@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
+def _dot(a: Array, b: Array) -> float:
+    total = 0.0
+    for i in range(len(b)):
+        total += a[i] * b[i]
+    return total
+
+
+@compiled()
+def _add(factor: float, row: Array, total: Array) -> None:
+    for i in range(len(total)):
+        total[i] += factor * row[i]
+
+
+@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
+def _gram(scaled: Array, stacked: Array, size: int, system: Array) -> None:
+    """Lower triangle (size, size) of the products of rows, four at a time."""
+    n = stacked.shape[1]
+    for r in range(size):
+        own = scaled[r]
+        s = 0
+        while s + 3 <= r:
+            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+            for i in range(n):
+                entry = own[i]
+                a += entry * stacked[s, i]
+                b += entry * stacked[s + 1, i]
+                c += entry * stacked[s + 2, i]
+                d += entry * stacked[s + 3, i]
+            system[r, s], system[r, s + 1], system[r, s + 2], system[r, s + 3] = a, b, c, d
+            s += 4
+        while s <= r:
+            system[r, s] = _dot(own, stacked[s])
+            s += 1
 
 
 @compiled(error_model="numpy")

@@ -6,7 +6,8 @@ Because the programs are solved exactly, the order is kept to rounding whatever 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +28,16 @@ PULL = 0.4  # m per rad of radius: of a goal farther away, or a deeper overlap, 
 BOX = 2.0  # radii: the box around a step, which seldom holds it; asking for little keeps programs easy instead
 HOLD_SHARE = 3.0  # what a metre of hold counts against a metre of goal when a step is judged
 ELASTIC_SHARE = 10.0  # and a metre of overlap; above any ratio at which overlap could buy goal
+FORCE = np.array([GOAL_FORCE, *GOAL_WEIGHTS, HOLD_WEIGHT])
+"""What the compiled loops take of the above."""
+
 LEAST_SHARE = 1e-3  # of the largest goal weight: goals that weigh less count as this much, or they would not be met
 HEAVIEST_CURVATURE = 5e3  # 1/rad^2: heavier measures are scaled to this; above it they would hold goals back
 MOST_ROWS = 4096  # more than one contact ever has
 LEVER = 1.0  # m: of a limb; larger = more damping of every joint while a goal is out of reach
 LEAST_CURVATURE = 1e-3  # share of the largest curvature that a degree of freedom has which no measure speaks for
+
+_NONE = np.zeros(0)
 
 
 class Violation(NamedTuple):
@@ -73,6 +79,7 @@ class Rows(NamedTuple):
         contact: (k,) rows of one contact share its number; the worst of them counts.
         contacts: how many numbers there are.
         key: (k,) names a row from one linearisation to the next.
+        soft_values: (2, m) errors and weights of the soft rows, of which the two above are views.
     """
 
     soft: Array
@@ -84,6 +91,7 @@ class Rows(NamedTuple):
     contact: NDArray[np.intp]
     contacts: int
     key: NDArray[np.intp]
+    soft_values: Array
 
 
 class Subproblem:
@@ -116,8 +124,13 @@ class Subproblem:
         self._equal = np.flatnonzero(self._lower == self._upper)
         self.equalities = [int((low == high).sum()) for low, high in zip(lower, upper, strict=True)]
         """How many rows of each constraint are equalities."""
-        self._low = np.flatnonzero((self._lower != self._upper) & np.isfinite(self._lower))
-        self._high = np.flatnonzero((self._lower != self._upper) & np.isfinite(self._upper))
+        low = (self._lower != self._upper) & np.isfinite(self._lower)
+        high = (self._lower != self._upper) & np.isfinite(self._upper)
+        self._one_sided = int(low.sum() + high.sum())
+        neither = (self._lower != self._upper) & ~low & ~high
+        self._kind = np.where(neither, -1, low + 2 * high).astype(np.intp)
+        self._bound = np.array([self._lower, self._upper]).reshape(2, -1)
+        self._kernel = compiled_kernel()
 
     def rows(self, at: Linearisation) -> Rows:
         """Sort the rows of a linearisation.
@@ -131,39 +144,30 @@ class Subproblem:
                 f"goals and constraints have {goals} and {len(at.value)} rows here, and had {len(self._goal_share)} "
                 f"and {len(self._lower)} at the start; give each term one number of rows at all postures"
             )
-        soft = np.vstack([at.goal_jacobian, at.value_jacobian[self._equal]])
-        error = np.concatenate([at.goal_error, at.value[self._equal] - self._lower[self._equal]])
-        distance = float(np.linalg.norm(at.goal_error))
-        pull = min(max(GOAL_FORCE / max(distance, 1e-12), GOAL_WEIGHTS[0]), GOAL_WEIGHTS[1])
-        weight = np.concatenate([pull * self._goal_share, np.full(len(self._equal), HOLD_WEIGHT)])
-        low, high = self._low, self._high
-        elastic = np.vstack([at.value_jacobian[low], -at.value_jacobian[high], at.gap_jacobian])
-        violated = np.concatenate(
-            [self._lower[low] - at.value[low], at.value[high] - self._upper[high], at.clearance - at.gap]
-        )
-        one_sided = len(low) + len(high)
-        contact = np.concatenate([np.arange(one_sided), one_sided + at.gap_contact])
-        contacts = len(at.contacts.distance)
-        more = at.gap_contact[contacts:]
-        place = np.concatenate([np.zeros(contacts, np.intp), 1 + np.arange(len(more)) - np.searchsorted(more, more)])
-        key = np.concatenate([-1 - np.arange(one_sided), at.contacts.number[at.gap_contact] * MOST_ROWS + place])
-        return Rows(soft, error, weight, goals, elastic, violated, contact, one_sided + contacts, key)
+        nv, soft, elastic = len(at.gradient), goals + len(self._equal), self._one_sided + len(at.gap)
+        soft_rows, soft_values = np.empty((soft, nv)), np.empty((2, soft))
+        elastic_rows, violated = np.empty((elastic, nv)), np.empty(elastic)
+        labels = np.empty((2, elastic), dtype=np.intp)
+        self._kernel.sort_rows(
+            at.goal_error, at.goal_jacobian, at.value, at.value_jacobian, at.gap, at.gap_jacobian, at.gap_contact,
+            at.clearance, at.contacts.number, self._kind, self._bound, self._goal_share, FORCE, MOST_ROWS, soft_rows,
+            soft_values, elastic_rows, violated, labels,
+        )  # fmt: skip
+        contacts = self._one_sided + len(at.contacts.distance)
+        return Rows(
+            soft_rows, soft_values[0], soft_values[1], goals, elastic_rows, violated, labels[0], contacts, labels[1],
+            soft_values,
+        )  # fmt: skip
 
     def violation(self, rows: Rows, displacement: Array | None = None) -> Violation:
         """Violation at the linearised posture, or what the linearisation predicts after a displacement (nv,)."""
-        error, violated = rows.soft_error, rows.elastic_violation
-        if displacement is not None:
-            error = error + rows.soft @ displacement
-            violated = violated - rows.elastic @ displacement
-        worst = np.zeros(rows.contacts)
-        np.maximum.at(worst, rows.contact, violated)
-        goal, hold = error[: rows.goals], error[rows.goals :]
+        way = _NONE if displacement is None else displacement
         return Violation(
-            float(np.sqrt((self._goal_share * goal) @ goal)),
-            float(np.sqrt(hold @ hold)),
-            float(worst.sum()),
-            float(np.sqrt(goal @ goal)),
-        )
+            *self._kernel.violation(
+                rows.soft_error, rows.soft, rows.elastic_violation, rows.elastic, rows.contact, self._goal_share,
+                np.empty(rows.contacts), way,
+            )
+        )  # fmt: skip
 
     def program(
         self,
@@ -174,6 +178,7 @@ class Subproblem:
         damping: float,
         shift: Array,
         measures: bool,
+        gain: float = 1.0,
     ) -> QuadraticProgram:
         """The program of one step.
 
@@ -186,35 +191,45 @@ class Subproblem:
                 is asked for, how much of the squared error (Sugihara 2011, as in `DampedLeastSquares`).
             shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
             measures: whether the measures count; without them the nearest posture to the goals is sought.
+            gain: share of the way to the least measures that the step is to go.
         """
-        curvature = self.scale * at.curvature
-        floor = float(curvature.max(initial=0.0)) * LEAST_CURVATURE or 1.0
-        diagonal = np.maximum(curvature, floor)
-        linear = self.scale * at.gradient if measures else np.zeros_like(at.gradient)
-        diagonal = np.maximum(diagonal if measures else PROXIMAL_SHARE * diagonal, np.abs(linear) / radius)
-        error = rows.soft_error.copy()
-        goal, goal_weight = error[: rows.goals], rows.soft_weight[: rows.goals]
-        farthest = float(np.abs(goal).max(initial=0.0))
-        if pull is None:
-            # half way between joints that move alike, which takes the fewest steps, and as the measures would have them
-            middle = len(diagonal) // 2
-            metric = np.sqrt(diagonal / np.partition(diagonal, middle)[middle])
-            diagonal = diagonal + damping * float(goal @ goal) * float(goal_weight.max(initial=0.0)) * metric
-        elif farthest > pull:
-            goal *= pull / farthest
-        if damping > 0.0 and pull is not None:
-            diagonal = diagonal + damping * LEVER * float((goal_weight * np.abs(goal)).max(initial=0.0))
-        box = BOX * radius
-        lower, upper = np.clip(at.lower, -box, box), np.clip(at.upper, -box, box)
+        numbers = np.array(
+            [self.scale, LEAST_CURVATURE, PROXIMAL_SHARE, radius, 0.0 if pull is None else pull, damping, LEVER]
+            + [BOX * radius, PULL * radius, gain]
+        )
+        columns = np.empty((4, len(at.gradient)))
+        target, least = np.empty(len(rows.soft_error)), np.empty(len(rows.elastic_violation))
+        self._kernel.program(
+            at.gradient, at.curvature, at.lower, at.upper, rows.soft_values, rows.goals, rows.elastic_violation, shift,
+            measures, pull is not None, numbers, columns, target, least,
+        )  # fmt: skip
         return QuadraticProgram(
-            diagonal=diagonal,
-            linear=linear,
+            diagonal=columns[0],
+            linear=columns[1],
             rows=rows.soft,
-            target=-(error + shift),
+            target=target,
             weight=rows.soft_weight,
             elastic=rows.elastic,
-            least=np.minimum(rows.elastic_violation, PULL * radius),
-            elastic_weight=np.full(len(rows.elastic_violation), ELASTIC_WEIGHT),
-            lower=lower,
-            upper=upper,
+            least=least,
+            elastic_weight=np.full(len(least), ELASTIC_WEIGHT),
+            lower=columns[2],
+            upper=columns[3],
         )
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody.methods.qp import subproblem_kernel
+
+    none, rows, index, pair = np.zeros(0), np.zeros((0, 1)), np.zeros(0, dtype=np.intp), np.zeros((2, 0))
+    one, number = np.ones(1), np.ones(10)
+    subproblem_kernel.sort_rows(
+        none, rows, none, rows, none, rows, index, none, index, index, pair, none, FORCE, MOST_ROWS, rows, pair, rows,
+        none, np.zeros((2, 0), dtype=np.intp),
+    )  # fmt: skip
+    subproblem_kernel.violation(none, rows, none, rows, index, none, none, none)
+    subproblem_kernel.program(one, one, one, one, pair, 0, none, none, True, True, number, np.ones((4, 1)), none, none)
+    one_joint = np.zeros(1, dtype=np.intp)
+    subproblem_kernel.motion(one, np.zeros((1, 6)), one_joint, one_joint, one_joint, np.zeros((1, 4, 3)), one)
+    return subproblem_kernel

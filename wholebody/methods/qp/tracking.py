@@ -17,7 +17,7 @@ from wholebody.methods.base import Method, goal_error, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem
+from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem, compiled_kernel
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
@@ -35,8 +35,9 @@ CUTS = 6  # times that a step is halved before it is given up
 OF_A_FRAME = 1e-4  # m, rad: to which the goals of a frame are met
 PROGRAMS = 3  # most of a frame; more = nearer to a goal that turns quickly, dearer frames where it cannot be met
 WORTH = 0.5  # share of the error that another program must leave at most for one more to follow
-DAMPING = (
-    0.3  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at what is in the way
+DAMPING = 1.0  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at obstacles
+SETTLING = (
+    0.3  # s: in which measures lessen by 1/e: longer = slower to settle, shorter = joints swing about the optimum
 )
 
 
@@ -76,6 +77,20 @@ class FrameStep(NamedTuple):
 
     q: Array
     iterations: int
+
+
+class _Before(NamedTuple):
+    """The step before.
+
+    Attributes:
+        q: (nq,) where it ended.
+        foreseen: (m,) errors of the goals and equalities there, to first order.
+        left: what it left of the way to the goals that it was to go, metres and radians: they are out of reach.
+    """
+
+    q: Array
+    foreseen: Array
+    left: float
 
 
 class QPTracker:
@@ -121,11 +136,9 @@ class QPTracker:
         self._query_distance = LEAST_WITHIN
         self._alone = OneAtATime("tracker")
         self.workspace = problem.workspace()
+        self._before: _Before | None = None
         self._set_up()
-        table = self.workspace.table
-        self._moving = np.flatnonzero(table.joint > 0)
-        self._support = self.workspace.state.support[table.joint[self._moving]]
-        self._reach = table.reach[self._moving]
+        self._kernel = compiled_kernel()
 
     def step(self, q: Array, measures: bool = True) -> QPStep:
         """One step from q, shape (nq,); a posture out of limits is brought back first.
@@ -195,6 +208,9 @@ class QPTracker:
             displacement, share = self._looked_after(at, rows, program, displacement, share)
         self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
         following = pin.integrate(self.problem.scene.model, at.q, displacement)
+        gone = rows.soft @ displacement
+        left = gone[: rows.goals] - program.target[: rows.goals]
+        self._before = _Before(following.copy(), rows.soft_error + gone, float(np.sqrt(left @ left)))
         return QPStep(
             following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
             answer.iterations, answer.by, share,
@@ -204,8 +220,15 @@ class QPTracker:
         """Linearisation, rows, program and its answer at a posture (nq,)."""
         at = self._lineariser.at(q, self._query_distance)
         rows = self._subproblem.rows(at)
+        shift, damping, goals = np.zeros(len(rows.soft_error)), 0.0, rows.goals
+        before = self._before
+        if before is not None and np.array_equal(before.q, q):
+            # what held constraints miss, because the last step was curved, the next one will miss again
+            shift[goals:] = rows.soft_error[goals:] - before.foreseen[goals:]
+            error = float(np.linalg.norm(at.goal_error))
+            damping = DAMPING * min(1.0, before.left / max(error, 1e-12))
         program = self._subproblem.program(
-            at, rows, RADIUS, PULL * RADIUS, DAMPING, np.zeros(len(rows.soft_error)), measures
+            at, rows, RADIUS, PULL * RADIUS, damping, shift, measures, min(1.0, self.dt / SETTLING)
         )
         return at, rows, program, self._working_set.solve(program, rows.key)
 
@@ -266,6 +289,7 @@ class QPTracker:
         self._subproblem = Subproblem(problem, self.workspace.state)
         self._lineariser = problem.lineariser(self.workspace, self.dt)
         self._goals = self._signatures(problem.goals)
+        self._before = None
 
     def _renew(self) -> None:
         """Take what was replaced of the problem since the last step; where targets moved only, keep what is set up."""
@@ -292,13 +316,8 @@ class QPTracker:
         The workspace's state is where the linearisation is.
         """
         state = self.workspace.state
-        twist = (self._support * state.spread(displacement)) @ state.jacobian.T
-        center = at.contacts.placements[self._moving, 3]
-        turn = twist[:, 3:]
-        shift = twist[:, :3].copy()
-        shift[:, 0] += turn[:, 1] * center[:, 2] - turn[:, 2] * center[:, 1]
-        shift[:, 1] += turn[:, 2] * center[:, 0] - turn[:, 0] * center[:, 2]
-        shift[:, 2] += turn[:, 0] * center[:, 1] - turn[:, 1] * center[:, 0]
-        angle = np.sqrt(np.einsum("ij,ij->i", turn, turn))
-        way = np.sqrt(np.einsum("ij,ij->i", shift, shift)) + angle * self._reach
-        return float(way.max(initial=0.0)), float(angle.max(initial=0.0))
+        way, turn = self._kernel.motion(
+            state.spread(displacement), state.jacobian.T, state.column_joint, state.parents, self.workspace.table.joint,
+            at.contacts.placements, self.workspace.table.reach,
+        )  # fmt: skip
+        return way, turn

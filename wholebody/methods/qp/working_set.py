@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Mask
+from wholebody.arrays import Array, Mask
+from wholebody.methods.qp.active_set import BOUND_TOLERANCE, FULL_CORRECTIONS, ROW_TOLERANCE, compiled_kernel
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.base import WARM_CORRECTIONS, QPSolver
 
 NEAR = 0.03  # m: rows lacking less than this at x = 0 are in from the beginning
 ROUNDS = 8  # most times that rows are added before all of them are
+LIMITS = np.array([NEAR, ROUNDS, WARM_CORRECTIONS, FULL_CORRECTIONS, BOUND_TOLERANCE, ROW_TOLERANCE])
+"""What the compiled loop takes of these."""
 
 
 class WorkingSet:
@@ -22,9 +25,9 @@ class WorkingSet:
     def __init__(self, solver: QPSolver) -> None:
         """Begin without a guess."""
         self.solver = solver
-        self._lower: Mask | None = None
-        self._upper: Mask | None = None
-        self._pushing: set[int] = set()
+        self._kernel = compiled_kernel()
+        self._work, self._places = np.empty(0), np.empty(0, dtype=np.intp)
+        self.forget()
 
     def solve(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
         """Solve a program by growing its set of elastic rows until no other row is violated.
@@ -35,7 +38,44 @@ class WorkingSet:
             program: the full program.
             key: (k,) names of its elastic rows.
         """
-        pushing = np.array([name in self._pushing for name in key.tolist()], dtype=bool)
+        if self._lower is not None and self._upper is not None:
+            answer = self._from_the_last(program, key, self._lower, self._upper)
+            if answer is not None:
+                return answer
+        return self._round_by_round(program, key)
+
+    def forget(self) -> None:
+        """Drop the guess."""
+        self._lower: Mask | None = None
+        self._upper: Mask | None = None
+        self._pushing = np.zeros(0, dtype=np.intp)
+
+    def _from_the_last(
+        self, program: QuadraticProgram, key: NDArray[np.intp], lower: Mask, upper: Mask
+    ) -> QPSolution | None:
+        """The answer by the active set of the program before, corrected; None where that does not settle."""
+        n, k = program.size, len(key)
+        size = self._kernel.work_size(n, len(program.target), k)
+        if size > len(self._work):
+            self._work = np.empty(2 * size)
+        if 2 * k > len(self._places):
+            self._places = np.empty(4 * k, dtype=np.intp)
+        x: Array = np.empty(n)
+        active = ActiveSet(lower.copy(), upper.copy(), np.empty(k, dtype=bool))
+        program.check_shapes(active)
+        rounds = self._kernel.solve_growing(
+            program.diagonal, program.linear, program.rows, program.target, program.weight, program.elastic,
+            program.least, program.elastic_weight, program.lower, program.upper, key, self._pushing, *active,
+            np.empty(k, dtype=bool), LIMITS, self._work, self._places, x,
+        )  # fmt: skip
+        if rounds < 0:
+            return None
+        self._remember(active, key)
+        return QPSolution(x, active, True, 0, "last active set")
+
+    def _round_by_round(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
+        """The answer where nothing is known, or the solver has to be asked."""
+        pushing: Mask = np.isin(key, self._pushing)
         chosen = (program.least > -NEAR) | pushing
         lower, upper = self._lower, self._upper
         for attempt in range(ROUNDS + 1):
@@ -51,10 +91,10 @@ class WorkingSet:
             if not missed.any():
                 break
             chosen |= missed
-        self._lower, self._upper, self._pushing = lower, upper, set(key[pushing].tolist())
-        return answer._replace(active=ActiveSet(answer.active.lower, answer.active.upper, pushing))
+        active = ActiveSet(answer.active.lower, answer.active.upper, pushing)
+        self._remember(active, key)
+        return answer._replace(active=active)
 
-    def forget(self) -> None:
-        """Drop the guess."""
-        self._lower = self._upper = None
-        self._pushing = set()
+    def _remember(self, active: ActiveSet, key: NDArray[np.intp]) -> None:
+        self._lower, self._upper = active.lower, active.upper
+        self._pushing = np.sort(key[active.elastic])

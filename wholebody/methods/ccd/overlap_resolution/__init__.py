@@ -1,1 +1,1 @@
-"""Removal of overlap: the penetrating link of a chain, the way out for it, chain by chain, frame by frame."""
+"""Overlap resolution: the penetrating link of a chain, its displacement, the loop over chains, and frames."""

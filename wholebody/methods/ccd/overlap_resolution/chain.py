@@ -1,4 +1,4 @@
-"""One chain: cyclic coordinate descent that takes its overlapping link to the goal outside."""
+"""One chain: cyclic coordinate descent that moves its overlapping link to the goal outside."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from wholebody.methods.ccd.sweep import Aims, sweep
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
 
-MARGIN = 2e-4  # m: how far outside a goal lies, so that the next query finds nothing
+MARGIN = 2e-4  # m: distance of a goal outside the obstacle, so that the next query finds no overlap
 CLOSE = 1e-4  # m: a goal nearer than this is reached
-SWEEPS = 5  # for one goal; it is set anew afterwards, so more is lost time
+SWEEPS = 5  # for one goal; it is computed anew afterwards, so more sweeps waste time
 SLOW = 0.9  # a sweep that leaves more than this share of the distance is the last one
 PARALLEL = 0.26  # sine of 15 degrees: a bone at a smaller angle to the obstacle's surface is nearly parallel to it
-SHORT = 0.02  # m: a link shorter than this has no direction worth the name
+SHORT = 0.02  # m: a link shorter than this has no meaningful direction
 
 
 class ChainResolver:
@@ -29,7 +29,7 @@ class ChainResolver:
     Attributes:
         name: the chain's name.
         limbs: its joints.
-        reach: for each node, an upper bound of the distance from its joint to the chain's farthest point, metres.
+        reach: for each node, an upper bound of the distance from its joint to a point of the chain, metres.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class ChainResolver:
             joints: Pinocchio's indices of its joints.
             foreign: joints of the other chains.
             tip: index of the frame at its end.
-            cones: names of the reach cones to keep; all of the figure's where None.
+            cones: names of the reach cones to keep; None for all of the figure's.
             exact: see `LinkFinder`.
         """
         self.name = name
@@ -83,18 +83,18 @@ class ChainResolver:
         return reaches[::-1]
 
     def read(self, q: Array, data: Any) -> None:
-        """Take a posture q (nq,) whose joints are placed in `data`."""
+        """Read a posture q (nq,), with the joint placements in `data`."""
         self.limbs.read(q, data)
         self.limbs.forward()
         for guard in self._guards:
             guard.read(data)
 
     def in_cones(self, data: Any) -> bool:
-        """Whether the limbs are in their reach cones where the joints of `data` are; `read` is not needed."""
+        """Whether the limbs are in their reach cones at the joint placements in `data`; `read` is not needed."""
         return all(guard.holds(data) for guard in self._guards)
 
     def keep_cones(self) -> bool:
-        """Bring limbs that have left their reach cones back into them; true if all are inside."""
+        """Turn limbs that have left their reach cones back into them; true if all are inside."""
         inside = [guard.keep() for guard in self._guards]
         return all(inside)
 
@@ -103,7 +103,7 @@ class ChainResolver:
         return self._finder.find(overlaps)
 
     def push(self, link: Link, margin: float = MARGIN) -> tuple[int, ...]:
-        """Turn the chain so that the link leaves, to `margin` metres; the nodes that took part. `read` comes before."""
+        """Move the link out of the obstacle by `margin` metres; returns the nodes that moved. Call `read` first."""
         x, y, z = link.push
         length = (x * x + y * y + z * z) ** 0.5
         if length < 1e-9:
@@ -118,7 +118,7 @@ class ChainResolver:
         return link.nodes
 
     def _reach_out(self, node: int, nodes: Sequence[int], effector: Vector, push: Vector) -> None:
-        """Cyclic coordinate descent from a point of a node to that point moved by a vector."""
+        """Cyclic coordinate descent that moves a point of a node by a vector."""
         limbs = self.limbs
         goal = (effector[0] + push[0], effector[1] + push[1], effector[2] + push[2])
         frame = limbs.frames[node]
@@ -137,7 +137,7 @@ class ChainResolver:
                 return
 
     def _translate(self, link: Link, push: Vector, inner: Sequence[int]) -> None:
-        """Move the link by pure translation: its joint goes along, and its own joints keep its orientation."""
+        """Move the link by pure translation: its joint's origin moves, and its own joints keep its orientation."""
         limbs = self.limbs
         own = [node for node in link.nodes if node not in inner]
         before = limbs.frames[link.node]
@@ -155,12 +155,12 @@ class ChainResolver:
         self.keep_cones()
 
     def _inner(self, link: Link) -> tuple[int, ...]:
-        """The nodes inside of the link's own: those that move the link before it."""
+        """The nodes inwards of the link's own: those that move the previous link."""
         before = [node for node in self._bearing if node < link.node and node in link.nodes]
         return tuple(node for node in link.nodes if node <= before[-1]) if before else ()
 
     def _parallel(self, link: Link, push: Vector) -> bool:
-        """Whether the link's bone lies nearly in the obstacle's surface."""
+        """Whether the link's bone is nearly parallel to the obstacle's surface."""
         frames = self.limbs.frames
         here = frames[link.node]
         after = [node for node in self._bearing if node > link.node]

@@ -1,9 +1,9 @@
-"""Removal of overlap from frame to frame: the posture shown is as near to the tracked one as contact allows.
+"""Overlap resolution from frame to frame: the posture shown is as near to the tracked one as contact allows.
 
-Each frame goes from the last posture without overlap towards the tracked one, in steps short enough that what they
-overlap is shallow, and every step is pushed out again by the loop of `resolver`. So joints are attracted to the tracked
-ones in every frame, also at rest (the coach and trainee of Boulic and others 1997), limbs slide along what stops them,
-and the global penetration is asked only where it is a good estimate. A step that cannot be pushed out is shortened by
+Each frame moves from the last posture without overlap towards the tracked one, in steps so short that overlaps are
+shallow, and the loop of `resolver` removes the overlap of every step. So joints are attracted to the tracked ones in
+every frame, also at rest (the coach and trainee of Boulic and others 1997), limbs slide along obstacles, and the global
+penetration depth is used only where it is a good estimate. A step whose overlap cannot be removed is shortened by
 interpolation with the last posture without overlap (algorithm 1, step 4, of Schmidl and Lin).
 """
 
@@ -24,38 +24,38 @@ from wholebody.methods.ccd.overlap_resolution.chain import MARGIN
 from wholebody.methods.ccd.overlap_resolution.resolver import Counts, OverlapResolver
 from wholebody.scene import Scene
 
-STEP = 0.03  # m: farthest that a chain's tip moves at once; half of a forearm's width
-SMALL_STEP = 0.006  # m: where steps of that length lead around a bulge that the straight way cuts
+STEP = 0.03  # m: largest motion of a chain's tip in one step; half of a forearm's width
+SMALL_STEP = 0.006  # m: length of steps that lead around a bulge which the direct motion penetrates
 STEPS = 8  # most steps of one frame
-BUDGET = 42  # queries and goals after which a frame makes no further step, and the next one goes on: some 3 ms
-SMALL_STEP_BUDGET = 15  # queries and goals for small steps, where larger ones led nowhere straight
-OVERRUN = 16  # queries and goals beyond these after which no chain has another turn
+BUDGET = 42  # queries and goals after which a frame makes no further step, and the next one continues: some 3 ms
+SMALL_STEP_BUDGET = 15  # queries and goals for small steps, if larger ones found no free motion
+OVERRUN = 16  # further queries and goals after which no chain is processed any more
 HALVINGS = 7  # of an interpolation: a step of 3 cm to a quarter of a millimetre
-PERTURBATIONS = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things came upon and that no joint's best value frees
-APART = 0.02  # m: how far a tip moves between two queries on the straight way from one shown posture to the next
+PERTURBATIONS = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things penetrate and that single joints cannot free
+APART = 0.02  # m: motion of a tip between two queries of the direct motion from one shown posture to the next
 MOST_QUERIES = 5
-DIP = 4e-4  # m: how deep it may go in there
+DIP = 4e-4  # m: allowed depth of that motion
 PASSED = (
-    2e-3  # m: overlap of a single step, not of what is shown, that does not count; the way shown is swept more closely
+    2e-3  # m: allowed overlap of the motion of a single step; the motion between shown postures is swept more closely
 )
-WIDE = 5e-3  # m: how far what is to come back to a free posture is pushed out, so that it has room to turn
+WIDE = 5e-3  # m: margin of limbs that return to a free posture, so that they have room to turn
 TINY = 1e-12  # rad, m
 
 
 @dataclass(frozen=True)
 class OverlapResult:
-    """A posture without overlap, and what it took.
+    """A posture without overlap, and the work to find it.
 
     Attributes:
         q: (nq,) the posture to show.
-        iterations: goals that cyclic coordinate descent was given.
-        joints: joints that took part, counted once for each goal that moved them.
-        pairs: different pairs of pieces that overlapped on the way.
+        iterations: number of goals of cyclic coordinate descent.
+        joints: number of joints that moved, counted once for each goal.
+        pairs: number of different pairs of pieces that overlapped during the search.
         contact_seconds: time of contact queries.
         ik_seconds: time of cyclic coordinate descent.
-        fell_back: interpolation with the last posture without overlap was needed.
-        deepest: deepest overlap left, metres.
-        swept: the straight way from the posture shown before was swept and goes into nothing.
+        fell_back: whether interpolation with the last posture without overlap was needed.
+        deepest: deepest remaining overlap, metres.
+        swept: whether the direct motion from the posture shown before was swept and is free.
     """
 
     q: Array
@@ -75,16 +75,16 @@ def resolve_overlap(
     """The posture nearest to the wanted one that this frame can reach without overlap.
 
     Args:
-        scene: figure and things. What was prepared for it is kept from call to call.
+        scene: figure and things. Prepared data of the scene are cached between calls.
         q_free: (nq,) the last posture without overlap: the one shown before.
-        q_wanted: (nq,) the tracked posture. It may be in anything; limits and cones are kept for it.
+        q_wanted: (nq,) the tracked posture. It may overlap; it is clamped to limits and cones.
         rng: of the order of the chains; the same seed gives the same answer.
-        pace: (nv,) most that each degree of freedom may move, radians and metres; without end where None. What is left
-            waits for the next frame. Where things moved onto `q_free`, leaving them comes first.
+        pace: (nv,) largest motion of each degree of freedom, radians and metres; None for no limit. The remainder
+            is left to the next frame. If things were moved into `q_free`, leaving them comes first.
 
     Returns:
-        The posture, within limits and reach cones and never NaN. Where things moved onto `q_free`, that is removed
-        first; `deepest` says what could not be.
+        The posture, within limits and reach cones and never NaN. If things were moved into `q_free`, that overlap is
+        removed first; `deepest` is the remaining overlap.
 
     Raises:
         InputError: a posture of the wrong shape, or a value that is not finite.
@@ -95,10 +95,10 @@ def resolve_overlap(
 
 
 class FrameResolver:
-    """Removal of overlap from frame to frame in one scene."""
+    """Overlap resolution from frame to frame in one scene."""
 
     def __init__(self, scene: Scene) -> None:
-        """Prepare the chains, and which degrees of freedom are of which."""
+        """Prepare the chains and their degrees of freedom."""
         self._model, self._figure, self._workspace = scene.model, scene.figure, scene.workspace()
         self._resolver = OverlapResolver(scene, self._workspace, exact=False)
         self._attraction = Attraction(scene, self._resolver)
@@ -142,12 +142,12 @@ class FrameResolver:
         return self._result(q if shown is None else shown)
 
     def _approach(self, q: Array, wanted: Array, before: Placed, rng: np.random.Generator) -> list[Array]:
-        """From a free posture towards the wanted one, step by step: the postures on the way."""
+        """Steps from a free posture towards the wanted one; returns the postures."""
         resolver = self._resolver
         settled = [False] * len(self._parts)
         settled[-1] = later = (
             self._attraction.free
-        )  # limbs that are pressed at something leave it before the root goes on
+        )  # limbs that are pressed against something leave it before the root moves
         way = []
         for _ in range(STEPS):
             if resolver.counts.work > self._attraction.limit - OVERRUN:
@@ -169,9 +169,10 @@ class FrameResolver:
         return way
 
     def _toward(self, q0: Array, q1: Array) -> Array | None:
-        """As far from q0 straight towards q1 as a frame may go, without dipping in; None where that is not free.
+        """The direct motion from q0 towards q1, as far as a frame may move; None if that is not free.
 
-        Where the way is too long each part goes its own share of it, or else all of them the least of these.
+        If the motion is too long, each part makes its own share of it, or, if that is not free, all make the least
+        share.
         """
         way = np.asarray(pin.difference(self._model, q0, q1))
         shares = np.minimum(1.0, self._pace / np.maximum(np.abs(way), TINY))
@@ -186,7 +187,7 @@ class FrameResolver:
         return None
 
     def _clear(self, q0: Array, q1: Array) -> bool:
-        """Whether the straight way between two shown postures does not dip in; queries are cheap, the sweep is sure."""
+        """Whether the direct motion between two shown postures is free; queries are cheap, the sweep is exact."""
         way = np.abs(np.asarray(pin.difference(self._model, q0, q1)))
         length = max(float(way[dofs] @ reach) for dofs, reach in self._parts)
         queries = min(int(length / APART), MOST_QUERIES)
@@ -197,20 +198,20 @@ class FrameResolver:
         return self._workspace.sweep.first_contact(q0, q1, None, 2.0 * DIP) is None
 
     def _perturbed(self, q: Array, size: float, rng: np.random.Generator) -> Array:
-        """Copy of a posture q (nq,) with its joints moved at random: a straight arm pushed along itself must bend."""
+        """Copy of a posture q (nq,) with random changes of its joints, so that a straight arm can bend."""
         step = size * rng.normal(size=self._model.nv)
         step[self._parts[-1][0]] = 0.0
         return self._resolver.into_cones(self._figure.clamp(np.asarray(pin.integrate(self._model, q, step))))
 
     def _interpolate(self, free: Array, q: Array) -> Array:
-        """The last free posture on the way from a free one, by halving."""
+        """The last free posture between a free one and q, by bisection."""
         self._fell_back = True
         result = last_free(self._model, free, q, self._resolver.query, HALVINGS)
         self._resolver.query(result)
         return result
 
     def _passes_through(self, before: Placed, q0: Array, q1: Array) -> bool:
-        """Whether the motion passes through something; `_hit` is then where it meets it first."""
+        """Whether the motion passes through something; `_hit` is then the first contact."""
         hit = first_passed(self._workspace, before, self._resolver.placed, q0, q1, PASSED)
         if hit is not None:
             self._hit = hit.q

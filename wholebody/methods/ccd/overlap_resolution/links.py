@@ -1,8 +1,8 @@
-"""Which link of a chain overlaps nearest to the root, where, and which way is out.
+"""The overlapping link of a chain nearest to the root, its contact points, and its displacement.
 
 Equations 1 to 3 of Schmidl and Lin: the end effector is the mean of the contact points on the link, and the goal is
-that point moved by the global penetration PD_g of the link in what it overlaps. Each obstacle has its own PD_g; in a
-corner the link moves by a translation that is as long as each of them along it.
+that point moved by the global penetration depth PD_g of the link in the obstacle. Each obstacle has its own PD_g; in a
+corner the link moves by a translation whose component along each of them is at least its length.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ ROUNDS = 4  # over the obstacles of one link; two walls need one, wedges a few
 
 
 class Overlap(NamedTuple):
-    """Two pieces that are in each other: their indices and joints, depth [m], normal from a to b, points on a and b."""
+    """Two overlapping pieces: their indices and joints, depth [m], normal from a to b, points on a and b."""
 
     a: int
     b: int
@@ -38,13 +38,13 @@ class Overlap(NamedTuple):
 
 
 class Link(NamedTuple):
-    """A link that overlaps, and the way out.
+    """A link that overlaps, and its displacement.
 
     Attributes:
         node: its node in the chain.
-        nodes: the nodes that move it relative to what it overlaps.
+        nodes: the nodes that move it relative to the obstacles.
         effector: the mean of its contact points.
-        push: PD_g, the translation that takes it out.
+        push: the translation that removes the overlap, from PD_g.
         depth: depth of its deepest pair, metres.
     """
 
@@ -59,13 +59,13 @@ class LinkFinder:
     """Finds the overlapping link of one chain."""
 
     def __init__(self, workspace: Workspace, limbs: Limbs, foreign: frozenset[int], exact: bool = True) -> None:
-        """Say which joints belong to the chain.
+        """Prepare the joints of the chain.
 
         Args:
             workspace: of the run.
             limbs: the joints of the chain.
-            foreign: joints of other chains: what they carry is no link of this one, although it may move it.
-            exact: where PD_g cancels, look for the least translation that separates.
+            foreign: joints of other chains: their links are no links of this chain, although this chain may move them.
+            exact: whether to compute the least translation that separates if PD_g cancels.
         """
         self._exact = exact
         self._workspace, self._limbs = workspace, limbs
@@ -78,7 +78,7 @@ class LinkFinder:
         self._masks: dict[tuple[tuple[int, ...], str], tuple[list[int], NDArray[np.bool_]]] = {}
 
     def find(self, overlaps: Sequence[Overlap]) -> Link | None:
-        """The overlapping link nearest to the root; None where no link of this chain overlaps what it can leave."""
+        """The overlapping link nearest to the root; None if the chain's joints can change no overlap."""
         links: dict[int, list[tuple[Overlap, bool, tuple[int, ...]]]] = {}
         for overlap in overlaps:
             found = self._side(overlap)
@@ -107,7 +107,7 @@ class LinkFinder:
         return None
 
     def _push(self, overlaps: Sequence[tuple[Overlap, bool]]) -> Vector:
-        """The translation that leaves every obstacle by its PD_g."""
+        """The translation whose component along the PD_g of every obstacle is at least its length."""
         owners = self._workspace.owners
         by_owner: dict[str, list[tuple[Overlap, bool]]] = {}
         for overlap, is_a in overlaps:
@@ -123,7 +123,7 @@ class LinkFinder:
         return x, y, z
 
     def _global_depth(self, owner: str, group: Sequence[tuple[Overlap, bool]]) -> Vector:
-        """Equation 1 for the link and one obstacle; the exact separation where the normals cancel."""
+        """Equation 1 for the link and one obstacle; the exact separation if the normals cancel."""
         if len(group) == 1:
             overlap, is_a = group[0]
             size = -overlap.depth if is_a else overlap.depth
@@ -137,7 +137,7 @@ class LinkFinder:
         return self._separation(owner, group) or (x, y, z)
 
     def _separation(self, owner: str, group: Sequence[tuple[Overlap, bool]]) -> Vector | None:
-        """Least translation of the link's pieces out of all pieces of the obstacle; None where there is none."""
+        """Least translation of the link's pieces out of all pieces of the obstacle; None if there is none."""
         workspace = self._workspace
         mine = tuple(sorted({overlap.a if is_a else overlap.b for overlap, is_a in group}))
         if (mine, owner) not in self._masks:

@@ -1,4 +1,4 @@
-"""The paper's loop: chain by chain, the penetrating link nearest to the root goes out, until none penetrates."""
+"""The paper's loop: chain by chain, the penetrating link nearest to the root moves out, until none penetrates."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.proximity import Joints
 from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.ccd.overlap_resolution.chain import MARGIN, ChainResolver
 from wholebody.methods.ccd.overlap_resolution.links import Overlap
@@ -20,16 +21,16 @@ from wholebody.methods.control import Control
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
 
-TOLERANCE = 1e-4  # m: an overlap that does not count; coal's own accuracy is a hundredth of it
-GOALS = 8  # most goals for one chain before the next has its turn
-PASSES = 4  # most times that every chain has its turn
-SLOW = 0.8  # a goal that leaves more than this share of the link's overlap is the last one of the turn
-GAIN = 0.98  # a pass that leaves more than this share of the deepest overlap leads nowhere
+TOLERANCE = 1e-4  # m: largest overlap that is ignored; coal's own accuracy is a hundredth of it
+GOALS = 8  # most goals for one chain in one pass
+PASSES = 4  # most passes over all chains
+SLOW = 0.8  # a goal that leaves more than this share of the link's overlap is the last one of the pass
+GAIN = 0.98  # a pass that leaves more than this share of the deepest overlap is the last one
 
 
 @dataclass
 class Counts:
-    """What a removal did, summed over its parts; a joint counts once for each goal that moved it."""
+    """Counts of the work of a removal; a joint counts once for each goal that moved it."""
 
     queries: int = 0
     iterations: int = 0
@@ -40,19 +41,19 @@ class Counts:
 
     @property
     def work(self) -> int:
-        """Looks and goals together; each takes some 60 us."""
+        """Number of queries and goals; each takes some 60 us."""
         return self.queries + self.iterations
 
 
 class OverlapResolver:
-    """Takes overlap out of postures of one scene, re-used from posture to posture.
+    """Removes overlap from postures of one scene; one object serves many postures.
 
     Attributes:
         workspace: of the run.
         placed: the pieces and pairs at the last query.
-        counts: what was done since it was last set.
-        deepest: deepest overlap found by the last query, metres, against the distance asked of the pair.
-        margin: how far outside links are pushed, metres.
+        counts: the work since it was last set.
+        deepest: largest shortfall of a pair from its clearance in the last query, metres.
+        margin: distance by which links end outside, metres.
     """
 
     def __init__(
@@ -71,12 +72,12 @@ class OverlapResolver:
         Args:
             scene: figure and things.
             workspace: of the run, for as long as this is used.
-            clearances: (pairs,) distance asked of every collision pair, metres; zero where None.
+            clearances: (pairs,) clearance of every collision pair, metres; None for zero.
             fixed: Pinocchio's indices of joints that must not move.
-            cones: names of the reach cones that are kept; all of the figure's where None.
-            tolerance: overlap that does not count, metres.
-            exact: where PD_g cancels, look for the least translation that separates, which takes up to 0.1 s.
-            control: what may end the pushing.
+            cones: names of the reach cones that are kept; None for all of the figure's.
+            tolerance: largest overlap that is ignored, metres.
+            exact: whether to compute the least translation that separates if PD_g cancels, which takes up to 0.1 s.
+            control: may end the removal early.
         """
         self.control = Control(np.inf) if control is None else control
         self.exact, self.margin = exact, MARGIN
@@ -90,7 +91,7 @@ class OverlapResolver:
 
     @cached_property
     def chains(self) -> dict[str, ChainResolver]:
-        """Name to chain, in the figure's order; made when something overlaps first."""
+        """Name to chain, in the figure's order; made at the first overlap."""
         named = {
             name: ([joint for joint in joints if joint not in self._fixed], tip)
             for name, (joints, tip) in chains_of(self.scene.figure).items()
@@ -105,11 +106,11 @@ class OverlapResolver:
         }
 
     def query(self, q: Array) -> list[Overlap]:
-        """What overlaps at a posture q (nq,), the deepest first."""
+        """The overlaps at a posture q (nq,), the deepest first."""
         began = time.perf_counter()
         self.counts.queries += 1
         pin.forwardKinematics(self.scene.model, self._data, q)
-        near = self.workspace.proximity.near(self._data, self._query_distance)
+        near = self.workspace.proximity.query(Joints(self._data), self._query_distance)
         self.placed = Placed(near, self._query_distance)
         depth = -near.distance if self.clearances is None else self.clearances[near.number] - near.distance
         self.deepest = float(depth.max(initial=0.0))
@@ -133,15 +134,15 @@ class OverlapResolver:
         return found
 
     def resolve(self, q: Array, rng: np.random.Generator, most_work: float = np.inf) -> tuple[Array, list[Overlap]]:
-        """Push links out until nothing overlaps or nothing gains.
+        """Move links out until nothing overlaps or no step gains.
 
         Args:
             q: (nq,) posture.
-            rng: of the order in which the chains have their turns.
-            most_work: of the counts, at which no further chain has its turn.
+            rng: of the order of the chains.
+            most_work: work after which no further chain is processed.
 
         Returns:
-            The posture, and what still overlaps in it.
+            The posture, and its remaining overlaps.
         """
         q = q.copy()
         overlaps = self.query(q)
@@ -159,7 +160,7 @@ class OverlapResolver:
         return q, overlaps
 
     def _leave(self, chain: ChainResolver, q: Array, overlaps: list[Overlap]) -> list[Overlap]:
-        """One chain leaves what it overlaps, with its goal set anew every time; q is changed in place."""
+        """Move one chain out of its overlaps, with a new goal every time; q is changed in place."""
         worst, node = np.inf, -1
         for _ in range(GOALS):
             link = chain.find(overlaps)
@@ -192,7 +193,7 @@ class OverlapResolver:
 
 
 def chains_of(figure: Figure) -> Mapping[str, tuple[Sequence[int], int]]:
-    """The figure's chains as joints that can turn or slide, and their tips; one for each leaf where it has none."""
+    """The figure's chains as revolute and prismatic joints, and their tips; if it has none, one for each leaf."""
     model = figure.model
     if figure.chains:
         return {

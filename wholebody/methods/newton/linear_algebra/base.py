@@ -1,4 +1,4 @@
-"""What all factorisations have in common."""
+"""Types that all factorisations share."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from wholebody.errors import WholebodyError
 
 
 class SingularSystemError(WholebodyError, ArithmeticError):
-    """A linear system that the factorisation cannot solve; damp it more, or ask a reference method."""
+    """A linear system that the factorisation cannot solve; damp it more, or use a reference method."""
 
 
 class Pattern(NamedTuple):
-    """Where a sparse Jacobian can be other than zero.
+    """Structural non-zeros of a sparse Jacobian.
 
     Attributes:
-        rows, columns: (nnz,) places of the entries.
+        rows, columns: (nnz,) indices of the entries.
         height, width: the Jacobian's shape.
     """
 

@@ -1,4 +1,4 @@
-"""Which factorisation when: by name, or by the pattern."""
+"""Choice of the factorisation: by name, or by the pattern."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.linear_algebra.reference import Dense, SingularValues
 
 NAMES = ("auto", "normal", "llt", "kkt", "schur", "dense", "svd")
-DENSE_ROWS = 60  # rows in which a column must stand to be split off, as of a hub; fewer = more splits
-MOST_DENSE = 50  # dense columns that are split off; with hundreds, as of a body near to everything, a step took 2 s
+DENSE_ROWS = 60  # least number of rows of a column that is split off, such as a hub's; fewer = more splits
+MOST_DENSE = 50  # most dense columns that are split off; with hundreds, as of a body near everything, a step took 2 s
 
 
 def dense_columns(pattern: Pattern) -> Indices:
@@ -26,7 +26,7 @@ def linear_algebra(pattern: Pattern, name: str = "auto") -> LinearAlgebra:
     """The factorisation of this name for a pattern.
 
     Raises:
-        UnknownNameError: there is none.
+        UnknownNameError: there is no such factorisation.
     """
     known(name, NAMES, "linear algebra")
     dense = dense_columns(pattern)

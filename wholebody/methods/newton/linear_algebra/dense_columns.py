@@ -1,4 +1,4 @@
-"""Normal equations with dense columns split off, so that a hub with a hundred arms costs what a hundred arms cost."""
+"""Normal equations with dense columns split off, so that a hub adds little cost to that of its arms."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ class DenseColumns:
     """The modified Schur complement (eqs. 11 and 12; Andersen 1996, ACM Transactions on Mathematical Software 22).
 
     With A_s the sparse and A_D the dense columns of J D^-1/2, A_s A_s' + M + F F' is factorised sparsely. Each column
-    of F has one non-zero, in a row that would be empty without it. A small dense system puts A_D in and takes F out.
+    of F has one non-zero, in a row that would be empty without it. A small dense system adds A_D and removes F.
     """
 
     name = "normal/schur"
 
     def __init__(self, pattern: Pattern, dense: Indices) -> None:
-        """Lay out and analyse; `dense` are the columns to split off."""
+        """Build and analyse; `dense` are the columns to split off."""
         import eigenpy
 
         self.pattern = pattern

@@ -1,4 +1,4 @@
-"""The pattern and the values of J D^-1 J' + M: laid out once a structure, refilled at every iteration."""
+"""The matrix J D^-1 J' + M: its pattern is made once a structure, its values at every iteration."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Gram:
     """
 
     def __init__(self, pattern: Pattern) -> None:
-        """Pair the entries of J that share a column, and find out where their products go."""
+        """Pair the entries of J that share a column, and find the entries of their products."""
         from scipy.sparse import csc_matrix
 
         self.pattern = pattern
@@ -53,7 +53,7 @@ class Gram:
 
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
-    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    """The module of compiled loops, compiled or loaded from the cache, before a solve."""
     from wholebody.methods.newton.linear_algebra import gram_kernel
 
     none, places = np.zeros(0), np.zeros(0, dtype=np.int32)

@@ -15,7 +15,7 @@ Places = NDArray[np.int32]
 def sum_products(
     scaled: Array, values: Array, first: Places, second: Places, starts: Places, filled: Places, data: Array
 ) -> None:
-    """Put the sums of scaled[first] values[second] between starts into data, at the places `filled`."""
+    """Write the sums of scaled[first] values[second] between starts into data, at the indices `filled`."""
     for k in range(len(filled)):
         total = 0.0
         for p in range(starts[k], starts[k + 1]):

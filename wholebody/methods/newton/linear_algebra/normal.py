@@ -13,7 +13,7 @@ class NormalEquations:
     """J D^-1 J' + M by Eigen's SimplicialLDLT or SimplicialLLT with AMD ordering (eq. 10)."""
 
     def __init__(self, pattern: Pattern, *, square_root: bool = False) -> None:
-        """Lay out and analyse; `square_root` takes L L' in place of L D L'."""
+        """Build and analyse; `square_root` uses L L' in place of L D L'."""
         import eigenpy
 
         self.name = "normal/llt" if square_root else "normal/ldlt"

@@ -1,4 +1,4 @@
-"""The whole KKT matrix by sparse L D L', which has no products to form and keeps dense columns sparse."""
+"""The whole KKT matrix by sparse L D L', which forms no products and so stays sparse with dense columns."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from wholebody.arrays import Array, Indices
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern, SingularSystemError
 
 LEAST_DAMPING = 1e-10  # times the largest weight's inverse: makes the matrix quasi-definite; smaller = less stable
-REFINEMENTS = 2  # steps that take the error of that out again
+REFINEMENTS = 2  # steps of iterative refinement that remove the error of the damping
 
 
 class QuasiDefinite:
@@ -22,7 +22,7 @@ class QuasiDefinite:
     name = "kkt/ldlt"
 
     def __init__(self, pattern: Pattern, second: tuple[Indices, Indices] | None = None) -> None:
-        """Lay out and analyse.
+        """Build and analyse.
 
         Args:
             pattern: of J.
@@ -64,7 +64,7 @@ class QuasiDefinite:
         wanted = np.concatenate([-system.gradient, system.residual])
         found = self._factor.solve(wanted)
         slack = np.maximum(least - system.damping, 0.0)
-        for _ in range(REFINEMENTS):  # against the matrix without the least damping: off by -slack y
+        for _ in range(REFINEMENTS):  # residual of the matrix without the least damping: differs by -slack y
             error = wanted - self._times(found)
             error[n:] -= slack * found[n:]
             found = found + self._factor.solve(error)
@@ -73,7 +73,7 @@ class QuasiDefinite:
         return found[:n], found[n:]
 
     def convex(self) -> bool:
-        """Whether the last matrix is positive where the equations are kept: its inertia is (n, m, 0)."""
+        """Whether the last matrix is positive definite on the null space of J: its inertia is (n, m, 0)."""
         pivots = self._factor.vectorD()
         return int((pivots < 0.0).sum()) == self.pattern.height
 

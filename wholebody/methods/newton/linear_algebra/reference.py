@@ -1,4 +1,4 @@
-"""Dense references: what the sparse factorisations are held to, and what answers where the rank is deficient."""
+"""Dense references: sparse factorisations are compared with them, and they solve rank-deficient systems."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Dense:
     name = "dense"
 
     def __init__(self, pattern: Pattern) -> None:
-        """Remember the pattern."""
+        """Store the pattern."""
         self.pattern = pattern
 
     @property
@@ -40,7 +40,7 @@ class SingularValues:
     name = "svd"
 
     def __init__(self, pattern: Pattern) -> None:
-        """Remember the pattern."""
+        """Store the pattern."""
         self.pattern = pattern
 
     @property

@@ -1,28 +1,36 @@
-"""One robot, in a process of its own: load it, and reach with its tips to where a free posture has them."""
+"""Every robot description of a folder: whether it loads, how fast, and whether its tips reach; and the page about it.
+
+A description is examined in a process of its own: it is loaded, and its tips reach to where a free posture has them.
+"""
 
 from __future__ import annotations
 
+import os
 import time
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
+from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.errors import WholebodyError
+from wholebody.bench.report import render
+from wholebody.errors import InputError, WholebodyError
+from wholebody.files import Scratch
+from wholebody.geometry.mesh_cache import VARIABLE
+from wholebody.runner import Child, EndedError
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.scene import Scene
 
-
-SEED = 7
-"""Of the postures whose tips are the targets."""
-
-FAR = 100.0
-"""Metres: pairs farther apart in the default posture do not count."""
-
+LONGEST = 300.0  # s: after which a description is given up
+REACHES = 12  # of each robot
+SEED = 7  # of the postures whose tips are the targets
+FAR = 100.0  # m: pairs farther apart in the default posture do not count
 SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0625)
 """How far from the default posture towards a random one a target's posture is: the first that is free of contact."""
 
@@ -35,15 +43,12 @@ class Loaded:
         seconds: CPU time of `wholebody.load`, packages imported before.
         refused: the sentence it was refused with; empty where it was loaded.
         kind: "URDF" or "MJCF".
-        nv: degrees of freedom.
-        pieces: convex pieces.
-        pairs: pairs that can touch.
+        nv, pieces, pairs: degrees of freedom, convex pieces, and pairs that can touch.
         notes: sentences on what was changed about the geometry.
         left_out: pairs that overlap at zero and could not be parted.
         free: least distance of any pair in the default posture, metres; inf without pairs.
         solved: reaches that ended `solved`.
-        times: CPU seconds of each reach.
-        statuses: status of each reach.
+        times, statuses: CPU seconds and status of each reach.
     """
 
     seconds: float
@@ -71,12 +76,7 @@ class Loaded:
 
 
 def examine(path: str, reaches: int) -> Loaded:
-    """Load a description, and reach.
-
-    Args:
-        path: of the description.
-        reaches: how many; 0 loads only.
-    """
+    """Load a description, and make some reaches; 0 loads only."""
     import wholebody as wb
     from wholebody.figures.rest_posture import UNPARTED
     from wholebody.geometry import convex, meshes
@@ -103,24 +103,16 @@ def examine(path: str, reaches: int) -> Loaded:
     )
     if not reaches or not figure.chains:
         return found
-    statuses, times = _reach(figure, scene, reaches)
-    solved = sum(status == "solved" for status in statuses)
-    return Loaded(**{**asdict(found), "solved": solved, "times": tuple(times), "statuses": tuple(statuses)})
-
-
-def _reach(figure: Figure, scene: Scene, count: int) -> tuple[list[str], list[float]]:
-    import wholebody as wb
-
     statuses: list[str] = []
     times: list[float] = []
-    targets = tip_targets(figure, scene, count)
+    targets = tip_targets(figure, scene, reaches)
     wb.solve(wb.Problem(scene, goals=[wb.Point(*targets[0])]))  # numba's loops are compiled or read back
     for tip, target in targets:
         problem = wb.Problem(scene, goals=[wb.Point(tip, target)])
         began = time.process_time()
         statuses.append(wb.solve(problem).status)
         times.append(time.process_time() - began)
-    return statuses, times
+    return replace(found, solved=statuses.count("solved"), times=tuple(times), statuses=tuple(statuses))
 
 
 def tip_targets(figure: Figure, scene: Scene, count: int) -> list[tuple[str, Array]]:
@@ -140,3 +132,75 @@ def tip_targets(figure: Figure, scene: Scene, count: int) -> list[tuple[str, Arr
         pin.framesForwardKinematics(figure.model, data, q)
         found.append((tip, np.array(data.oMf[figure.frame_id(tip)].translation)))
     return found
+
+
+@dataclass(frozen=True)
+class Robot:
+    """One description.
+
+    Attributes:
+        name: its path below the folder.
+        first: loaded with an empty cache.
+        again: loaded once more, and reached with; None where the first was not loaded.
+    """
+
+    name: str
+    first: Loaded
+    again: Loaded | None
+
+    @property
+    def refusal(self) -> str:
+        """The sentence with the file's path shortened to its name below the folder."""
+        _, found, tail = self.first.refused.partition(self.name)
+        return f"{self.name}{tail}" if found else self.first.refused
+
+
+def descriptions(folder: Path) -> list[Path]:
+    """Return the URDF and MJCF files below a folder.
+
+    Raises:
+        InputError: no folder, or no description in it.
+    """
+    if not os.path.isdir(folder):
+        raise InputError(f"{folder}: there is no such folder; give one that holds robot descriptions")
+    found = sorted(folder.rglob("*.urdf")) + sorted(path for path in folder.rglob("*.xml") if _is_mjcf(path))
+    if not found:
+        raise InputError(f"{folder}: there are no .urdf files and no MJCF files below it")
+    return found
+
+
+def _is_mjcf(path: Path) -> bool:
+    try:
+        _, outermost = next(iter(ElementTree.iterparse(path, events=["start"])))
+        return bool(outermost.tag == "mujoco")
+    except (ElementTree.ParseError, StopIteration, OSError, LookupError, ValueError):
+        return False
+
+
+def measure(folder: Path, reaches: int) -> Iterator[Robot]:
+    """Load every description of a folder twice, each time in a process of its own, and reach with it the second time.
+
+    The folder and its parents are looked up for packages.
+    """
+    for path in descriptions(folder):
+        with Scratch() as cache:
+            first = _examined(path, 0, str(cache))
+            again = _examined(path, reaches, str(cache)) if not first.refused else None
+        yield Robot(str(path.relative_to(folder)), first, again)
+
+
+def _examined(path: Path, reaches: int, cache: str) -> Loaded:
+    child = Child({VARIABLE: cache, "OMP_NUM_THREADS": "1"})
+    try:
+        found: Loaded = child.call(examine, str(path), reaches, seconds=LONGEST)
+    except EndedError as error:
+        refused = f"it takes more than {LONGEST:g} s" if error.overtime else str(error)
+        return Loaded(LONGEST if error.overtime else 0.0, refused=refused)
+    finally:
+        child.close()
+    return found
+
+
+def page(robots: list[Robot], facts: Mapping[str, str], reaches: int) -> str:
+    """Return the page on robots as Markdown."""
+    return render("robots.md", robots=robots, facts=facts, reaches=reaches) + "\n"

@@ -1,48 +1,72 @@
-"""Asks a method a hard question, and writes down what it answers; nothing is judged here."""
+"""Asks methods hard questions, each in a process of its own: what hangs or crashes costs one cell and a time."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from wholebody.arrays import Array
 from wholebody.bench.adapters.base import Adapter
-from wholebody.bench.stability.case import HardCase, Nonsense, Posed, Stream
+from wholebody.bench.stability.case import NOTHING, Answer, HardCase, Nonsense, Posed, Stream
+from wholebody.bench.stability.judging import Judged, judge
+from wholebody.compiled import compile_all
 from wholebody.errors import WholebodyError
 from wholebody.methods.drag import Drag
+from wholebody.runner import Child, EndedError, Job, allow, run_jobs, tell
 
 ASKED = 1e-5  # m, rad: tolerance that methods are asked for; they are judged by the case's own
+CAP = 20.0  # s: a method that has not answered by then, or has not made its next frame, hangs
+JUDGING = 120.0  # s: a judgement of many frames, all pairs of each
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What a method did with one case.
+class Cell:
+    """One method's answer to one case, and what it measures."""
 
-    Attributes:
-        postures: (k, nq) its answer, or one posture a frame; empty where it gave none.
-        status: what it says of its answer; "" for streams, which say only what is left.
-        left: (k,) what it says is left to the goal, metres or radians; NaN where it does not say.
-        refusal: what it says where it refuses.
-        failure: an exception that is no WholebodyError, or how the process ended.
-        taken: nonsense that it took without a word.
-        seconds: wall time.
-        message: its own sentence.
-    """
-
-    postures: Array
-    status: str = ""
-    left: tuple[float, ...] = ()
-    refusal: str = ""
-    failure: str = ""
-    taken: tuple[str, ...] = ()
-    seconds: float = 0.0
-    message: str = ""
+    case: HardCase
+    method: str
+    answer: Answer
+    judged: Judged
 
 
-NOTHING = np.zeros((0, 0))
+def run(cases: Sequence[HardCase], adapters: Sequence[Adapter], jobs: int = 1, cap: float = CAP) -> Iterator[Cell]:
+    """Every case by every method, as they end, in `jobs` processes; `cap` is seconds for an answer, or for a frame."""
+    _warm()
+    left = (Job((case, adapter.name), _cell, (case, adapter, cap), cap) for case in cases for adapter in adapters)
+    for outcome in run_jobs(lambda: next(left, None), [Child(forked=True) for _ in range(jobs)]):
+        case, method = outcome.job.name
+        answer = outcome.notes[0] if outcome.notes else Answer(NOTHING)
+        if outcome.error is not None:
+            failure = "its answer cannot be judged" if outcome.notes else _failure(outcome.error, cap)
+            answer = Answer(NOTHING, failure=failure)
+        yield Cell(case, method, answer, outcome.answer or Judged())
+
+
+def _warm() -> None:
+    """Import and compile in this process what most cells need, so that no cell is timed with it."""
+    from wholebody.bench.stability.streams import thin_plate
+    from wholebody.methods.qp.method import QP
+
+    compile_all()
+    question = thin_plate()
+    judged = QP().solve(question.problem)
+    question.problem.scene.sweep(question.problem.start, judged.q)
+
+
+def _cell(case: HardCase, adapter: Adapter, cap: float) -> Judged:
+    """Ask, send the answer, then judge it: the clock for the method stops with the answer."""
+    answer = ask(case, adapter, lambda: allow(cap))
+    allow(JUDGING)
+    tell(answer)
+    return judge(case, answer)
+
+
+def _failure(error: EndedError, cap: float) -> str:
+    if error.overtime:
+        return f"hangs: no answer in {cap:g} s"
+    return f"crashes: {error.how}" if error.code < 0 else f"ends its process with code {error.code}"
 
 
 def ask(case: HardCase, adapter: Adapter, alive: Callable[[], None] = lambda: None) -> Answer:
@@ -61,9 +85,10 @@ def ask(case: HardCase, adapter: Adapter, alive: Callable[[], None] = lambda: No
 
 
 def _posed(question: Posed, adapter: Adapter) -> Answer:
-    method = adapter.make(ASKED, question.iterations)
-    if question.adjust is not None:
-        method = question.adjust(method)
+    if question.hindered and adapter.hindered is not None:
+        method = adapter.hindered(tolerance=ASKED)
+    else:
+        method = adapter.make(ASKED, 1 if question.hindered else question.iterations)
     solution = method.solve(question.problem)
     left = max(solution.assessment.goal_error, solution.assessment.goal_angle)
     return Answer(

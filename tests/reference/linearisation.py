@@ -1,0 +1,160 @@
+"""Everything that counts at a posture, term by term: what the compiled pass of `wholebody.linearisation` must do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from tests.reference.contact_rows import ReferenceRowBuilder
+from wholebody.arrays import Array, Indices
+from wholebody.errors import InputError
+from wholebody.figures.state import State, Wrench
+from wholebody.linearisation import Linearisation
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+from wholebody.workspace import Workspace
+
+
+class ReferenceLineariser:
+    """Linearises one problem at many postures, in the room of one run.
+
+    Attributes:
+        workspace: moves from posture to posture, and sees things where they were when the run began.
+        goals: what is linearised; may be replaced.
+    """
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        limits: Callable[[Array], tuple[Array, Array]],
+        goals: Sequence[Goal],
+        constraints: Sequence[Constraint],
+        bounds: Sequence[Bound],
+        measures: Sequence[Measure],
+        clearances: Array,
+        dt: float | None = None,
+    ) -> None:
+        """Take the resolved terms of a problem.
+
+        Args:
+            workspace: of this run alone.
+            limits: bounds that the joints' limits put on the displacement of a posture; see `Figure.tangent_bounds`.
+            goals: resolved goals.
+            constraints: resolved constraints.
+            bounds: resolved bounds on the displacement.
+            measures: resolved measures.
+            clearances: (pairs,) least distance asked of every collision pair, metres.
+            dt: step in seconds for bounds that need one.
+        """
+        self.workspace, self.state, self._limits = workspace, workspace.state, limits
+        self.constraints, self.bounds, self.measures, self.dt = constraints, bounds, measures, dt
+        self.take(goals, clearances)
+
+    def take(self, goals: Sequence[Goal], clearances: Array) -> None:
+        """Put other goals and clearances in the place of the present ones.
+
+        Raises:
+            InputError: there is not one clearance for each pair.
+        """
+        if clearances.shape != (len(self.workspace.table.pairs),):
+            count = len(self.workspace.table.pairs)
+            raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
+        self.goals, self.clearances = goals, clearances
+        self._largest_clearance = float(clearances.max()) if len(clearances) else 0.0
+
+    def at(self, q: Array, within: float) -> Linearisation:
+        """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance."""
+        state, workspace = self.state, self.workspace
+        contacts = workspace.near(q, within + self._largest_clearance)
+        clearance = self.clearances[contacts.number]
+        rows = ReferenceRowBuilder(workspace.table).rows(contacts, clearance)
+
+        errors = [np.atleast_1d(goal.error(state)) for goal in self.goals]
+        values = [np.atleast_1d(constraint.value(state)) for constraint in self.constraints]
+        sizes = [len(part) for part in (*errors, *values)]
+        jacobian = self._jacobians(state, sizes, rows.wrench, rows.second, rows.first)
+        goal_rows = sum(len(error) for error in errors)
+        value_rows = sum(len(value) for value in values)
+        lower, upper = self._box(state)
+        measure, gradient, curvature = self._measure(state)
+        return Linearisation(
+            q=np.array(q, dtype=float),
+            goal_error=_joined(errors),
+            goal_jacobian=jacobian[:goal_rows],
+            value=_joined(values),
+            value_jacobian=jacobian[goal_rows : goal_rows + value_rows],
+            contacts=contacts,
+            gap=rows.gap,
+            gap_jacobian=jacobian[goal_rows + value_rows :],
+            gap_contact=rows.contact,
+            clearance=clearance[rows.contact],
+            measure=measure,
+            gradient=gradient,
+            curvature=curvature,
+            lower=lower,
+            upper=upper,
+        )
+
+    def _jacobians(
+        self, state: State, sizes: Sequence[int], gap_wrench: Array, second: Indices, first: Indices
+    ) -> Array:
+        """Rows of all goals, constraints and contacts, in this order; the wrenches among them in one product.
+
+        Raises:
+            InputError: a term has other numbers of values (`sizes`) and rows.
+        """
+        wrenches: list[Array] = []
+        joint: list[int] = []
+        against: list[int] = []
+        dense: list[tuple[int, Array]] = []
+        row = 0
+        terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
+        for term, values in zip(terms, sizes, strict=True):
+            part = term.jacobian(state)
+            if isinstance(part, Wrench):
+                size = len(part.rows)
+                wrenches.append(part.rows)
+                joint += [part.joint] * size
+                against += [part.against] * size
+            else:
+                size = len(part)
+                dense.append((row, part))
+                wrenches.append(np.zeros((size, 6)))
+                joint += [0] * size
+                against += [0] * size
+            if size != values:
+                raise InputError(
+                    f"{type(term).__name__} has {values} values and {size} rows at a posture; give as many"
+                )
+            row += size
+        stacked = np.vstack([*wrenches, gap_wrench])
+        result = state.rows(
+            stacked,
+            np.concatenate([np.array(joint, dtype=np.intp), second]),
+            np.concatenate([np.array(against, dtype=np.intp), first]),
+        )
+        for start, part in dense:
+            result[start : start + len(part)] = part
+        return result
+
+    def _box(self, state: State) -> tuple[Array, Array]:
+        lower, upper = self._limits(state.q)
+        for bound in self.bounds:
+            # a joint out of its limits comes back no faster than the bound lets it
+            low, high = bound.bounds(state, self.dt)
+            lower, upper = np.clip(lower, low, high), np.clip(upper, low, high)
+        return lower, upper
+
+    def _measure(self, state: State) -> tuple[float, Array, Array]:
+        value = 0.0
+        gradient = np.zeros(state.model.nv)
+        curvature = np.zeros(state.model.nv)
+        for term in self.measures:
+            value += term.weight * term.value(state)
+            gradient += term.weight * term.gradient(state)
+            curvature += term.weight * term.curvature(state)
+        return value, gradient, curvature
+
+
+def _joined(parts: list[Array]) -> Array:
+    return np.concatenate(parts) if parts else np.zeros(0)

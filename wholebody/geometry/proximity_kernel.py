@@ -1,0 +1,156 @@
+"""Which pairs can be near, and the distances of those that are, as compiled loops: see `proximity`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.arrays import Array, Indices
+from wholebody.compiled import compiled
+
+
+@compiled()
+def travel(placement: Array, last: Array, reach: Array, travelled: Array) -> None:
+    """Add to `travelled` (n,) how far a point of each piece can have moved since `last`, and renew `last`.
+
+    A point x of a piece moves by at most |t1 - t0| + |R1 - R0| |x|, with the Frobenius norm of R1 - R0.
+
+    Args:
+        placement: (n, 4, 3) where the pieces are now; see `Contacts.placements`.
+        last: (n, 4, 3) where they were when this was asked last; is overwritten.
+        reach: (n,) radius of each piece about its origin; may be infinite.
+        travelled: (n,) metres since the beginning; grows.
+    """
+    for i in range(len(reach)):
+        shift = 0.0
+        turn = 0.0
+        for k in range(3):
+            change = placement[i, 3, k] - last[i, 3, k]
+            shift += change * change
+            last[i, 3, k] = placement[i, 3, k]
+            for j in range(3):
+                change = placement[i, j, k] - last[i, j, k]
+                turn += change * change
+                last[i, j, k] = placement[i, j, k]
+        if turn > 0.0:
+            travelled[i] += np.sqrt(shift) + np.sqrt(turn) * reach[i]
+        elif shift > 0.0:
+            travelled[i] += np.sqrt(shift)
+
+
+@compiled()
+def cull(
+    placement: Array,
+    pairs: Indices,
+    reach: Array,
+    half: Array,
+    travelled: Array,
+    bound: Array,
+    extent: Array,
+    within: float,
+    index: Indices,
+) -> int:
+    """Pairs that may be nearer than `within`, in the order of the pairs: their places go to the front of `index`.
+
+    A pair is left out where one of three lower bounds of its signed distance is not below `within`: the bound when it
+    was last looked at, less what both pieces have moved since; the gap between spheres about the pieces; the gap
+    between boxes along the world's axes about them. All three bound the distance in penetration too.
+
+    Args:
+        placement: (n, 4, 3) where the pieces are.
+        pairs: (pairs, 2) their pieces.
+        reach: (n,) radius of each piece about its origin; may be infinite.
+        half: (n, 3) half the size of a box about each piece's origin, along its own axes.
+        travelled: (n,) see `travel`.
+        bound: (pairs,) lower bound of the distance when the pair was last looked at, plus what both had travelled then;
+            renewed for pairs that the spheres or boxes leave out.
+        extent: (n, 3) room for the sizes of the boxes.
+        within: metres.
+        index: (pairs,) room for the answer.
+
+    Returns:
+        How many there are.
+    """
+    for i in range(len(reach)):
+        for k in range(3):
+            total = 0.0
+            for j in range(3):
+                total += abs(placement[i, j, k]) * half[i, j]
+            extent[i, k] = total
+    count = 0
+    for p in range(len(pairs)):
+        a, b = pairs[p, 0], pairs[p, 1]
+        way = travelled[a] + travelled[b]
+        if bound[p] - way >= within:
+            continue
+        square = 0.0
+        boxes = -np.inf
+        for k in range(3):
+            apart = abs(placement[a, 3, k] - placement[b, 3, k])
+            square += apart * apart
+            boxes = max(boxes, apart - extent[a, k] - extent[b, k])
+        gap = max(boxes, np.sqrt(square) - reach[a] - reach[b])
+        if gap >= within:
+            bound[p] = gap + way
+            continue
+        index[count] = p
+        count += 1
+    return count
+
+
+@compiled()
+def gather(
+    results: Array,
+    index: Indices,
+    pairs: Indices,
+    points_meet: Array,
+    travelled: Array,
+    bound: Array,
+    accuracy: float,
+    within: float,
+    table: Array,
+    number: Indices,
+    pair: Indices,
+) -> tuple[int, bool]:
+    """Copy the results of the pairs nearer than `within`, and remember the distances of all that were asked.
+
+    Args:
+        results: (pairs, 10) of coal; see `memory_views.distance_view`.
+        index: (k,) the pairs that were asked.
+        pairs: (pairs, 2) their pieces.
+        points_meet: (pairs,) distance at and below which coal may have no normal.
+        travelled: (n,) see `travel`.
+        bound: (pairs,) see `cull`; renewed.
+        accuracy: metres to which a distance is known, and share of it.
+        within: metres.
+        table: (k, 10) room for distance, normal and nearest points.
+        number: (k,) room for the places of the pairs.
+        pair: (k, 2) room for their pieces.
+
+    Returns:
+        How many are near, and whether one of them needs its normal repaired.
+    """
+    count = 0
+    broken = False
+    for p in index:
+        a, b = pairs[p, 0], pairs[p, 1]
+        distance = results[p, 0]
+        bound[p] = distance - accuracy * (1.0 + abs(distance)) + travelled[a] + travelled[b]
+        if not distance < within:
+            continue
+        for k in range(10):
+            table[count, k] = results[p, k]
+        number[count] = p
+        pair[count, 0], pair[count, 1] = a, b
+        broken = broken or distance <= points_meet[p]
+        count += 1
+    return count, broken
+
+
+@compiled()
+def mark(active: NDArray[np.bool_], pairs: Indices, before: Indices, index: Indices) -> None:
+    """Set the entries (first, second) of the pairs `index` in a matrix that has those of `before`."""
+    for p in before:
+        active[pairs[p, 0], pairs[p, 1]] = False
+    for p in index:
+        active[pairs[p, 0], pairs[p, 1]] = True
