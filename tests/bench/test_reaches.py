@@ -45,7 +45,7 @@ def test_a_seed_makes_one_reach_and_another_seed_another() -> None:
 def test_a_row_is_what_the_assessment_says() -> None:
     row = solve_reach(0, "qp")
     assert row.status == "solved"
-    assert row.how in ("directly", "by homotopy", "from another start")
+    assert row.how in ("directly", "by feasibility first", "from another start")
     assert row.goal_error < 2e-5
     assert row.penetration < 1e-4
     assert row.limit_violation < 1e-9

@@ -165,6 +165,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     if method != "qp":
         return {}
     from wholebody.methods.qp.acceleration import Anderson
+    from wholebody.methods.qp.feasibility import Feasibility
     from wholebody.methods.qp.funnel import Funnel
     from wholebody.methods.qp.multistart import Search
     from wholebody.methods.qp.sqp import SQP
@@ -173,8 +174,8 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "the funnel narrows": (Funnel, "narrow", lambda self, before, after: None),
         "the watchdog": (SQP, "_promises", lambda self, here, there: False),
         "acceleration": (Anderson, "propose", lambda self, dq: None),
-        "a start with bent joints": (Search, "_bent", lambda self, start: iter(())),
-        "homotopy": (Search, "_homotopy", lambda self, start: iter(())),
+        "feasibility first": (Search, "_feasibility_first", lambda self, start: self.best),
+        "turning on to the other limit": (Feasibility, "_turned_on", lambda self, here, program, step, wrapped: None),
         "relaxed probes": (Search, "_relaxed_probes", lambda self, starts: iter(())),
         "descents without contacts": (Search, "_known_out_of_reach", lambda self, q: False),
     }

@@ -43,7 +43,7 @@ class ReachRow:
         seed: what it was made from.
         method: which, such as "qp" or "qp/osqp".
         programs: what closed its quadratic programs, and how many.
-        how: "directly", "by homotopy", "from another start", or the message of what was not solved.
+        how: "directly", "by feasibility first", "from another start", or the message of what was not solved.
         penetration: deepest overlap.
         clearance_violation: by how much the worst pair misses its clearance.
         constraint_violation: of the feet.

@@ -31,8 +31,8 @@ class QP:
             answers are the same to rounding; `Solution.programs` says how many programs each closed.
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most programs for one descent.
-        budget: most programs that continuation and restarts may add when the first descent does not reach the goals;
-            a program takes about a millisecond.
+        budget: most programs that restarts may add when no descent from the start reaches the goals; a program takes
+            about a millisecond.
         restarts: most seeded starts that are tried.
         seed: of the restarts.
         measures: whether the measures are to be least. Without, the first posture is the answer that meets the goals
@@ -81,7 +81,7 @@ class QP:
         return None
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture; the best of a descent, of goals approached by homotopy, and of seeded starts.
+        """Find a posture; the best of a descent, of another that seeks feasibility first, and of seeded starts.
 
         The later ones are tried only when the earlier ones did not reach the goals, and within the budget. Never
         raises for a goal out of reach or a start in penetration: the status says so.

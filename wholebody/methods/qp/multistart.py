@@ -1,9 +1,9 @@
-"""All the ways that are tried for one problem: a descent, bent limbs, goals approached by homotopy, other starts."""
+"""All the ways that are tried for one problem: a descent, feasibility first, other starts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from itertools import chain, islice
+from collections.abc import Iterator
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -13,10 +13,11 @@ from wholebody.linearisation import Lineariser
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
 from wholebody.methods.qp.curved_reach import CurvedReach
+from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP, LocalSolution
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.starts import Minima, bent, restarts
+from wholebody.methods.starts import Minima, restarts
 from wholebody.problem import Problem
 from wholebody.solution import TraceEntry
 from wholebody.workspace import Workspace
@@ -28,7 +29,6 @@ RELAXATION_DEPTH = 0.15  # m: by which a relaxed probe may be inside of things; 
 NO_NEARER = 20  # relaxed probes in a row that came no nearer: the goals are out of reach
 REACHED = 10.0  # tolerances: relaxed probes that end farther from the goals are given up
 NEARER = 0.02  # share of what is left by which a probe is nearer
-FIRST = 8  # relaxed probes before homotopy, which takes as many programs and stays near the start
 REACH_TRIALS = 10  # most descents without contacts that tell whether goals are out of reach
 REACH_TRIAL_PROGRAMS = 60  # most programs of each
 FAR = (1.0, 0.6)  # shares of the joints' ranges that their starts may be away by
@@ -38,7 +38,6 @@ AGREE = 1.05  # times the least violation up to which they count as equally near
 COMING_NEAR = 40  # most programs from there to the nearest posture among things
 PUSHED_OUT = 2  # of the nearest ends of such descents, how many are pushed out of things
 FOR_WAYS = 0.5  # share of the time limit that ways after the first may take: to come nearest takes its time too
-HOMOTOPY = (0.25, 0.5, 0.75)  # of the way to the goals, when the straight attempt ends in a local minimum
 
 
 class Settings(NamedTuple):
@@ -53,7 +52,7 @@ class Settings(NamedTuple):
 
 
 class Search:
-    """SQP, continuation and restarts for one problem, remembering the best posture."""
+    """SQP, feasibility first and restarts for one problem, remembering the best posture."""
 
     def __init__(
         self, problem: Problem, workspace: Workspace, solver: QPSolver, settings: Settings, control: Control
@@ -92,8 +91,10 @@ class Search:
 
     def _try_ways(self) -> None:
         start = self.problem.scene.figure.clamp(self.problem.start)
-        first = self._descend(start, full_step=not self.settings.measures, out_of_reach=self._known_out_of_reach)
-        if self._accept(first, "directly"):
+        first = self._descend(start, full_step=not self.settings.measures, early_exit=True)
+        if self._accept(first, "directly") or self.control.over:
+            return
+        if self._accept(self._feasibility_first(start), "by feasibility first"):
             return
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         least = least_left(self.contradictions)
@@ -104,30 +105,18 @@ class Search:
             return
         rng = np.random.default_rng(self.settings.seed)
         starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, self.settings.restarts))
-        ways = chain(
-            self._bent(start),
-            self._relaxed_probes(islice(starts, FIRST)),
-            self._homotopy(start),
-            self._relaxed_probes(starts),
-        )
-        for local, how in ways:
+        for local, how in self._relaxed_probes(starts):
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
 
-    def _bent(self, start: Array) -> Iterator[tuple[LocalSolution, str]]:
-        """Straight limbs hide what bending them would do: the same descent with joints moved off their limits."""
-        q = bent(self.problem, self.lineariser.state, start)
-        if q is not None:
-            yield self._try(q, "bent"), "from a start with bent joints"
-
-    def _homotopy(self, start: Array) -> Iterator[tuple[LocalSolution, str]]:
-        """Goals approached through intermediate ones: the errors at the start, shrinking to nothing."""
-        if not self.problem.goals:
-            return
-        whole, q = self._goal_errors(start), start
-        for share in HOMOTOPY:
-            q = self._try(q, "homotopy", (1.0 - share) * whole).q
-        yield self._try(q, "homotopy"), "by homotopy"
+    def _feasibility_first(self, start: Array) -> LocalSolution:
+        """A posture that fits, without regard to the measures; where there is one, they improve from there."""
+        local = self._feasibility(self.lineariser, self.settings.iterations, "feasibility").run(start)
+        self.spent += local.iterations
+        if local.violation.worst > self.settings.tolerance or not self.settings.measures:
+            return local
+        self._accept(local, "by feasibility first")
+        return self._descend(local.q)
 
     def _relaxed_probes(self, starts: Iterator[Array]) -> Iterator[tuple[LocalSolution, str]]:
         """Relaxed probes from the start and from seeded postures, and a descent from where one reaches the goals.
@@ -165,10 +154,16 @@ class Search:
         """
         most = max(min(self._left, PROBE_PROGRAMS), 1)
         lineariser = self.lineariser if depth == 0.0 else self.lineariser.relaxed(depth)
-        local = self._descent(most, None, "probe", measures=False, early_exit=True, lineariser=lineariser).run(start)
+        local = self._feasibility(lineariser, most, "probe").run(start)
         self.spent += local.iterations
         self._left -= local.iterations
         return local
+
+    def _feasibility(self, lineariser: Lineariser, most: int, note: str) -> Feasibility:
+        return Feasibility(
+            self.problem, self.subproblem, lineariser, self.solver, self.settings.tolerance, most, self.trace, note,
+            self.control,
+        )  # fmt: skip
 
     def _settle(self) -> None:
         """Where the goals are not reached, come as near as goes, then improve the measures from there."""
@@ -272,15 +267,14 @@ class Search:
         measures: bool = True,
         most: int | None = None,
         full_step: bool = False,
-        out_of_reach: Callable[[Array], bool] | None = None,
+        early_exit: bool = False,
     ) -> LocalSolution:
         """Descend from a start; where that ends with something that must hold not holding, mend it."""
         iterations = self.settings.iterations if most is None else min(most, self.settings.iterations)
-        descent = self._descent(iterations, offset, note, measures=measures, full_step=full_step)
-        descent.out_of_reach = out_of_reach
+        descent = self._descent(iterations, offset, note, measures=measures, full_step=full_step, early_exit=early_exit)
         local = descent.run(start)
         self.spent += local.iterations
-        if out_of_reach is not None and self._out_of_reach:
+        if early_exit:
             return local
         if not _held(local, self.settings.tolerance) and offset is None and (most is None or local.iterations < most):
             stayed = self._stay(local)
@@ -296,10 +290,9 @@ class Search:
         measures: bool = True,
         early_exit: bool = False,
         full_step: bool = False,
-        lineariser: Lineariser | None = None,
     ) -> SQP:
         return SQP(
-            self.subproblem, lineariser or self.lineariser, self.solver, self.settings.tolerance, iterations, offset,
+            self.subproblem, self.lineariser, self.solver, self.settings.tolerance, iterations, offset,
             self.trace, note, measures and self.settings.measures, early_exit, full_step, self.control,
         )  # fmt: skip
 

@@ -9,7 +9,6 @@ that could have jumped over something are swept.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -38,6 +37,7 @@ LEAST_WITHIN = 0.05  # m: pairs nearer than what a step asks for get rows, and a
 MOST_WITHIN = 0.12  # m: but none farther apart than this; more is slower, less means more steps that meet things unseen
 SLOW = 0.1  # share of the violation that must go in PATIENCE iterations, else only the nearest posture is sought
 PATIENCE = 6
+PROGRESS = 0.1  # m, rad: or as much, whatever is left: steps are bounded, and far goals take many
 UNIMPROVED = 4  # postures that fit and save less than ten tolerances of the measure: then it ends
 RENEWALS = 2  # times that a descent with small steps begins anew with long ones before it is taken for settled
 RESTORABLE = 0.03  # m, rad: violation that the next step is trusted to mend
@@ -88,12 +88,10 @@ class SQP:
         note: what to call the iterations in the trace.
         measures: whether the measures count from the beginning; without them only the goals are sought, and the first
             posture that fits is the end.
-        early_exit: whether to give up where the violation hardly lessens for a while.
+        early_exit: whether to end where the violation hardly lessens for a while although measures do not count.
         full_step: whether to ask for all of the way to the goals in every step, damped by how far they are, until
             steps are rejected or gain little; else for a piece of it.
         control: what may end it.
-        out_of_reach: asked once, where the violation first lessens hardly for a while, whether to go on from a posture
-            (nq,) leads nowhere.
     """
 
     subproblem: Subproblem
@@ -108,7 +106,6 @@ class SQP:
     early_exit: bool = False
     full_step: bool = False
     control: Control = field(default_factory=lambda: Control(np.inf))
-    out_of_reach: Callable[[Array], bool] | None = None
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
@@ -165,15 +162,12 @@ class SQP:
                 here = there
                 self._keep(here)
                 history.append(here.violation.total)
-                if self.early_exit and self._stalls(history):
-                    break
-                if self.out_of_reach is not None and self._stalls(history):
-                    out_of_reach, self.out_of_reach = self.out_of_reach(here.at.q), None
-                    if out_of_reach:
+                if stalls(history, self.tolerance):
+                    if self.early_exit and not self._measures:
                         break
-                if self._measures and self._stalls(history):
-                    self._measures = False
-                    self._memory.forget()
+                    if self._measures:
+                        self._measures, history = False, []
+                        self._memory.forget()
                 elif self.measures and not self._measures and here.violation.worst <= 10.0 * self.tolerance:
                     self._measures = True
             elif self._anchor is not None:
@@ -220,12 +214,6 @@ class SQP:
         still = float(np.abs(answer.x).max(initial=0.0)) <= 10.0 * self.tolerance
         return still or predicted.measure <= 1e-2 * self.tolerance * (1.0 + abs(here.at.measure))
 
-    def _stalls(self, history: list[float]) -> bool:
-        """Whether the violation has hardly lessened for a while."""
-        if len(history) <= PATIENCE or history[-1] <= 100.0 * self.tolerance:
-            return False
-        return min(history[-PATIENCE:]) > (1.0 - SLOW) * min(history[:-PATIENCE])
-
     def _advance(
         self, here: Iterate, program: QuadraticProgram, answer: QPSolution, predicted: PredictedReduction
     ) -> Iterate | None:
@@ -241,7 +229,7 @@ class SQP:
         there = self._iterate_at(pin.integrate(self.lineariser.state.model, here.at.q, dq))
         acceptance = self._judge(here, there, predicted)
         promising = not acceptance.accepted and self._promises(here, there)
-        if (acceptance.accepted or promising) and not self.early_exit and self._jumps(here, there):
+        if (acceptance.accepted or promising) and self._jumps(here, there):
             acceptance, promising = StepAcceptance(False, False, False, "blocked"), False
         self._record(there, dq, "tentative" if promising else acceptance.by)
         step = float(np.abs(dq).max(initial=0.0))
@@ -334,3 +322,11 @@ class SQP:
             )
         )
         self.control.tell(self.trace[-1])
+
+
+def stalls(history: list[float], tolerance: float) -> bool:
+    """Whether the violation, one figure an iteration, has hardly lessened for a while, and far from the tolerance."""
+    if len(history) <= PATIENCE or history[-1] <= 100.0 * tolerance:
+        return False
+    before = min(history[:-PATIENCE])
+    return min(history[-PATIENCE:]) > before - min(SLOW * before, PROGRESS)

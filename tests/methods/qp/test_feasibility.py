@@ -1,0 +1,57 @@
+"""Feasibility first: what a descent with small pulls does not reach from the same start."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.bench.problem_sets.registry import SETS
+from wholebody.bench.stability.posed import the_long_way_round
+
+
+def test_a_goal_beyond_a_limit_is_reached_from_the_other_side(honest):
+    problem = the_long_way_round().problem
+    solution = honest(problem, wb.QP(budget=0, restarts=0).solve(problem))
+    assert solution.status == "solved"
+    assert solution.q[0] < 0.0 < problem.start[0]
+
+
+def test_a_frozen_joint_is_not_turned_on(honest):
+    whole = the_long_way_round().problem
+    problem = wb.Problem(
+        whole.scene, whole.start, goals=whole.goals, constraints=[wb.Freeze(whole.scene.figure.joints[0])]
+    )
+    solution = honest(problem, wb.QP(budget=0, restarts=0).solve(problem))
+    assert solution.status == "unreachable"
+    assert solution.q[0] == problem.start[0]
+
+
+@pytest.mark.parametrize("measures", [True, False])
+@pytest.mark.parametrize("number", [2, 8, 11])
+def test_arms_cross_from_one_start(honest, number, measures):
+    """Two of places alone, and one with directions, for which places come first."""
+    problem = SETS["self_contact"].make(number, 0).problem
+    assert honest(problem, wb.QP(budget=0, restarts=0, measures=measures).solve(problem)).status == "solved"
+
+
+def test_what_fits_is_kept_where_measures_lead_away(honest):
+    problem = SETS["self_contact"].make(45, 0).problem
+    assert honest(problem, wb.QP(budget=0, restarts=0).solve(problem)).status == "solved"
+
+
+def test_whole_steps_stay_in_their_box(planar_arm):
+    from wholebody.methods.qp.feasibility import STEP, Feasibility
+    from wholebody.methods.qp.solvers.registry import make_solver
+    from wholebody.methods.qp.subproblem import Subproblem
+
+    problem = wb.Problem(
+        wb.Scene(planar_arm((0.5, 0.4))), start=np.array([0.1, 0.4]), goals=[wb.Point("tip", (-0.5, 0.3, 0.0))]
+    )
+    workspace = problem.workspace()
+    run = Feasibility(
+        problem, Subproblem(problem, workspace.state), problem.lineariser(workspace), make_solver("osqp"), 1e-6, 100
+    )
+    local = run.run(problem.start)
+    assert local.violation.worst <= 1e-6
+    assert max(entry.step for entry in run.trace) <= STEP + 1e-12

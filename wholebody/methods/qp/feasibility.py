@@ -1,0 +1,174 @@
+"""Feasibility first: from a start to a posture that fits, by whole Gauss-Newton steps in a small box, without measures.
+
+Each program asks for all that is left of the goals and lets no degree of freedom go farther than the box. So the step
+slides along what is in the way with all of its length: the joints that are held up stay, and the others go on. A step
+that asks for a piece of the way and least motion, as `sqp` does, gets no nearer there. Steps are taken as they are;
+where they go to and fro the box shrinks.
+
+Where both places and directions are asked for, places come first. A wrist that turns early takes the arm to a limit
+from which the place cannot be reached.
+
+Where a joint is held up by its limit, and turning on by what is missing to a full turn leads to its other limit, it is
+put there: a goal beyond the limit of a shoulder that turns by 320 degrees is reached from the other side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array, Mask
+from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.linearisation import Lineariser
+from wholebody.methods.control import Control
+from wholebody.methods.qp.quadratic_program import QuadraticProgram
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.sqp import Iterate, LocalSolution, stalls
+from wholebody.methods.qp.subproblem import BOX, Subproblem, Violation
+from wholebody.methods.qp.working_set import WorkingSet
+from wholebody.problem import Problem
+from wholebody.solution import TraceEntry
+
+STEP = 0.2  # rad, m: most that a degree of freedom moves in a program; larger = fewer programs, limbs jump over others
+LEAST_STEP = 1e-3  # rad, m: of the box; smaller = slower to end where steps go to and fro
+DAMPING = 0.05  # share of the squared error, as in `sqp`; less = dozens of bounds hold a step, and programs are dear
+SHORTER, LONGER = 0.7, 1.2  # factors of the box after a step back and after a step on
+WITHIN = 0.1  # m: pairs nearer than this get rows
+DIRECTIONS_LATER = 2.5e-3  # share of their weight that directions have while places come first
+PLACED = 0.01  # m: places nearer than this are reached, and directions count
+WIDE = 5.0  # rad: range from which a joint may be taken from one limit to the other
+AT_LIMIT = 1e-6  # rad
+
+
+@dataclass
+class Feasibility:
+    """One attempt; call `run` once.
+
+    Attributes:
+        problem: what is asked.
+        subproblem: builds the programs.
+        lineariser: linearises the problem.
+        solver: solves the programs.
+        tolerance: metres and radians.
+        iterations: most programs to solve.
+        trace: grows by one entry a program.
+        note: what to call the programs in the trace.
+        control: what may end it.
+    """
+
+    problem: Problem
+    subproblem: Subproblem
+    lineariser: Lineariser
+    solver: QPSolver
+    tolerance: float
+    iterations: int
+    trace: list[TraceEntry] = field(default_factory=list)
+    note: str = "feasibility"
+    control: Control = field(default_factory=lambda: Control(np.inf))
+
+    def run(self, start: Array) -> LocalSolution:
+        """Go from a posture within limits, shape (nq,), to one that fits; else to where nothing leads nearer."""
+        directions = self._directions(start)
+        local = self._attempt(start, directions, False, 0)
+        if local.violation.worst <= self.tolerance or not directions.any() or directions.all():
+            return local
+        other = self._attempt(start, directions, True, local.iterations)
+        return other if other.violation.total < local.violation.total else local._replace(iterations=other.iterations)
+
+    def _attempt(self, start: Array, directions: Mask, later: bool, count: int) -> LocalSolution:
+        """One of them: with or without places first; `count` programs were solved before."""
+        weight = np.where(directions & later, DIRECTIONS_LATER, 1.0)
+        working_set = WorkingSet(self.solver)
+        here, box, last = self._iterate_at(start), STEP, np.zeros(self.lineariser.state.model.nv)
+        history: list[float] = []
+        wrapped: set[int] = set()
+        while here.violation.worst > self.tolerance and count < self.iterations and not self.control.over:
+            error = here.rows.soft_error[: here.rows.goals]
+            if later and here.violation.elastic <= PLACED and np.linalg.norm(error[~directions]) <= PLACED:
+                later, weight, history = False, np.ones(len(error)), []
+            history.append(_merit(here.violation, float(np.sqrt((weight * error) @ error))))
+            count += 1
+            program = self._program(here, box, weight)
+            step = working_set.solve(program, here.rows.key).x
+            stuck = float(np.abs(step).max(initial=0.0)) <= self.tolerance**2 or stalls(history, self.tolerance)
+            if stuck and later:
+                later, weight, history, box = False, np.ones(len(error)), [], STEP
+                continue
+            if stuck:
+                q = self._turned_on(here, program, step, wrapped)
+                if q is None:
+                    return _end(here, True, count)
+                here, history, box = self._iterate_at(q), [], STEP
+                last = np.zeros_like(step)
+                working_set.forget()
+                self._record(here, 2.0 * np.pi, "turned on")
+                continue
+            box = max(SHORTER * box, LEAST_STEP) if float(step @ last) < 0.0 else min(LONGER * box, STEP)
+            last = step
+            here = self._iterate_at(np.asarray(pin.integrate(self.lineariser.state.model, here.at.q, step)))
+            self._record(here, float(np.abs(step).max(initial=0.0)), "goal")
+        return _end(here, here.violation.worst <= self.tolerance, count)
+
+    def _program(self, here: Iterate, box: float, weight: Array) -> QuadraticProgram:
+        rows = here.rows
+        soft_weight = rows.soft_weight.copy()
+        soft_weight[: rows.goals] *= weight
+        none = np.zeros(len(rows.soft_error))
+        return self.subproblem.program(
+            here.at, rows._replace(soft_weight=soft_weight), box / BOX, None, DAMPING, none, False
+        )
+
+    def _directions(self, q: Array) -> Mask:
+        """Which rows of the goals, (goal rows,) of bool, are angles."""
+        state = self.lineariser.state.update(q)
+        parts = [np.broadcast_to(goal.angular, np.atleast_1d(goal.error(state)).shape) for goal in self.problem.goals]
+        return np.concatenate([np.zeros(0, dtype=bool), *parts])
+
+    def _turned_on(self, here: Iterate, program: QuadraticProgram, step: Array, wrapped: set[int]) -> Array | None:
+        """The posture (nq,) with the joint at its other limit that presses hardest at one; None where there is none.
+
+        Args:
+            here: where nothing leads nearer.
+            program: of that posture.
+            step: (nv,) its answer.
+            wrapped: joints for which this was done; it grows.
+        """
+        limits, q, model = self.problem.scene.figure.limits, here.at.q, self.lineariser.state.model
+        turning = [joint.idx_v for joint in model.joints if joint.shortname().startswith("JointModelR")]
+        pushed = program.gradient(step)[limits.idx_v]
+        after = q[limits.idx_q] + step[limits.idx_v]
+        high = (pushed < 0.0) & (after > limits.upper - AT_LIMIT)
+        low = (pushed > 0.0) & (after < limits.lower + AT_LIMIT)
+        there = np.where(high, limits.lower, limits.upper)
+        move = there - q[limits.idx_q]
+        allowed = (move >= here.at.lower[limits.idx_v] - AT_LIMIT) & (move <= here.at.upper[limits.idx_v] + AT_LIMIT)
+        range_ = limits.upper - limits.lower
+        wide = (range_ > WIDE) & (range_ < 2.0 * np.pi) & np.isin(limits.idx_v, turning)
+        for index in np.argsort(-np.abs(pushed)).tolist():
+            if ((high | low) & allowed & wide)[index] and index not in wrapped:
+                wrapped.add(index)
+                moved: Array = q.copy()
+                moved[limits.idx_q[index]] = there[index]
+                return moved
+        return None
+
+    def _iterate_at(self, q: Array) -> Iterate:
+        at = self.lineariser.at(q, WITHIN)
+        rows = self.subproblem.rows(at)
+        return Iterate(at, rows, self.subproblem.violation(rows), Placed(at.contacts, WITHIN))
+
+    def _record(self, here: Iterate, step: float, what: str) -> None:
+        violation = here.violation
+        held = max(violation.hold, violation.elastic)
+        self.trace.append(TraceEntry(violation.left, held, here.at.measure, step, f"{self.note}: {what}"))
+        self.control.tell(self.trace[-1])
+
+
+def _merit(violation: Violation, goal: float) -> float:
+    return violation._replace(goal=goal).total
+
+
+def _end(here: Iterate, converged: bool, count: int) -> LocalSolution:
+    return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
