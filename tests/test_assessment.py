@@ -47,7 +47,7 @@ def test_it_does_not_use_what_methods_use(free_bodies, monkeypatch):
     def nothing(self, data, within):
         raise AssertionError("the assessment asked the culled distances")
 
-    monkeypatch.setattr(Proximity, "near", nothing)
+    monkeypatch.setattr(Proximity, "query", nothing)
     assert wb.assess(problem, problem.start).penetration == pytest.approx(0.05)
 
 

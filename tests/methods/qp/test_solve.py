@@ -252,9 +252,11 @@ def test_every_solver_poses_the_human(solver, honest):
         scene, goals=[wb.Point("right_index_tip", (0.5, -0.2, 0.8))], constraints=[wb.Hold("left_foot")],
         clearance=0.002,
     )  # fmt: skip
-    solution = honest(problem, wb.QP(solver).solve(problem))
-    assert solution.status == "solved"
-    assert solution.method == f"qp/{solver}"
+    for hot_start in (True, False):
+        method = wb.QP(solver, hot_start=hot_start)
+        solution = honest(problem, method.solve(problem))
+        assert solution.status == "solved"
+        assert solution.method == method.name
 
 
 @pytest.mark.parametrize(

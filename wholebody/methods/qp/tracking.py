@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -212,7 +213,7 @@ class QPTracker:
         following = pin.integrate(self.problem.scene.model, at.q, displacement)
         gone = rows.soft @ displacement
         left = gone[: rows.goals] - program.target[: rows.goals]
-        self._before = _Before(following.copy(), rows.soft_error + gone, float(np.sqrt(left @ left)))
+        self._before = _Before(following.copy(), rows.soft_error + gone, sqrt(left @ left))
         return QPStep(
             following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
             answer.iterations, answer.by, self._working_set.solver.counted(), share,
@@ -227,7 +228,7 @@ class QPTracker:
         if before is not None and np.array_equal(before.q, q):
             # what held constraints miss, because the last step was curved, the next one will miss again
             shift[goals:] = rows.soft_error[goals:] - before.foreseen[goals:]
-            error = float(np.linalg.norm(at.goal_error))
+            error = sqrt(at.goal_error @ at.goal_error)
             damping = DAMPING * min(1.0, before.left / max(error, 1e-12))
         gain = min(1.0, self.dt / SETTLING) if goals else 1.0  # without goals the measures are the task
         program = self._subproblem.program(at, rows, RADIUS, PULL * RADIUS, damping, shift, measures, gain)
