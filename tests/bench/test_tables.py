@@ -89,7 +89,9 @@ def test_what_fell_short_is_said() -> None:
         step_row(tool="placo", reach="contact"),
     ]
     (line,) = goal_lines(rows)
-    assert "median 0.40 of placo's (at most 0.5: reached)" in line
-    assert "p95 1.20 of placo's (at most 1: missed)" in line
-    assert "least distance 0.85 of the clearance (at least 0.9: missed)" in line
-    assert "nothing" in goal_lines([step_row(tool="wholebody", ratio=math.nan, ratio_p95=math.nan)])[0]
+    assert "median 0.400 of placo's (at most 0.08: missed)" in line
+    assert "p95 1.200 of placo's (at most 0.1: missed)" in line
+    assert "1.5 mm short of the clearance (at most 0.001: missed)" in line
+    assert "acceleration 1.00 rad/s² (at most 1: reached)" in line
+    alone = step_row(tool="wholebody", reach="alone", ratio=math.nan, ratio_p95=math.nan)
+    assert "nothing to compare with" in goal_lines([alone])[0]

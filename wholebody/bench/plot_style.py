@@ -15,6 +15,7 @@ COLORS = {
     "wholebody/proxqp": "#9fb8d0",
     "wholebody/piqp": "#b3c6e0",
     "placo": "#d55e00",
+    "placo/pruned": "#e8a06a",
     "mink": "#009e73",
     "pink": "#cc79a7",
 }

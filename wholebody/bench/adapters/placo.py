@@ -6,7 +6,8 @@ The objects are added to its collision model, fixed to the world; it then treats
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Sequence
+from functools import lru_cache, partial
 from typing import ClassVar
 from xml.etree import ElementTree
 
@@ -18,6 +19,9 @@ from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few, made
 from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, WITHIN, Track
 from wholebody.figures.packaged_urdf import urdf_path
+
+SAMPLES = 2000
+ROOT_SPREAD = np.array([0.15, 0.15, 0.1, 0.2, 0.2, 0.2])  # m, rad
 
 
 def placo_adapter() -> Adapter:
@@ -60,8 +64,8 @@ class PlacoTool(Tool):
         pieces, scene = self._robot.collision_model, track.scene.geometry
         for piece in scene.geometryObjects:
             pieces.addGeometryObject(pin.GeometryObject(piece.name, piece.parentJoint, piece.placement, piece.geometry))
-        for pair in scene.collisionPairs:
-            pieces.addCollisionPair(pin.CollisionPair(pair.first, pair.second))
+        for first, second in self.pairs(track):
+            pieces.addCollisionPair(pin.CollisionPair(first, second))
         self._robot.set_velocity_limits(JOINT_SPEED)
         self.reset(track.start)
 
@@ -82,6 +86,10 @@ class PlacoTool(Tool):
         apart.self_collisions_margin, apart.self_collisions_trigger = CLEARANCE, WITHIN
         apart.configure("apart", "hard", 1.0)
 
+    def pairs(self, track: Track) -> Sequence[tuple[int, int]]:
+        """The pairs of pieces that it is given: all of the scene."""
+        return [(pair.first, pair.second) for pair in track.scene.geometry.collisionPairs]
+
     def reset(self, q: Array) -> None:
         """Go to a posture."""
         self._robot.state.q = np.array(q)
@@ -100,6 +108,46 @@ class PlacoTool(Tool):
     def posture(self) -> Array:
         """Where it is: placo orders the joints as we do."""
         return np.array(self._robot.state.q)
+
+
+class PrunedPlacoTool(PlacoTool):
+    """The same with the pairs that a careful user would leave: those that sampled postures bring near."""
+
+    name = "placo/pruned"
+    differences: ClassVar[tuple[str, ...]] = (
+        f"placo/pruned has only the pairs that come nearer than {1e3 * WITHIN:g} mm in one of {SAMPLES} sampled "
+        "postures, joints anywhere within their limits and the root near where it stands; the sampling is not timed, "
+        "and pairs that it left out are not kept apart",
+    )
+
+    def pairs(self, track: Track) -> Sequence[tuple[int, int]]:
+        """The pairs that come near."""
+        return near_pairs(track.scene, track.start.tobytes())
+
+    def remarks(self) -> dict[str, float]:
+        """How many pairs it has."""
+        return {"pairs": float(len(self._robot.collision_model.collisionPairs))}
+
+
+@lru_cache(maxsize=4)
+def near_pairs(scene: wb.Scene, start: bytes) -> Sequence[tuple[int, int]]:
+    """Pairs of pieces that come nearer than `WITHIN` in sampled postures.
+
+    Args:
+        scene: whose pairs.
+        start: (nq,) posture about which the root is sampled, as bytes.
+    """
+    rng, q, model = np.random.default_rng(0), np.frombuffer(start), scene.model
+    limits, found = scene.figure.limits, np.zeros(len(scene.geometry.collisionPairs), dtype=bool)
+    workspace = scene.workspace()
+    for _ in range(SAMPLES):
+        move = np.zeros(model.nv)
+        move[:6] = rng.normal(size=6) * ROOT_SPREAD
+        posture = np.asarray(pin.integrate(model, q, move))
+        posture[limits.idx_q] = rng.uniform(limits.lower, limits.upper)
+        found[workspace.near(posture, WITHIN).number] = True
+    pairs = [(pair.first, pair.second) for pair in scene.geometry.collisionPairs]
+    return [pair for pair, near in zip(pairs, found, strict=True) if near]
 
 
 def _without_collisions() -> str:

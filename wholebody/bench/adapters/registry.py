@@ -101,6 +101,7 @@ STEPPING = {
     "wholebody/daqp": ("daqp",),
     **{f"wholebody/{solver}": (module,) for solver, module in SOLVERS.items()},
     "placo": ("placo",),
+    "placo/pruned": ("placo",),
     "pink": ("pink", "daqp"),
     "mink": ("mink", "mujoco", "daqp"),
 }
@@ -126,7 +127,7 @@ def chosen_tools(names: Iterable[str] | None) -> tuple[str, ...]:
         if name not in STEPPING:
             raise UnknownNameError("tool", name, STEPPING)
         if name not in installed_tools():
-            extra = "placo" if name == "placo" else "solvers" if name.startswith("wholebody/") else "compare"
+            extra = "placo" if name.startswith("placo") else "solvers" if name.startswith("wholebody/") else "compare"
             raise MissingPackageError(f"{name} is not installed; install it with: pip install 'wholebody[{extra}]'")
     return chosen
 
@@ -139,7 +140,7 @@ def make_tool(name: str, track: Track) -> Tool:
         MissingPackageError: its packages are not installed.
     """
     kind = tool_class(name)
-    tool: Tool = kind(track, name.partition("/")[2]) if "/" in name else kind(track)
+    tool: Tool = kind(track, name.partition("/")[2]) if name.startswith("wholebody/") else kind(track)
     return tool
 
 
@@ -153,7 +154,8 @@ def tool_class(name: str) -> Any:
     (name,) = chosen_tools([name])
     family = name.partition("/")[0]
     module = "own" if family == "wholebody" else family
-    return getattr(import_module(f"wholebody.bench.adapters.{module}"), f"{family.capitalize()}Tool")
+    kind = "PrunedPlaco" if name == "placo/pruned" else family.capitalize()
+    return getattr(import_module(f"wholebody.bench.adapters.{module}"), f"{kind}Tool")
 
 
 def differences(name: str) -> tuple[str, ...]:
