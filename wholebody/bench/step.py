@@ -221,10 +221,12 @@ def goal_lines(rows: Sequence[StepRow]) -> list[str]:
         if not row.tool.startswith("wholebody"):
             continue
         hot = row.tool in HOT
-        median, p95 = (0.25, np.inf) if row.reach == "alone" else (0.08, 0.10)
+        median, p95 = (0.08, 0.10) if hot else (0.35, 1.0)
+        if row.reach not in JUDGED:
+            median, p95 = (0.25, np.inf) if hot else (np.inf, np.inf)
         asked = [
-            (f"median {row.ratio:.3f} of {REFERENCE}'s", row.ratio, median if hot else 0.35),
-            (f"p95 {row.ratio_p95:.3f} of {REFERENCE}'s", row.ratio_p95, p95 if hot else 1.0),
+            (f"median {row.ratio:.3f} of {REFERENCE}'s", row.ratio, median),
+            (f"p95 {row.ratio_p95:.3f} of {REFERENCE}'s", row.ratio_p95, p95),
         ]
         if hot and row.reach in JUDGED:
             others = [other for other in rows if other.reach == row.reach and not other.tool.startswith("wholebody")]
@@ -241,7 +243,8 @@ def goal_lines(rows: Sequence[StepRow]) -> list[str]:
             for name, value, most in asked
             if np.isfinite(value) and np.isfinite(most)
         ]
-        lines.append(f"{row.tool}, {row.reach}: " + ("; ".join(parts) or "nothing to compare with") + ".")
+        if parts or hot:
+            lines.append(f"{row.tool}, {row.reach}: " + ("; ".join(parts) or "nothing to compare with") + ".")
     return lines
 
 

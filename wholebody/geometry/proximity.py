@@ -1,6 +1,7 @@
-"""Signed distances between all pairs of a geometry model: bounding spheres first, then boxes, coal for what survives.
+"""Signed distances between all pairs of a geometry model: coal for those that can be near.
 
-About 24 us for 760 pairs of which 47 survive, against 207 us for coal on every pair.
+A pair cannot be near where it was farther away than both pieces have moved since, or where spheres or boxes around its
+pieces are apart. Telling this takes some 5 us for 1,000 pairs, coal on every pair 200 us.
 """
 
 from __future__ import annotations

@@ -161,11 +161,14 @@ def residuals(program: QuadraticProgram, answer: QPSolution) -> Residuals:
     box = np.where(x >= program.upper, np.maximum(-pull, 0.0), 0.0) + np.where(
         x <= program.lower, np.minimum(-pull, 0.0), 0.0
     )
+    held = box != 0.0  # a bound that holds nothing may be infinite
+    low, high = program.lower[held], program.upper[held]
     outside = np.maximum(program.lower - x, x - program.upper)
     primal = 0.5 * (program.diagonal * x) @ x + program.linear @ x + 0.5 * y @ r + 0.5 * push @ s
     dual = (
         -0.5 * (program.diagonal * x) @ x - 0.5 * y @ r - 0.5 * push @ s - y @ program.target + push @ program.least
-        - np.maximum(box, 0.0) @ program.upper - np.minimum(box, 0.0) @ program.lower
+        - np.maximum(box[held], 0.0) @ np.where(box[held] > 0.0, high, 0.0)
+        - np.minimum(box[held], 0.0) @ np.where(box[held] < 0.0, low, 0.0)
     )  # fmt: skip
     return Residuals(
         max(float(outside.max(initial=0.0)), 0.0),
