@@ -150,7 +150,7 @@ def test_what_was_told_is_not_overwritten_by_the_next_posture(problem):
 
 def reference(problem, workspace, dt=None):
     return ReferenceLineariser(
-        workspace, problem.scene.figure.tangent_bounds, problem.goals, problem.constraints, problem.bounds,
+        workspace, problem.scene.figure.limits, problem.goals, problem.constraints, problem.bounds,
         problem.measures, problem.clearances, dt,
     )  # fmt: skip
 

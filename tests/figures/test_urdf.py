@@ -42,6 +42,17 @@ def test_cylinder_becomes_a_prism_around_it():
     assert np.ptp(points[:, 2]) == pytest.approx(0.32)
 
 
+def test_long_names_are_quoted_in_short(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text(
+        f'<robot name="r"><link name="base"/><joint name="{"j" * 5000}" type="fixed"><parent link="base"/>'
+        f'<child link="{"c" * 5000}"/></joint></robot>'
+    )
+    with pytest.raises(FileFormatError, match="which is not in the file") as caught:
+        load(path)
+    assert len(str(caught.value)) < 400 + len(str(path))
+
+
 def test_bracket_keeps_its_volume():
     arm = load(ARM, concavity={"tool": 0.2})
     volume = sum(p.geometry.computeVolume() for p in arm.geometry.geometryObjects if p.name.startswith("tool"))

@@ -70,6 +70,17 @@ def test_goals_against_holds_and_against_each_other(standing):
     assert found(standing(goals=[goals[0], offset])) == ()
 
 
+def test_unreachable_says_that_everything_holds(standing):
+    """One of two goals is missed for certain; whether the hold is kept is another question."""
+    foot = wb.Hold("left_foot", (0.4, 0.3, 0.5), orientation=False)
+    goals = [wb.Point("right_index_tip", (0.3, -0.2, 1.6)), wb.Point("right_index_tip", (0.3, -0.2, 1.7))]
+    problem = standing(goals=goals, constraints=[foot])
+    assert [entry.status for entry in found(problem)] == ["unreachable"]
+    answer = wb.QP(iterations=1, budget=0, restarts=0).solve(problem)
+    assert not answer.assessment.holds(1e-4)
+    assert answer.status in ("stalled", "infeasible")
+
+
 def test_an_arm_without_joints_to_move():
     """The world itself is a rigid group: what a frozen fixed arm should reach is told where it is."""
     figure = wb.load("avatar")

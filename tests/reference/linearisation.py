@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,57 +10,12 @@ from tests.reference.contact_rows import ReferenceRowBuilder
 from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
-from wholebody.linearisation import Linearisation
-from wholebody.tasks.base import Bound, Constraint, Goal, Measure
-from wholebody.workspace import Workspace
+from wholebody.linearisation import Linearisation, Lineariser
+from wholebody.tasks.base import Constraint, Goal
 
 
-class ReferenceLineariser:
-    """Linearises one problem at many postures, in the room of one run.
-
-    Attributes:
-        workspace: moves from posture to posture, and sees things where they were when the run began.
-        goals: what is linearised; may be replaced.
-    """
-
-    def __init__(
-        self,
-        workspace: Workspace,
-        limits: Callable[[Array], tuple[Array, Array]],
-        goals: Sequence[Goal],
-        constraints: Sequence[Constraint],
-        bounds: Sequence[Bound],
-        measures: Sequence[Measure],
-        clearances: Array,
-        dt: float | None = None,
-    ) -> None:
-        """Take the resolved terms of a problem.
-
-        Args:
-            workspace: of this run alone.
-            limits: bounds that the joints' limits put on the displacement of a posture; see `Figure.tangent_bounds`.
-            goals: resolved goals.
-            constraints: resolved constraints.
-            bounds: resolved bounds on the displacement.
-            measures: resolved measures.
-            clearances: (pairs,) least distance asked of every collision pair, metres.
-            dt: step in seconds for bounds that need one.
-        """
-        self.workspace, self.state, self._limits = workspace, workspace.state, limits
-        self.constraints, self.bounds, self.measures, self.dt = constraints, bounds, measures, dt
-        self.take(goals, clearances)
-
-    def take(self, goals: Sequence[Goal], clearances: Array) -> None:
-        """Put other goals and clearances in the place of the present ones.
-
-        Raises:
-            InputError: there is not one clearance for each pair.
-        """
-        if clearances.shape != (len(self.workspace.table.pairs),):
-            count = len(self.workspace.table.pairs)
-            raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
-        self.goals, self.clearances = goals, clearances
-        self._largest_clearance = float(clearances.max()) if len(clearances) else 0.0
+class ReferenceLineariser(Lineariser):
+    """The lineariser with each term's own methods in place of the compiled pass."""
 
     def at(self, q: Array, within: float) -> Linearisation:
         """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance."""
@@ -76,7 +31,7 @@ class ReferenceLineariser:
         goal_rows = sum(len(error) for error in errors)
         value_rows = sum(len(value) for value in values)
         lower, upper = self._box(state)
-        measure, gradient, curvature = self._measure(state)
+        measure, gradient, curvature = self._measured(state)
         return Linearisation(
             q=np.array(q, dtype=float),
             goal_error=_joined(errors),
@@ -137,15 +92,22 @@ class ReferenceLineariser:
             result[start : start + len(part)] = part
         return result
 
+    def _limited(self, q: Array) -> tuple[Array, Array]:
+        nv = self.state.model.nv
+        lower, upper = np.full(nv, -np.inf), np.full(nv, np.inf)
+        limits = self._limits
+        lower[limits.idx_v], upper[limits.idx_v] = limits.lower - q[limits.idx_q], limits.upper - q[limits.idx_q]
+        return lower, upper
+
     def _box(self, state: State) -> tuple[Array, Array]:
-        lower, upper = self._limits(state.q)
+        lower, upper = self._limited(state.q)
         for bound in self.bounds:
             # a joint out of its limits comes back no faster than the bound lets it
             low, high = bound.bounds(state, self.dt)
             lower, upper = np.clip(lower, low, high), np.clip(upper, low, high)
         return lower, upper
 
-    def _measure(self, state: State) -> tuple[float, Array, Array]:
+    def _measured(self, state: State) -> tuple[float, Array, Array]:
         value = 0.0
         gradient = np.zeros(state.model.nv)
         curvature = np.zeros(state.model.nv)

@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from wholebody.checks import shown
 from wholebody.errors import FileFormatError
 
 SCHEMES = ("package://", "model://")
@@ -36,7 +37,7 @@ def find_mesh(
     if name.startswith(SCHEMES):
         parts = [part for part in name.split("://", 1)[1].split("/") if part not in ("", ".")]
         if not parts or ".." in parts[:1]:
-            raise FileFormatError(f"{place}: the mesh {name!r} names no package; write package://<package>/<path>")
+            raise FileFormatError(f"{place}: the mesh {shown(name)} names no package; write package://<package>/<path>")
         bases = [*package_dirs, folder, *folder.parents, *_ros_folders(environ)]
         candidates = [base.joinpath(*tail) for base in bases for tail in (parts, parts[1:]) if tail]
     else:
@@ -46,8 +47,8 @@ def find_mesh(
         if _is_file(candidate):
             return candidate
     raise FileFormatError(
-        f"{place}: the mesh {name!r} is not found; put it in place, or name the folder of its package in package_dirs "
-        "or ROS_PACKAGE_PATH"
+        f"{place}: the mesh {shown(name)} is not found; put it in place, or name the folder of its package in "
+        "package_dirs or ROS_PACKAGE_PATH"
     )
 
 

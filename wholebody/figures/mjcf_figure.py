@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.checks import shown
 from wholebody.errors import FileFormatError, InputError
 from wholebody.figures.description import ROOT_JOINT
 from wholebody.figures.figure import Figure
@@ -54,7 +55,7 @@ def xml_figure(
     if outermost.tag != "mujoco":
         return urdf_figure(path, root, package_dirs, concavity, samples, seed)
     if root not in (None, "fixed", "free"):
-        raise InputError(f"root is {root!r}; give 'fixed' or 'free'")
+        raise InputError(f"root is {shown(root)}; give 'fixed' or 'free'")
     model, meshes = _read(place, root)
     check_size(model, place)
     links = tuple(frame.name for frame in model.frames if frame.type == pin.FrameType.BODY)
@@ -84,12 +85,14 @@ def _read(path: Path, root: str | None) -> tuple[pin.Model, pin.GeometryModel]:
     for name, joint in zip(model.names, model.joints, strict=True):
         if joint.shortname() == "JointModelComposite":
             raise FileFormatError(
-                f"{path}: the body of joint {name!r} has several joints; give each of them a body of its own"
+                f"{path}: the body of joint {shown(name)} has several joints; give each of them a body of its own"
             )
     limits = [np.array(limit) for limit in (model.lowerPositionLimit, model.upperPositionLimit)]
     for joint in list(model.joints)[1:]:
         if joint.nq == joint.nv == 1 and limits[0][joint.idx_q] > limits[1][joint.idx_q]:
-            raise FileFormatError(f"{path}: joint {model.names[joint.id]!r} has a lower limit above the upper; mend it")
+            raise FileFormatError(
+                f"{path}: joint {shown(model.names[joint.id])} has a lower limit above the upper; mend it"
+            )
     return model, meshes
 
 
@@ -112,7 +115,7 @@ def _shape(model: pin.Model, piece: pin.GeometryObject, path: Path) -> LinkShape
         faces = [solid.polygons(k) for k in range(solid.num_polygons)]
         return _triangles(frame.name, at, np.array(solid.points()), faces)
     raise FileFormatError(
-        f"{path}: a geom of body {frame.name!r} is a {kind}; use boxes, capsules, meshes and the like"
+        f"{path}: a geom of body {shown(frame.name)} is a {kind}; use boxes, capsules, meshes and the like"
     )
 
 
@@ -128,7 +131,7 @@ def _unread(outermost: Element) -> list[str]:
         notes.append("the geoms of the world are not read; add them to the scene")
     first = outermost.find("worldbody/body")
     if first is not None and first.find("freejoint") is None and set(first.attrib) & _PLACED:
-        notes.append(f"body {first.get('name')!r}: its place in the world is not kept, it stands at the origin")
+        notes.append(f"body {shown(first.get('name'))}: its place in the world is not kept, it stands at the origin")
     equality = outermost.find("equality")
     if equality is not None and len(equality):
         notes.append(f"the {len(equality)} constraints in <equality> are not kept: the joints move by themselves")

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.checks import shown
 from wholebody.errors import FileFormatError, InputError, WholebodyError
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description
 from wholebody.figures.figure import Figure
@@ -136,8 +137,8 @@ def geometry_of_links(
         try:
             pieces, remarks = link_pieces(shape, concavity)
         except WholebodyError as error:
-            raise FileFormatError(f"{path}: collision of link {shape.link!r}: {error}") from error
-        notes += [f"link {shape.link!r}: {remark}" for remark in remarks]
+            raise FileFormatError(f"{path}: collision of link {shown(shape.link)}: {error}") from error
+        notes += [f"link {shown(shape.link)}: {remark}" for remark in remarks]
         frame_id = model.getFrameId(shape.link, pin.FrameType.BODY)
         frame = model.frames[frame_id]
         for solid, placement in pieces:

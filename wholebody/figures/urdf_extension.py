@@ -33,6 +33,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.checks import shown
 from wholebody.errors import FileFormatError, UnknownNameError, WholebodyError
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, JointCone
 from wholebody.figures.figure import Figure
@@ -162,7 +163,7 @@ class _Reader:
         if item.get("root") is not None:
             root = np.array(numbers(item, "root", self._place(item), 7))
             if abs(float(np.linalg.norm(root[3:])) - 1.0) > 1e-6:
-                self._fail(f"posture {item.get('name')!r} has a root whose quaternion is not of unit length")
+                self._fail(f"posture {shown(item.get('name'))} has a root whose quaternion is not of unit length")
             root[3:] /= np.linalg.norm(root[3:])
         return partial(_placed, root=root, values=dict(zip(joints, values, strict=True)))
 
@@ -198,7 +199,7 @@ class _Reader:
             if name not in known:
                 raise FileFormatError(str(UnknownNameError(kind, name, known, self._place(item))))
         if not names and attribute in ("tip", "reference", "limb"):
-            self._fail(f"<{item.tag}> {item.get('name')!r} has no {attribute}; add it")
+            self._fail(f"<{item.tag}> {shown(item.get('name'))} has no {attribute}; add it")
         return names
 
     def _place(self, item: Element) -> str:

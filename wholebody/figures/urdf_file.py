@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
+from wholebody.checks import shown
 from wholebody.errors import FileFormatError
 from wholebody.figures.link_pieces import LinkShape
 from wholebody.figures.mesh_search import find_mesh
@@ -65,7 +66,7 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
     for link in robot.findall("link"):
         inertial = link.find("inertial")
         if inertial is not None:
-            _check_inertial(inertial, f"{path}: link {link.get('name')!r}")
+            _check_inertial(inertial, f"{path}: link {shown(link.get('name'))}")
             inertials[str(link.get("name"))] = inertial
     shapes = tuple(shape for link in robot.findall("link") for shape in _shapes(link, path, tuple(package_dirs)))
     ordered = (root, *(name for name in links if name != root))
@@ -100,7 +101,7 @@ def _shapes(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> list[L
     capsules = {element.get("name") for element in link.findall("collision_checking/capsule")}
     found = []
     for collision in link.findall("collision"):
-        place = f"{path}: collision of link {name!r}"
+        place = f"{path}: collision of link {shown(name)}"
         shapes = list(collision.find("geometry") or ())
         if len(shapes) != 1:
             raise FileFormatError(f"{place} has {len(shapes)} shapes in its <geometry>; give one")
@@ -117,7 +118,7 @@ def _shapes(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> list[L
             size = bounded(shape, "scale", place, 3, "1 1 1")
             file = find_mesh(shape.get("filename", ""), place, path, package_dirs)
             if not all(size):
-                raise FileFormatError(f"{place}: the mesh has the scale {shape.get('scale')!r}; give no zeros")
+                raise FileFormatError(f"{place}: the mesh has the scale {shown(shape.get('scale'))}; give no zeros")
         else:
             raise FileFormatError(f"{place} is a <{kind}>; use box, sphere, cylinder or mesh")
         if kind != "mesh" and min(size) < 0.0:

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.checks import shown
 from wholebody.errors import FileFormatError
 from wholebody.figures.xml_reading import bounded, numbers, placement, unique_names
 from wholebody.geometry.pieces import LARGEST
@@ -77,11 +78,11 @@ def read_joints(
     parent_of: dict[str, str] = {}
     known = frozenset(links)
     for element in elements:
-        joint = _joint(element, known, f"{path}: joint {element.get('name')!r}", notes)
+        joint = _joint(element, known, f"{path}: joint {shown(element.get('name'))}", notes)
         if joint.child in parent_of:
             raise FileFormatError(
-                f"{path}: joint {joint.name!r}: link {joint.child!r} already hangs on {parent_of[joint.child]!r}; "
-                "a URDF is a tree"
+                f"{path}: joint {shown(joint.name)}: link {shown(joint.child)} already hangs on "
+                f"{shown(parent_of[joint.child])}; a URDF is a tree"
             )
         parent_of[joint.child] = joint.parent
         joints.append(joint)
@@ -97,7 +98,8 @@ def _with_leaders(joints: list[UrdfJoint], notes: list[str]) -> list[UrdfJoint]:
     for joint in joints:
         if joint.mimic is not None and joint.mimic.joint not in known:
             notes.append(
-                f"joint {joint.name!r}: it mimics {joint.mimic.joint!r}, which is not in the file, so it is on its own"
+                f"joint {shown(joint.name)}: it mimics {shown(joint.mimic.joint)}, which is not in the file, so it is "
+                "on its own"
             )
             joint = joint._replace(mimic=None)
         made.append(joint)
@@ -107,14 +109,14 @@ def _with_leaders(joints: list[UrdfJoint], notes: list[str]) -> list[UrdfJoint]:
 def _joint(element: Element, links: frozenset[str], place: str, notes: list[str]) -> UrdfJoint:
     kind = element.get("type")
     if kind not in JOINT_TYPES:
-        raise FileFormatError(f"{place} has the type {kind!r}; use one of {', '.join(JOINT_TYPES)}")
+        raise FileFormatError(f"{place} has the type {shown(kind)}; use one of {', '.join(JOINT_TYPES)}")
     ends = []
     for tag in ("parent", "child"):
         found = element.find(tag)
         end = found.get("link") if found is not None else None
         if end not in links:
             raise FileFormatError(
-                f"{place} has the {tag} link {end!r}, which is not in the file; add it or mend the name"
+                f"{place} has the {tag} link {shown(end)}, which is not in the file; add it or mend the name"
             )
         ends.append(str(end))
     axis = np.array([1.0, 0.0, 0.0])
@@ -141,7 +143,7 @@ def _limits(element: Element, kind: str, place: str, notes: list[str]) -> tuple[
     name = element.get("name")
     if limit is None:
         if kind != "continuous":
-            notes.append(f"joint {name!r}: it has no <limit>, so it moves without limits")
+            notes.append(f"joint {shown(name)}: it has no <limit>, so it moves without limits")
         return free
     lower, upper = -np.inf, np.inf
     if kind != "continuous":
@@ -149,7 +151,7 @@ def _limits(element: Element, kind: str, place: str, notes: list[str]) -> tuple[
         if lower > upper:
             raise FileFormatError(f"{place} has the lower limit {lower:g} above the upper {upper:g}; exchange them")
         if limit.get("lower") is None and limit.get("upper") is None:
-            notes.append(f"joint {name!r}: its <limit> has neither lower nor upper, so it moves without limits")
+            notes.append(f"joint {shown(name)}: its <limit> has neither lower nor upper, so it moves without limits")
             lower, upper = -np.inf, np.inf
         lower, upper = (lower if lower > -UNLIMITED else -np.inf), (upper if upper < UNLIMITED else np.inf)
     speeds = []
@@ -177,14 +179,14 @@ def _check_followers(joints: dict[str, UrdfJoint], path: Path) -> None:
     for joint in joints.values():
         seen = [joint.name]
         while (mimic := joints[seen[-1]].mimic) is not None:
-            place = f"{path}: joint {seen[-1]!r}"
+            place = f"{path}: joint {shown(seen[-1])}"
             if joints[mimic.joint].kind in ("floating", "planar"):
                 raise FileFormatError(
-                    f"{place} mimics {mimic.joint!r}, which is {joints[mimic.joint].kind}; name another"
+                    f"{place} mimics {shown(mimic.joint)}, which is {joints[mimic.joint].kind}; name another"
                 )
             if mimic.joint in seen:
                 raise FileFormatError(
-                    f"{place} mimics {mimic.joint!r}, which mimics it in turn; let one of them be free"
+                    f"{place} mimics {shown(mimic.joint)}, which mimics it in turn; let one of them be free"
                 )
             seen.append(mimic.joint)
 
@@ -204,7 +206,7 @@ def _root(links: tuple[str, ...], parent_of: dict[str, str], path: Path) -> str:
         while way[-1] not in under:
             above = parent_of[way[-1]]
             if above in way:
-                raise FileFormatError(f"{path}: the joints around link {above!r} form a loop; a URDF is a tree")
+                raise FileFormatError(f"{path}: the joints around link {shown(above)} form a loop; a URDF is a tree")
             way.append(above)
         under.update(way)
     return roots[0]

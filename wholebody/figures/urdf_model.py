@@ -14,6 +14,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 import pinocchio as pin
 
+from wholebody.checks import shown
 from wholebody.errors import FileFormatError
 from wholebody.figures.urdf_file import UrdfFile
 from wholebody.figures.urdf_joints import Mimic, UrdfJoint
@@ -72,7 +73,9 @@ def _with_constant_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJ
         if law is None or (law.leader not in fixed and law.slope != 0.0):
             made.append(joint)
             continue
-        notes.append(f"joint {joint.name!r}: it mimics {law.leader!r}, which does not move it, so it is fixed")
+        notes.append(
+            f"joint {shown(joint.name)}: it mimics {shown(law.leader)}, which does not move it, so it is fixed"
+        )
         if joint.kind == "prismatic":
             moved = pin.SE3(np.eye(3), law.offset * joint.axis)
         else:

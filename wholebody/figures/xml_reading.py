@@ -12,6 +12,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
+from wholebody.checks import shown
 from wholebody.errors import FileFormatError
 from wholebody.files import read_bytes
 
@@ -66,7 +67,7 @@ def unique_names(elements: Sequence[Element], kind: str, path: Path) -> tuple[st
         if not name:
             raise FileFormatError(f"{path}: {kind} number {k + 1} has no name; give it one")
         if name in names:
-            raise FileFormatError(f"{path}: two {kind}s are called {name!r}; rename one")
+            raise FileFormatError(f"{path}: two {kind}s are called {shown(name)}; rename one")
         names[name] = None
     return tuple(names)
 

@@ -76,7 +76,8 @@ def concluded(
     if ending.contradictions is None:
         why = "" if status == "solved" else explanation(problem)
     else:
-        status, why = proven(status, ending.contradictions), in_words(ending.contradictions)
+        holds = judgement.holds(counted(tolerance))
+        status, why = proven(status, ending.contradictions, holds), in_words(ending.contradictions)
     if why and ending.caveat and not judgement.holds(counted(tolerance)):
         why += f"; {ending.caveat}"
     said = why or control.message(judgement) or _message(problem, status, judgement, ending, counted(tolerance))

@@ -248,9 +248,17 @@ def least_left(found: tuple[Contradiction, ...]) -> float | None:
     return float(np.linalg.norm([each.least for each in found]))
 
 
-def proven(status: Status, found: tuple[Contradiction, ...]) -> Status:
-    """The status of an answer to a contradictory problem, which more iterations would not change."""
-    return found[0].status if found and status == "stalled" else status
+def proven(status: Status, found: tuple[Contradiction, ...], holds: bool) -> Status:
+    """The status of an answer to a contradictory problem, which more iterations would not change.
+
+    Args:
+        status: without the contradictions.
+        found: the contradictions.
+        holds: whether the answer violates nothing; else it is never `unreachable`.
+    """
+    if status == "stalled" and found and (holds or found[0].status == "infeasible"):
+        return found[0].status
+    return status
 
 
 def explanation(problem: Problem) -> str:

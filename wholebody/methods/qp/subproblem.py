@@ -79,7 +79,6 @@ class Rows(NamedTuple):
         contact: (k,) rows of one contact share its number; the worst of them counts.
         contacts: how many numbers there are.
         key: (k,) names a row from one linearisation to the next.
-        soft_values: (2, m) errors and weights of the soft rows, of which the two above are views.
     """
 
     soft: Array
@@ -91,7 +90,6 @@ class Rows(NamedTuple):
     contact: NDArray[np.intp]
     contacts: int
     key: NDArray[np.intp]
-    soft_values: Array
 
 
 class Subproblem:
@@ -156,7 +154,6 @@ class Subproblem:
         contacts = self._one_sided + len(at.contacts.distance)
         return Rows(
             soft_rows, soft_values[0], soft_values[1], goals, elastic_rows, violated, labels[0], contacts, labels[1],
-            soft_values,
         )  # fmt: skip
 
     def violation(self, rows: Rows, displacement: Array | None = None) -> Violation:
@@ -200,7 +197,8 @@ class Subproblem:
         columns = np.empty((4, len(at.gradient)))
         target, least = np.empty(len(rows.soft_error)), np.empty(len(rows.elastic_violation))
         self._kernel.program(
-            at.gradient, at.curvature, at.lower, at.upper, rows.soft_values, rows.goals, rows.elastic_violation, shift,
+            at.gradient, at.curvature, at.lower, at.upper, rows.soft_error, rows.soft_weight,
+            rows.goals, rows.elastic_violation, shift,
             measures, pull is not None, numbers, columns, target, least,
         )  # fmt: skip
         return QuadraticProgram(
@@ -229,7 +227,9 @@ def compiled_kernel() -> Any:
         none, np.zeros((2, 0), dtype=np.intp),
     )  # fmt: skip
     subproblem_kernel.violation(none, rows, none, rows, index, none, none, none)
-    subproblem_kernel.program(one, one, one, one, pair, 0, none, none, True, True, number, np.ones((4, 1)), none, none)
+    subproblem_kernel.program(
+        one, one, one, one, none, none, 0, none, none, True, True, number, np.ones((4, 1)), none, none
+    )
     one_joint = np.zeros(1, dtype=np.intp)
     subproblem_kernel.motion(one, np.zeros((1, 6)), one_joint, one_joint, one_joint, np.zeros((1, 4, 3)), one)
     return subproblem_kernel

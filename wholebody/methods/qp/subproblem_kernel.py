@@ -118,7 +118,8 @@ def program(
     curvature: Array,
     lower: Array,
     upper: Array,
-    soft_values: Array,
+    soft_error: Array,
+    soft_weight: Array,
     goals: int,
     violated: Array,
     shift: Array,
@@ -146,15 +147,15 @@ def program(
         floor = 1.0
     square, heaviest, farthest, heaviest_error = 0.0, 0.0, 0.0, 0.0
     for r in range(goals):
-        farthest = max(farthest, abs(soft_values[0, r]))
+        farthest = max(farthest, abs(soft_error[r]))
     factor = pull / farthest if pulls and farthest > pull else 1.0
     for r in range(len(target)):
-        error = soft_values[0, r]
+        error = soft_error[r]
         if r < goals:
             square += error * error
             error *= factor
-            heaviest = max(heaviest, soft_values[1, r])
-            heaviest_error = max(heaviest_error, soft_values[1, r] * abs(error))
+            heaviest = max(heaviest, soft_weight[r])
+            heaviest_error = max(heaviest_error, soft_weight[r] * abs(error))
         target[r] = -(error + shift[r])
     for i in range(nv):
         entry = max(scale * curvature[i], floor)
