@@ -8,8 +8,8 @@ from pathlib import Path
 from presenting import command_line, film, report_frames
 
 import wholebody as wb
-from wholebody.interaction import Recording, Track, follow
-from wholebody.interaction.scripts import script
+from wholebody.tracking import Recording, Track, follow
+from wholebody.tracking.scripts import script
 
 WALL = 1.2  # m: distance of the wall in front of the avatar's start
 REACHING = {"shoulder_flexion": 85.0, "elbow_flexion": 12.0, "shoulder_abduction": 10.0, "wrist_flexion": -35.0}

@@ -8,7 +8,7 @@ import numpy as np
 from presenting import OAK, command_line, film, report_frames
 
 import wholebody as wb
-from wholebody.interaction import Recording, Track, follow, posed
+from wholebody.tracking import Recording, Track, follow, posed
 
 TOP = 0.75  # m: height of the table
 FRAMES = 150

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import wholebody as wb
-from wholebody.interaction import Recording, judge
+from wholebody.tracking import Recording, judge
 
 Place = tuple[float, float, float]
 Color = tuple[float, float, float, float]
@@ -83,7 +83,7 @@ def picture(
 
 
 def report_frames(title: str, scene: wb.Scene, recording: Recording) -> None:
-    """Print the assessment of a tracked motion, from `wholebody.interaction.judge`."""
+    """Print the assessment of a tracked motion, from `wholebody.tracking.judge`."""
     judged = judge(scene, recording)
     inside = int((judged.tracked_depth > 1e-5).sum())
     milliseconds = 1e3 * recording.seconds

@@ -12,7 +12,7 @@ import numpy as np
 from presenting import OAK, command_line
 
 import wholebody as wb
-from wholebody.interaction import Dragged, drag_along, judge_drag, read_path, spread
+from wholebody.tracking import Dragged, drag_along, judge_drag, read_path, spread
 from wholebody.view.filmstrip import write_filmstrip
 
 SEAT = 0.386  # m: its top; buttocks touch it when the hips are as high as the knees

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody import interaction
+from wholebody import tracking
 from wholebody.cli import result
 from wholebody.cli.demo import packaged_tasks
 from wholebody.taskfile import task as task_module
@@ -89,14 +89,14 @@ def hand() -> wb.Figure:
 def sources(hand: wb.Figure, tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[list[str], str]]:
     """Right files of each kind, and the name that a faulty one has."""
     folder = tmp_path_factory.mktemp("right")
-    track = interaction.Track.of(hand, np.array([hand.neutral] * 3), 1 / 60)
+    track = tracking.Track.of(hand, np.array([hand.neutral] * 3), 1 / 60)
     (folder / "hand.toml").write_text('[figure]\nname = "hand"\n')
     task = wb.read_task(folder / "hand.toml")
     answer = result.as_json(result.describe(task, wb.solve(task.problem), folder))
     tasks = [path.read_text(encoding="utf-8") for path in packaged_tasks().values()]
     return {
         "task": (tasks, "task.toml"),
-        "track": ([interaction.write_track(track, folder / "track.csv").read_text()], "track.csv"),
+        "track": ([tracking.write_track(track, folder / "track.csv").read_text()], "track.csv"),
         "path": (["x y z\n0.1 0.2 0.3\n0.2,0.2,0.3 # there\n\n"], "path.txt"),
         "result": ([answer], "result.json"),
     }
@@ -112,8 +112,8 @@ def test_faulty_files_are_read_or_refused_in_one_sentence(
 ) -> None:
     readers: dict[str, Callable[[Path], Any]] = {
         "task": wb.read_task,
-        "track": lambda path: interaction.read_track(path, hand),
-        "path": interaction.read_path,
+        "track": lambda path: tracking.read_track(path, hand),
+        "path": tracking.read_path,
         "result": result.read,
     }
     known = cache(lambda spec, **options: wb.load(spec, **options))

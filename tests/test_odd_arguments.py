@@ -21,7 +21,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody import interaction
+from wholebody import tracking
 from wholebody.figures.state import State
 from wholebody.view import Viewer
 from wholebody.view.parts import Part, Parts
@@ -175,7 +175,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     q = arm.neutral
     state = State(arm.model)
     places = [(0.2, 0.1, 1.0), (0.2, 0.12, 1.0)]
-    track = interaction.Track.of(arm, np.array([q, q, q, q]), 0.1)
+    track = tracking.Track.of(arm, np.array([q, q, q, q]), 0.1)
     solve_it = partial(solvable, path)
     person = wb.Scene(human())
 
@@ -413,34 +413,34 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Parts.contacts", Call(one.contacts, {"q": one.posture({"one": at}), "within": 0.1})
 
     followed = {"scene": there, "track": track, "overlap": "qp", "seed": 0, "rigid": False, "progress": print}
-    yield "follow", Call(interaction.follow, followed)
+    yield "follow", Call(tracking.follow, followed)
     loop = {"scene": there, "start": q, "overlap": "qp", "dt": 0.1, "seed": 0, "rigid": False}
-    yield "FrameLoop", Call(interaction.FrameLoop, loop, lambda made: made.frame(q))
-    yield "FrameLoop.frame", Call(interaction.FrameLoop(there, q).frame, {"tracked": q})
-    recording = interaction.follow(there, track)
-    yield "judge", Call(interaction.judge, {"scene": there, "recording": recording})
+    yield "FrameLoop", Call(tracking.FrameLoop, loop, lambda made: made.frame(q))
+    yield "FrameLoop.frame", Call(tracking.FrameLoop(there, q).frame, {"tracked": q})
+    recording = tracking.follow(there, track)
+    yield "judge", Call(tracking.judge, {"scene": there, "recording": recording})
     tracked = {"q": [q, q], "dt": 0.1, "joints": arm.joints, "name": "it"}
-    yield "Track", Call(interaction.Track, tracked, lambda made: made.check(arm))
+    yield "Track", Call(tracking.Track, tracked, lambda made: made.check(arm))
     yield "Track.check", Call(track.check, {"figure": arm})
-    yield "Track.of", Call(interaction.Track.of, {"figure": arm, "q": [q, q], "dt": 0.1, "name": "it"})
+    yield "Track.of", Call(tracking.Track.of, {"figure": arm, "q": [q, q], "dt": 0.1, "name": "it"})
     yield "Track.part", Call(track.part, {"first": 0, "last": 2})
     yield "Track.repeated", Call(track.repeated, {"frames": 2})
     moved = {"figure": arm, "roots": None, "angles": {"joint1": [0.1]}, "posture": q, "dt": 0.1, "name": "it"}
-    yield "posed", Call(interaction.posed, moved)
-    yield "posed(angle)", Call(lambda v: interaction.posed(arm, angles={"joint1": v}, dt=0.1), {"v": [0.1, 0.2]})
+    yield "posed", Call(tracking.posed, moved)
+    yield "posed(angle)", Call(lambda v: tracking.posed(arm, angles={"joint1": v}, dt=0.1), {"v": [0.1, 0.2]})
     hand = human()
-    yield "posed(roots)", Call(lambda v: interaction.posed(hand, roots=v, dt=0.1), {"v": [at, at]})
-    yield "read_track", Call(interaction.read_track, {"path": path / "track.csv", "figure": arm})
-    yield "write_track", Call(interaction.write_track, {"track": track, "path": path / "track.csv"})
-    yield "gallery", Call(interaction.gallery, {"figure": hand})
-    yield "build_scene", Call(interaction.build_scene, {"name": "hand_on_table", "frames": 3, "seed": 0, "dt": 0.1})
+    yield "posed(roots)", Call(lambda v: tracking.posed(hand, roots=v, dt=0.1), {"v": [at, at]})
+    yield "read_track", Call(tracking.read_track, {"path": path / "track.csv", "figure": arm})
+    yield "write_track", Call(tracking.write_track, {"track": track, "path": path / "track.csv"})
+    yield "gallery", Call(tracking.gallery, {"figure": hand})
+    yield "build_scene", Call(tracking.build_scene, {"name": "hand_on_table", "frames": 3, "seed": 0, "dt": 0.1})
     along = {"problem": ask, "places": places, "method": "qp", "goal": 0, "dt": 0.1, "progress": print}
-    yield "drag_along", Call(interaction.drag_along, along)
-    done = interaction.drag_along(ask, places, "qp")
-    yield "judge_drag", Call(interaction.judge_drag, {"problem": ask, "dragged": done, "goal": 0})
-    yield "spread", Call(interaction.spread, {"corners": places, "frames": 3, "dt": 0.1})
-    yield "circle", Call(interaction.circle, {"center": at, "radius": 0.1, "normal": at})
-    yield "read_path", Call(interaction.read_path, {"path": path / "path.txt"})
+    yield "drag_along", Call(tracking.drag_along, along)
+    done = tracking.drag_along(ask, places, "qp")
+    yield "judge_drag", Call(tracking.judge_drag, {"problem": ask, "dragged": done, "goal": 0})
+    yield "spread", Call(tracking.spread, {"corners": places, "frames": 3, "dt": 0.1})
+    yield "circle", Call(tracking.circle, {"center": at, "radius": 0.1, "normal": at})
+    yield "read_path", Call(tracking.read_path, {"path": path / "path.txt"})
 
 
 @cache
@@ -454,7 +454,7 @@ def shown(parts: Parts) -> None:
 
 
 def public() -> Iterator[tuple[str, Any]]:
-    """Names and objects of the reference page, of `wholebody.__all__` and of `wholebody.interaction.__all__`."""
+    """Names and objects of the reference page, of `wholebody.__all__` and of `wholebody.tracking.__all__`."""
     for entry in re.findall(r"^::: ([\w.]+)$", (ROOT / "docs" / "reference.md").read_text(), re.MULTILINE):
         module, _, name = entry.rpartition(".")
         try:
@@ -463,7 +463,7 @@ def public() -> Iterator[tuple[str, Any]]:
         except ImportError:
             yield name, getattr(importlib.import_module(module), name)
     yield from ((name, getattr(wb, name)) for name in wb.__all__)
-    yield from ((name, getattr(interaction, name)) for name in interaction.__all__)
+    yield from ((name, getattr(tracking, name)) for name in tracking.__all__)
 
 
 def surface() -> list[str]:
@@ -534,7 +534,7 @@ NAMES = [name for name in surface() if fed(name)]
 def every(folder: Path) -> dict[str, list[tuple[str, Call]]]:
     """Return all calls by the name of what is called; variants have the same name with something in brackets."""
     q = figure(folder).neutral
-    interaction.write_track(interaction.Track.of(figure(folder), np.array([q, q]), 0.1), folder / "track.csv")
+    tracking.write_track(tracking.Track.of(figure(folder), np.array([q, q]), 0.1), folder / "track.csv")
     found: dict[str, list[tuple[str, Call]]] = {}
     for name, call in calls(folder):
         found.setdefault(name.partition("(")[0], []).append((name, call))

@@ -43,7 +43,7 @@ ROOMS = (
         "simplification",
         "methods",
     ),
-    *("motion", "interaction", "taskfile", "view", "bench", "doctor", "cli"),
+    *("tracking", "motion", "taskfile", "view", "bench", "doctor", "cli"),
 )
 """From the ground up; a room imports only from those before it, also where only type checkers look."""
 DOCUMENTED = {"_replace", "_asdict", "_fields", "_exit", "_SubParsersAction"}

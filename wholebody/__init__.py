@@ -30,10 +30,8 @@ if TYPE_CHECKING:
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
-    from wholebody.methods.drag import Drag
     from wholebody.methods.newton.assembly import Assembly
     from wholebody.methods.newton.method import Newton
-    from wholebody.methods.path_following import follow_path
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
@@ -65,6 +63,8 @@ if TYPE_CHECKING:
         Relative,
         StepLimit,
     )
+    from wholebody.tracking.drag import Drag
+    from wholebody.tracking.path_following import follow_path
     from wholebody.view import Viewer
 
 __all__ = [
@@ -131,11 +131,11 @@ _MODULES = {
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
     "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
-    "wholebody.methods.drag": "Drag",
+    "wholebody.tracking.drag": "Drag",
     "wholebody.methods.newton.assembly": "Assembly",
     "wholebody.methods.newton.method": "Newton",
     "wholebody.methods.placo.method": "Placo",
-    "wholebody.methods.path_following": "follow_path",
+    "wholebody.tracking.path_following": "follow_path",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
     "wholebody.problem": "Problem",

@@ -7,7 +7,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.interaction import WorstFrames, failures, summary, worst_frames
-from wholebody.interaction import Recording, judge
+from wholebody.tracking import Recording, judge
 
 
 def run(seconds: float) -> WorstFrames:

@@ -10,7 +10,7 @@ import pytest
 from wholebody.bench.interaction import FrameRow
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
-from wholebody.interaction import SCENES
+from wholebody.tracking import SCENES
 
 PAGE = """\
 before

@@ -12,10 +12,10 @@ import pinocchio as pin
 from wholebody.bench.drag import DragFrameRow, DragRow, drag_frames, drag_summary
 from wholebody.bench.report import render
 from wholebody.bench.tables import filled
-from wholebody.interaction.dragging import Dragged, drag_along, judge_drag, present_place
-from wholebody.interaction.paths import read_path, spread
 from wholebody.problem import Problem
 from wholebody.taskfile import read_task
+from wholebody.tracking.dragging import Dragged, drag_along, judge_drag, present_place
+from wholebody.tracking.paths import read_path, spread
 
 TASK = "sit_on_chair"
 METHODS = ("newton", "qp")

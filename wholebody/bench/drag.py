@@ -10,7 +10,7 @@ import numpy as np
 
 from wholebody.bench import plot_style
 from wholebody.bench.report import render
-from wholebody.interaction.dragging import Dragged, DragJudgement
+from wholebody.tracking.dragging import Dragged, DragJudgement
 
 ALLOWED = 1e-3  # m: of overlap, in a frame and on the way to the next
 

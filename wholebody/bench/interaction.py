@@ -10,8 +10,8 @@ import numpy as np
 
 from wholebody.bench import plot_style
 from wholebody.bench.report import render
-from wholebody.interaction.judging import IN_TIME, Judgement
-from wholebody.interaction.recording import Recording
+from wholebody.tracking.judging import IN_TIME, Judgement
+from wholebody.tracking.recording import Recording
 
 PAPER = (
     ("two arms", "1496", "14.63", "16", "3", "12.7", "3", "17.4"),

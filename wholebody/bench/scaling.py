@@ -19,8 +19,8 @@ from wholebody.bench.chains import TIP, chain, task
 from wholebody.bench.newton import assembly_row
 from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
-from wholebody.methods.drag import Drag
 from wholebody.simplification.simplify import simplify
+from wholebody.tracking.drag import Drag
 
 SERIES = ("joints", "pieces", "things")
 SIZES: dict[str, tuple[int, ...]] = {

@@ -10,9 +10,9 @@ from wholebody.methods import METHODS
 
 if TYPE_CHECKING:
     from wholebody.bench.drag import DragRow
-    from wholebody.interaction.dragging import Dragged, DragJudgement
     from wholebody.problem import Problem
     from wholebody.taskfile import Task
+    from wholebody.tracking.dragging import Dragged, DragJudgement
 
 HELP = "drag a goal of a task along a path, frame by frame"
 DESCRIPTION = """\
@@ -59,9 +59,9 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_rows, write_text
     from wholebody.cli.picture import make_folder
-    from wholebody.interaction.paths import spread
     from wholebody.methods.solve import method_named
     from wholebody.taskfile import read_task
+    from wholebody.tracking.paths import spread
 
     method_named(arguments.method)
     task = read_task(arguments.task)
@@ -87,7 +87,7 @@ def followed(problem: Problem, places: Any, method: str, goal: int, label: str) 
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from wholebody.interaction.dragging import drag_along, judge_drag
+    from wholebody.tracking.dragging import drag_along, judge_drag
 
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
@@ -116,8 +116,8 @@ def show(rows: list[DragRow]) -> None:
 
 def _goal(problem: Problem, number: int | None) -> int:
     from wholebody.errors import InputError
-    from wholebody.methods.moving_goals import moving_goal
     from wholebody.tasks import Frame, Point
+    from wholebody.tracking.moving_goals import moving_goal
 
     if number is None:
         number = next((k for k, goal in enumerate(problem.goals) if isinstance(goal, (Point, Frame))), None)
@@ -133,9 +133,9 @@ def _corners(problem: Problem, goal: int, arguments: argparse.Namespace) -> Any:
 
     from wholebody.errors import FileFormatError
     from wholebody.files import is_file
-    from wholebody.interaction.dragging import goal_place, present_place
-    from wholebody.interaction.paths import circle, read_path
     from wholebody.tasks.inputs import point
+    from wholebody.tracking.dragging import goal_place, present_place
+    from wholebody.tracking.paths import circle, read_path
 
     if arguments.path == "line":
         end = goal_place(problem, goal) if arguments.to is None else point(arguments.to, "--to")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from wholebody.bench.interaction import InteractionRow, WorstFrames
-    from wholebody.interaction import InteractionScene, Judgement, Recording
+    from wholebody.tracking import InteractionScene, Judgement, Recording
 
 HELP = "follow a tracker frame by frame through a gallery without penetration"
 DESCRIPTION = """\
@@ -53,8 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_text
     from wholebody.errors import InputError, UnknownNameError
-    from wholebody.interaction import SCENES, build_scene
-    from wholebody.interaction.loop import OVERLAPS
+    from wholebody.tracking import SCENES, build_scene
+    from wholebody.tracking.loop import OVERLAPS
 
     if arguments.list:
         for name, about in SCENES.items():
@@ -115,7 +115,7 @@ def _run_one(
 
     from wholebody.bench.interaction import frame_chart, frame_rows, summary, worst_frames
     from wholebody.bench.tables import write_rows
-    from wholebody.interaction import follow, judge
+    from wholebody.tracking import follow, judge
 
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:

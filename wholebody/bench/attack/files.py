@@ -89,7 +89,7 @@ def _reader(rng: np.random.Generator) -> Reader:
     if kind == "track":
         call = "read_track({path}, wb.load(HERE / 'robot.urdf'))"
         return Reader(
-            "from wholebody.interaction.track_files import read_track\n",
+            "from wholebody.tracking.track_files import read_track\n",
             call,
             _stored({"track.csv": "track.csv"} | ROBOT),
         )

@@ -13,8 +13,8 @@ from wholebody.bench.stability.case import NOTHING, Answer, HardCase, Nonsense, 
 from wholebody.bench.stability.judging import Judged, judge
 from wholebody.compiled import compile_all
 from wholebody.errors import WholebodyError
-from wholebody.methods.drag import Drag
 from wholebody.runner import Child, EndedError, Job, allow, run_jobs, tell
+from wholebody.tracking.drag import Drag
 
 ASKED = 1e-5  # m, rad: tolerance that methods are asked for; they are judged by the case's own
 CAP = 20.0  # s: a method that has not answered by then, or has not made its next frame, hangs

@@ -12,10 +12,10 @@ from wholebody.bench.stability.bodies import Builder, planar_arm, spatial_arm
 from wholebody.bench.stability.case import Group, Nonsense, Posed
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box
-from wholebody.methods.drag import Drag
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import Hold, Point
+from wholebody.tracking.drag import Drag
 
 LOOPS = Group("Loops and shared joints")
 NUMBERS = Group("Numbers")

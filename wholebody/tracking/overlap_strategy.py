@@ -8,7 +8,7 @@ from wholebody.arrays import Array
 
 
 class Resolution(NamedTuple):
-    """Result of the overlap removal of one frame; the other attributes are those of `wholebody.interaction.Frame`.
+    """Result of the overlap removal of one frame; the other attributes are those of `wholebody.tracking.Frame`.
 
     Attributes:
         candidates: postures (nq,) to show, the best one first; the next is taken if the motion to one is not free.

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.interaction import FrameLoop
+from wholebody.tracking import FrameLoop
 
 FACE = 0.55  # m: how far before the avatar's place the wall begins
 IN_TIME = 30

@@ -16,13 +16,13 @@ from wholebody.arrays import Array
 from wholebody.checks import time_step
 from wholebody.geometry.continuous.passing_through import GRAZE, is_free
 from wholebody.methods.base import Method, goal_error
-from wholebody.methods.moving_goals import copied, interpolated_target, moving_goal, refuse_assembly, retarget
 from wholebody.methods.solve import method_for_motions
-from wholebody.methods.warm_start import warm_started
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Frame, Point, StepLimit
+from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, refuse_assembly, retarget
+from wholebody.tracking.warm_start import warm_started
 from wholebody.workspace import Workspace
 
 FRAME = 1.0 / 60.0  # s: frame time of a screen

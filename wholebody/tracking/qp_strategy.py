@@ -7,13 +7,13 @@ import time
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.interaction.attraction import Attraction, Pace
-from wholebody.interaction.overlap_strategy import Resolution
 from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
+from wholebody.tracking.attraction import Attraction, Pace
+from wholebody.tracking.overlap_strategy import Resolution
 
 CLEARANCE = 1e-3
 """Clearance of pieces, metres. A step is exact to first order only; the clearance must exceed its error."""

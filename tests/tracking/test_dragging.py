@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.interaction import Dragged, drag_along, judge_drag, spread
-from wholebody.interaction.dragging import goal_place, present_place
+from wholebody.tracking import Dragged, drag_along, judge_drag, spread
+from wholebody.tracking.dragging import goal_place, present_place
 
 TOP = 0.74  # m: of the table
 

@@ -15,7 +15,7 @@ from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, InputError
 from wholebody.figures.figure import Figure
 from wholebody.files import read_text, write
-from wholebody.interaction.tracks import Track, check_figure
+from wholebody.tracking.tracks import Track, check_figure
 
 ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "root_qw")
 LARGEST = 200_000_000  # bytes: an hour of a person at 60 frames a second

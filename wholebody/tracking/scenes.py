@@ -16,11 +16,11 @@ from wholebody.arrays import Array
 from wholebody.checks import known, number, whole
 from wholebody.figures import load
 from wholebody.figures.figure import Figure
-from wholebody.interaction import rooms
-from wholebody.interaction.scripts import FRAME, script
-from wholebody.interaction.tracks import MOST_FRAMES, Track
 from wholebody.methods.inputs import SEED
 from wholebody.scene import Scene
+from wholebody.tracking import rooms
+from wholebody.tracking.scripts import FRAME, script
+from wholebody.tracking.tracks import MOST_FRAMES, Track
 
 Place = tuple[float, float, float]
 Keys = list[tuple[float, Array]]

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.checks import instance
-from wholebody.interaction.recording import Recording
 from wholebody.motion_assessment import OVERLAPS, assess_motion, cone_violation, passed, root_mean_square
 from wholebody.scene import Scene
+from wholebody.tracking.recording import Recording
 
 Counts = NDArray[np.intp]
 

@@ -10,9 +10,9 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.interaction import FrameLoop, Track, follow
-from wholebody.interaction.qp_strategy import CLEARANCE
 from wholebody.tasks import ReachCones
+from wholebody.tracking import FrameLoop, Track, follow
+from wholebody.tracking.qp_strategy import CLEARANCE
 
 
 def at(hand: wb.Figure, x: float, z: float, posture: str = "relaxed") -> Any:

@@ -19,14 +19,14 @@ from wholebody.arrays import Array
 from wholebody.assessment import assess
 from wholebody.checks import array, function, instance, numbers
 from wholebody.errors import InputError
-from wholebody.interaction.scripts import FRAME
 from wholebody.methods.base import Method
-from wholebody.methods.drag import Drag
-from wholebody.methods.moving_goals import copied, moving_goal, retarget
 from wholebody.motion_assessment import deepened, jerk
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point
+from wholebody.tracking.drag import Drag
+from wholebody.tracking.moving_goals import copied, moving_goal, retarget
+from wholebody.tracking.scripts import FRAME
 
 Counts = NDArray[np.intp]
 

@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.interaction.overlap_strategy import Resolution
 from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
 from wholebody.scene import Scene
+from wholebody.tracking.overlap_strategy import Resolution
 
 NOTED = 1e-3
 """Remaining depth, metres, from which a frame's note reports it."""

@@ -16,13 +16,13 @@ from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
-from wholebody.methods.moving_goals import copied, moving_goal, refuse_assembly, retarget
 from wholebody.methods.solve import method_for_motions
-from wholebody.methods.warm_start import warm_started
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point
 from wholebody.tasks.inputs import FARTHEST, point
+from wholebody.tracking.moving_goals import copied, moving_goal, refuse_assembly, retarget
+from wholebody.tracking.warm_start import warm_started
 
 SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from a nearer start
 CLOSEST = 1e-6  # m: least spacing

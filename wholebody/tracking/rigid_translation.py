@@ -18,8 +18,8 @@ from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.bisection import last_free
 from wholebody.geometry.penetration import global_depth
-from wholebody.interaction.overlap_strategy import Resolution
 from wholebody.scene import Scene
+from wholebody.tracking.overlap_strategy import Resolution
 
 STEP = 0.01
 """Largest motion of the hand in one step, metres: less than half the width of thin pieces (a table's top, a finger), so

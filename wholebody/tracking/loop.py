@@ -19,17 +19,17 @@ from wholebody.arrays import Array
 from wholebody.checks import array, flag, function, instance, known, time_step
 from wholebody.errors import InputError
 from wholebody.geometry.proximity import PENETRATION
-from wholebody.interaction.attraction import Attraction
-from wholebody.interaction.overlap_strategy import OverlapStrategy, Resolution
-from wholebody.interaction.qp_strategy import CLEARANCE, QPStrategy, weights
-from wholebody.interaction.recording import Frame, Recording
-from wholebody.interaction.scripts import FRAME
-from wholebody.interaction.tracks import UNIT_TOLERANCE, Track
 from wholebody.methods.inputs import SEED
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
+from wholebody.tracking.attraction import Attraction
+from wholebody.tracking.overlap_strategy import OverlapStrategy, Resolution
+from wholebody.tracking.qp_strategy import CLEARANCE, QPStrategy, weights
+from wholebody.tracking.recording import Frame, Recording
+from wholebody.tracking.scripts import FRAME
+from wholebody.tracking.tracks import UNIT_TOLERANCE, Track
 
 OVERLAPS = ("qp", "ccd")
 
@@ -156,10 +156,10 @@ class FrameLoop:
         if overlap == "qp":
             return QPStrategy(self.scene, self.shown, dt, rigid)
         if rigid:
-            from wholebody.interaction.rigid_translation import RigidTranslation
+            from wholebody.tracking.rigid_translation import RigidTranslation
 
             return RigidTranslation(self.scene)
-        from wholebody.interaction.ccd_strategy import CCDStrategy
+        from wholebody.tracking.ccd_strategy import CCDStrategy
 
         return CCDStrategy(self.scene, self.shown, dt, seed)
 

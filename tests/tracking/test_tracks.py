@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.interaction import Track, posed, read_track, write_track
-from wholebody.interaction.scripts import script, smooth
+from wholebody.tracking import Track, posed, read_track, write_track
+from wholebody.tracking.scripts import script, smooth
 
 
 def track(hand: wb.Figure, frames: int = 5) -> Track:

@@ -9,8 +9,8 @@ import numpy as np
 
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Sphere
-from wholebody.interaction.tracks import check_figure
 from wholebody.scene import Scene
+from wholebody.tracking.tracks import check_figure
 
 Color = tuple[float, float, float, float]
 Place = tuple[float, float, float]

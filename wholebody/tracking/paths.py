@@ -14,8 +14,8 @@ from wholebody.checks import array, number, shown, time_step, whole
 from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, InputError
 from wholebody.files import read_text
-from wholebody.interaction.tracks import MOST_FRAMES
 from wholebody.tasks.inputs import direction, point
+from wholebody.tracking.tracks import MOST_FRAMES
 
 SPEED = 0.5  # m/s: of the goal, if the number of frames is not given
 CORNERS = 72  # of a circle

@@ -10,10 +10,10 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.interaction import SCENES, Recording, Track, build_scene, follow, gallery, judge
-from wholebody.interaction.scenes import InteractionScene
 from wholebody.motion_assessment import assess_motion
 from wholebody.tasks import ReachCones
+from wholebody.tracking import SCENES, Recording, Track, build_scene, follow, gallery, judge
+from wholebody.tracking.scenes import InteractionScene
 
 BEFORE, AFTER = 8, 32
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
-from wholebody.interaction.tracks import Track
+from wholebody.tracking.tracks import Track
 
 FRAME = 1.0 / 60.0  # s: of a display
 TREMOR = 2e-3  # rad: amplitude of a tracker's noise and a person's tremor in arms, fingers and neck
