@@ -12,9 +12,9 @@ from wholebody.arrays import Array
 from wholebody.checks import choice, color, instance, known, listed, number, text
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.geometry.swept_points import swept_points
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import Shape
+from wholebody.geometry.swept_points import swept_points
 from wholebody.motion.sphere_filling import SphereFilling, fill_with_spheres
 from wholebody.scene import Scene
 
@@ -32,8 +32,8 @@ class Equipment:
 
     `attach` puts it into a scene as it is: its exact shape moves with the segment and is tested against all others but
     those it rests on and neighbours of the segment that it touches in the figure's first posture. `filled` gives what a
-    sphere-based test takes: spheres, which join the collision group of the segment and are tested across groups only. So
-    a pouch of spheres on the thorax is not tested against the pelvis, and an exact one is, unless it rests on it.
+    sphere-based test takes: spheres, which join the collision group of the segment and are tested across groups only.
+    So a pouch of spheres on the thorax is not tested against the pelvis, and an exact one is, unless it rests on it.
 
     Attributes:
         name: a name that nothing else in the scene has.
@@ -63,7 +63,9 @@ class Equipment:
         instance(self.shape, Shape, f"{where}: shape", "give wb.Mesh('pack.obj'), wb.Box or another")
         text(self.to, f"{where}: to")
         object.__setattr__(self, "at", placement(self.at, f"{where}: at"))
-        rests = tuple(text(name, f"{where}: rests_on") for name in listed(self.rests_on, f"{where}: rests_on", "['thorax']"))
+        rests = tuple(
+            text(name, f"{where}: rests_on") for name in listed(self.rests_on, f"{where}: rests_on", "['thorax']")
+        )
         object.__setattr__(self, "rests_on", rests)
         if self.color is not None:
             object.__setattr__(self, "color", color(self.color, f"{where}: color"))
@@ -142,9 +144,7 @@ class Equipment:
             group = group_of(scene.figure, known(self.to, scene.figure.segments, "segment", f"Equipment {self.name!r}"))
             others = [thing.name for thing in scene.objects.values() if thing.segment in group]
             rests = tuple(dict.fromkeys((*rests, *group, *others)))
-        return scene.attach(
-            self.shape, to=self.to, name=self.name, at=self.at, rests_on=rests, color=self.color
-        )
+        return scene.attach(self.shape, to=self.to, name=self.name, at=self.at, rests_on=rests, color=self.color)
 
 
 def group_of(figure: Figure, segment: str) -> tuple[str, ...]:
@@ -160,7 +160,11 @@ def bounds(shape: Shape) -> tuple[Array, Array]:
     Raises:
         InputError: it has none, as a half-space.
     """
-    extents = [_along(piece.geometry, piece.placement, axis) for axis in np.vstack([np.eye(3), -np.eye(3)]) for piece in shape.pieces()]
+    extents = [
+        _along(piece.geometry, piece.placement, axis)
+        for axis in np.vstack([np.eye(3), -np.eye(3)])
+        for piece in shape.pieces()
+    ]
     most = np.array(extents).reshape(6, -1).max(axis=1)
     if not np.isfinite(most).all():
         raise InputError(f"a {type(shape).__name__} has no bounds; equipment is a solid of finite size")

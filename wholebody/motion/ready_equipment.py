@@ -32,7 +32,9 @@ SLIT = 1e-4  # rad: between two sections, so that they stay separate parts, each
 
 def side_sphere(figure: Figure) -> tuple[Equipment, ...]:
     """A ball at the left side of the torso, half inside it."""
-    ball = Equipment.worn(Sphere(BALL), figure, name="side_sphere", to="lower_thorax", side="left", height=SIDE, color=CLOTH)
+    ball = Equipment.worn(
+        Sphere(BALL), figure, name="side_sphere", to="lower_thorax", side="left", height=SIDE, color=CLOTH
+    )
     at = ball.at.translation - np.array([0.0, BALL, 0.0])  # type: ignore[union-attr]
     return (Equipment(ball.name, ball.shape, ball.to, at, ball.rests_on, CLOTH),)
 
@@ -42,7 +44,9 @@ def pouches(figure: Figure) -> tuple[Equipment, ...]:
     depth, width, height = POUCH
     shape = Box((width, depth, height))
     return tuple(
-        Equipment.worn(shape, figure, name=f"{side}_pouch", to="lower_thorax", side=side, height=BELT, sideways=0.1, color=CLOTH)
+        Equipment.worn(
+            shape, figure, name=f"{side}_pouch", to="lower_thorax", side=side, height=BELT, sideways=0.1, color=CLOTH
+        )
         for side in ("left", "right")
     )
 

@@ -1,8 +1,8 @@
 """Solids filled with spheres: equipment as a sphere-based self-collision test takes it.
 
-Degenhardt's thesis (section 3.3.2) fills the mesh of equipment as it stands, or what its convex envelope encloses. Here
-the best fit of n spheres is the one that leaves the least volume uncovered and puts the least volume outside: the volume
-is sampled on a grid, the centres are those of n clusters of the solid's cells, and the radii descend one after another.
+Degenhardt's thesis (section 3.3.2) fills the mesh of equipment as it stands, or what its convex envelope encloses.
+Here the best fit of n spheres is the one that leaves the least volume uncovered and puts the least volume outside. The
+volume is sampled on a grid, the centres are those of n clusters of the solid's cells, and the radii descend in turn.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 
-from wholebody.arrays import Array
+from wholebody.arrays import Array, Indices
 from wholebody.checks import array, flag, whole
 from wholebody.errors import InputError
 from wholebody.geometry.pieces import Piece
@@ -25,14 +25,17 @@ from wholebody.geometry.shapes import Box, Hull, Mesh, Shape, Sphere
 
 Faces = NDArray[np.int64]
 
-CELLS = 12_000
+CELLS = 6_000
 """Cells of the grid inside the solid: more make the volumes finer and the filling slower."""
+
+MOST_CELLS = 150_000
+"""Cells of the whole grid, which limits those inside of thin solids."""
 
 UNCOVERED = 3.0
 """Weight of a volume that stays uncovered against one that protrudes: a limb would get into the former."""
 
 MOST_SPHERES = 500
-STARTS = 4  # seeded clusterings, of which the best is kept
+STARTS = 3  # seeded clusterings, of which the best is kept
 SWEEPS = 4  # over all radii, one after the other; later ones change less than a cell
 SIDES = 32  # of the meridians of a ball that is given as a shape
 
@@ -59,7 +62,7 @@ class Spheres(Shape):
         radii = array(self.radii, "Spheres radii", "an array of shape (n,)").copy()
         if radii.ndim != 1 or not len(radii) or centers.shape != (len(radii), 3) or not np.isfinite(centers).all():
             raise InputError(
-                f"Spheres: centers {centers.shape} and radii {radii.shape}; give finite (n, 3) and (n,) of one sphere or more"
+                f"Spheres: centers {centers.shape} and radii {radii.shape}; give finite (n, 3) and (n,), at least one"
             )
         for radius in radii.tolist():
             Sphere(radius)
@@ -177,10 +180,10 @@ class _Grid:
         corners = vertices[faces]
         volume = abs(float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum()) / 6.0)
         low, high = vertices.min(axis=0), vertices.max(axis=0)
-        self.cell = (max(volume, 1e-12) / CELLS) ** (1.0 / 3.0)
-        self.cell = max(self.cell, float((high - low).max()) / 400)
         # A sphere that covers its share of the solid stands out no farther than this.
         margin = min(0.5 * float(np.linalg.norm(high - low)), 1.5 * float(np.prod(high - low) / count) ** (1.0 / 3.0))
+        room = float(np.prod(high - low + 2.0 * margin))
+        self.cell = max(volume / CELLS, room / MOST_CELLS) ** (1.0 / 3.0)
         axes = [
             np.arange(a - margin + self.cell * share, b + margin, self.cell)
             for a, b, share in zip(low, high, (0.5, 0.4937, 0.4979), strict=True)  # off the planes of the mesh
@@ -222,17 +225,12 @@ def _fitted(grid: _Grid, count: int, seed: int) -> tuple[Array, Array, int, int]
     """Centres, radii, and how many cells are uncovered inside and covered outside."""
     count = min(count, len(grid.inside))
     centers, label = kmeans2(grid.inside, count, iter=30, minit="++", seed=np.random.default_rng(seed))
-    distance = [np.linalg.norm(grid.inside - center, axis=1) for center in centers]
-    farthest = np.array([d[label == k].max(initial=0.0) for k, d in enumerate(distance)])
-    near_in = [np.flatnonzero(d <= 1.2 * far + grid.cell) for d, far in zip(distance, farthest, strict=True)]
-    near_out, outer = [], []
-    for center, far in zip(centers, farthest, strict=True):
-        d = np.linalg.norm(grid.around - center, axis=1)
-        near = np.flatnonzero(d <= 1.2 * far + grid.cell)
-        near_out.append(near)
-        outer.append(d[near])
+    farthest = np.array(
+        [np.linalg.norm(grid.inside[label == k] - center, axis=1).max(initial=0.0) for k, center in enumerate(centers)]
+    )
+    near_in, inner = _near(grid.inside, centers, 1.2 * farthest + grid.cell)
+    near_out, outer = _near(grid.around, centers, 1.2 * farthest + grid.cell)
     radii = np.maximum(farthest, grid.cell)
-    inner = [d[near] for d, near in zip(distance, near_in, strict=True)]
     covers_in, covers_out = np.zeros(len(grid.inside), dtype=int), np.zeros(len(grid.around), dtype=int)
     for k in range(len(radii)):
         covers_in[near_in[k][inner[k] <= radii[k]]] += 1
@@ -245,6 +243,15 @@ def _fitted(grid: _Grid, count: int, seed: int) -> tuple[Array, Array, int, int]
             covers_in[near_in[k][inner[k] <= radii[k]]] += 1
             covers_out[near_out[k][outer[k] <= radii[k]]] += 1
     return centers, radii, int((covers_in == 0).sum()), int((covers_out > 0).sum())
+
+
+def _near(points: Array, centers: Array, within: Array) -> tuple[list[Indices], list[Array]]:
+    """For each centre the points within its distance (n,), and how far they are."""
+    found = (
+        cKDTree(points).query_ball_point(centers, within, return_sorted=True) if len(points) else [[]] * len(centers)
+    )
+    near = [np.array(each, dtype=np.intp) for each in found]
+    return near, [np.linalg.norm(points[k] - center, axis=1) for k, center in zip(near, centers, strict=True)]
 
 
 def _best_radius(inside: Array, outside: Array, grid: _Grid) -> float:
@@ -315,5 +322,3 @@ def _closed(vertices: Array, faces: Faces) -> bool:
     size = int(corner.max(initial=0)) + 1
     ahead, back = edges[:, 0] * size + edges[:, 1], edges[:, 1] * size + edges[:, 0]
     return bool(len(edges)) and bool(np.array_equal(np.sort(ahead), np.sort(back)))
-
-
