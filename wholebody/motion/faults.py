@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from wholebody.arrays import Array, Mask
+from wholebody.motion.dips import dips
 from wholebody.motion.frame_terms import FrameTerms
-from wholebody.motion.trajectory.gaps import dips
 from wholebody.workspace import Workspace
 
 DEPTH = 5e-5  # m: of an overlap that is to go; half of what counts as a collision
@@ -32,19 +32,13 @@ def faults(workspace: Workspace, terms: FrameTerms, q: Array, clearance: float =
         (n,) depths in metres; (n,) frames that overlap, miss a limit or miss what is held; gaps between other frames
         that dip.
     """
-    limits = workspace_limits(terms)
+    limits = terms.scene.figure.limits
     depths = np.array([depth(workspace, posture, clearance) for posture in q])
-    values = q[:, limits[0]]
-    beyond = np.maximum(limits[1] - values, values - limits[2]).max(axis=1, initial=0.0)
+    values = q[:, limits.idx_q]
+    beyond = np.maximum(limits.lower - values, values - limits.upper).max(axis=1, initial=0.0)
     wrong = (depths > DEPTH) | (beyond > BEYOND)
     if terms.holds:
         state = workspace.state
         wrong |= np.array([terms.missed(frame, state.update(posture)) > MISSED for frame, posture in enumerate(q)])
     quiet = [frame for frame in range(len(q) - 1) if not (wrong[frame] or wrong[frame + 1])]
     return depths, wrong, sorted(dips(workspace, q, quiet))
-
-
-def workspace_limits(terms: FrameTerms) -> tuple[Array, Array, Array]:
-    """Places in q, lower and upper limits of the figure's joints."""
-    limits = terms.scene.figure.limits
-    return limits.idx_q, limits.lower, limits.upper

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.checks import a, listed
@@ -132,14 +131,7 @@ def _try(term: HeldTerm, scene: Scene, q: Array, where: str) -> None:
     check_rows(where, resolved, value, resolved.jacobian(state), state)
 
 
-def joint_steps(model: pin.Model, q: Array) -> Array:
-    """(n - 1, nv) from each posture of (n, nq) to the next."""
-    pairs = zip(q[:-1], q[1:], strict=True)
-    return np.array([pin.difference(model, *pair) for pair in pairs]).reshape(-1, model.nv)
-
-
 def speed_limits(scene: Scene, dt: float) -> Array:
     """(nv,) largest change of each degree of freedom in one frame; infinite for what has no limit."""
     limit = np.array(scene.model.velocityLimit, dtype=float).reshape(-1)
     return np.where(limit > 0.0, np.minimum(limit, 1e9) * dt, np.inf)
-

@@ -113,9 +113,7 @@ class PerFrame:
         ended = "the caller ended it" if watch.ended else ""
         return MethodResult(q, 0, 0 if follower is None else follower.programs, ended)
 
-    def _free(
-        self, window: Window, q: Array, terms: FrameTerms, follower: Follower, workspace: Workspace
-    ) -> None:
+    def _free(self, window: Window, q: Array, terms: FrameTerms, follower: Follower, workspace: Workspace) -> None:
         forward = _passed(follower, terms, range(window.first, window.end))
         if not self.backward or len(window) < 2:
             q[window.first : window.end] = forward

@@ -1,6 +1,6 @@
 """Postures of a clip as deviations from the original postures, and rows carried over to these deviations.
 
-The posture of frame t is ``q_t = integrate(r_t, x_t)`` with the original posture r_t and the deviation x_t, shape (nv,).
+The posture of frame t is ``q_t = integrate(r_t, x_t)`` with the original posture r_t and the deviation x_t (nv,).
 For a joint of one degree of freedom x_t is a difference of angles. For a free root it is the logarithm of the motion
 from the original placement. So deviations and their differences over time are linear in the unknowns.
 """
@@ -88,6 +88,6 @@ class Chart:
 
     def _times(self, rows: Array, matrix: Array) -> Array:
         """A product with a matrix (nv, nv) that is the identity but for its curved joints."""
-        curved, result = self.curved, rows.copy()
+        curved, result = self.curved, np.array(rows)
         result[:, curved] = rows[:, curved] @ matrix[np.ix_(curved, curved)]
         return result

@@ -15,10 +15,10 @@ import numpy as np
 from wholebody.arrays import Array, Indices
 from wholebody.figures.state import State, Wrench
 from wholebody.motion.trajectory.chart import Chart
-from wholebody.tasks.base import Constraint
+from wholebody.tasks.base import Constraint, Goal
 from wholebody.workspace import Workspace
 
-Terms = Sequence[Constraint]
+Terms = Sequence[Constraint | Goal]
 
 
 class Node(NamedTuple):
@@ -114,12 +114,15 @@ class Looking:
         return found.gap - self.clearance, rows, found.contact
 
 
-def _split(term: Constraint, state: State) -> tuple[Array, Array, Array, Array]:
-    """Values and rows of a constraint's equalities, and of its inequalities as gaps."""
-    value = np.atleast_1d(term.value(state))
+def _split(term: Constraint | Goal, state: State) -> tuple[Array, Array, Array, Array]:
+    """Values and rows of a term's equalities, and of its inequalities as gaps."""
+    if isinstance(term, Goal):
+        value, low_value, high_value = np.atleast_1d(term.error(state)), np.zeros(()), np.zeros(())
+    else:
+        value, low_value, high_value = np.atleast_1d(term.value(state)), term.lower, term.upper
     derivative = term.jacobian(state)
     rows = state.wrench_jacobian(derivative) if isinstance(derivative, Wrench) else np.atleast_2d(derivative)
-    lower, upper = np.broadcast_to(term.lower, value.shape), np.broadcast_to(term.upper, value.shape)
+    lower, upper = np.broadcast_to(low_value, value.shape), np.broadcast_to(high_value, value.shape)
     equal = lower == upper
     low, high = ~equal & np.isfinite(lower), ~equal & np.isfinite(upper)
     gaps = np.concatenate([value[low] - lower[low], upper[high] - value[high]])

@@ -38,7 +38,7 @@ class Limits(NamedTuple):
 
     def passed(self, x: Array) -> Array:
         """(n, nv) by how much deviations (n, nv) pass their limits, or their changes the bounds on speed."""
-        past = np.maximum(np.maximum(self.lower - x, x - self.upper), 0.0)
+        past: Array = np.maximum(np.maximum(self.lower - x, x - self.upper), 0.0)
         change = np.diff(x, axis=0)
         past[1:] = np.maximum(past[1:], np.maximum(self.slowest - change, change - self.fastest))
         return past
@@ -59,7 +59,7 @@ class Layout(NamedTuple):
 
     def deviations(self, z: Array, x: Array) -> Array:
         """(n, nv) deviations that the unknowns z say, with those of x elsewhere."""
-        found = x.copy()
+        found: Array = x.copy()
         found[:, self.dofs] = z[self.place]
         return found
 
@@ -105,7 +105,7 @@ def lay_out(
 
 
 def box(x: Array, limits: Limits, radius: float, dofs: Indices) -> tuple[Array, Array]:
-    """(n, a) bounds of the deviations: the limits, and the trust region; where they are apart, the way to the limits."""
+    """(n, a) bounds of the deviations: the limits, and the trust region; where they are apart, the way there."""
     now = x[:, dofs]
     low, high = limits.lower[:, dofs], limits.upper[:, dofs]
     least, most = np.maximum(low, now - radius), np.minimum(high, now + radius)
@@ -126,7 +126,7 @@ def touched(rows: Sequence[Rows], which: Sequence[Mask]) -> Mask:
 def foreseen(one: Rows, step: Array) -> Array:
     """(r,) gaps of a node's rows after a step (n, nv), to first order."""
     frame = one.node.frame
-    after = one.gap + one.first @ step[frame]
+    after: Array = one.gap + one.first @ step[frame]
     return after if one.second is None else after + one.second @ step[frame + 1]
 
 

@@ -127,9 +127,7 @@ class WindowProgram:
             small = longest <= STILL or (abs(gained) <= GAIN * max(here.objective, 1e-9))
             if self._accepted(there, here, entries, gained):
                 entries.append(((1.0 - MARGIN) * here.total, here.objective))
-                multipliers = [
-                    self._shifted(old, one) for old, one in zip(multipliers, there.rows, strict=True)
-                ]
+                multipliers = [self._shifted(old, one) for old, one in zip(multipliers, there.rows, strict=True)]
                 if there.worst > MET and there.total > HALVED * here.total and longest < 0.9 * radius:
                     penalty = min(RAISE * penalty, HIGHEST)
                 radius = min(2.0 * radius, LARGEST) if longest > 0.9 * radius else radius
@@ -160,8 +158,9 @@ class WindowProgram:
         known = [*entries, ((1.0 - MARGIN) * here.total, here.objective)]
         if there.total <= free:
             return here.total > free or gained >= -1e-12 * max(1.0, here.objective)
-        return all(there.total < total or there.objective < objective - MARGIN * there.total
-                   for total, objective in known)
+        return all(
+            there.total < total or there.objective < objective - MARGIN * there.total for total, objective in known
+        )
 
     def _counts(self, here: _At) -> Mask:
         """(nv,) degrees of freedom that move what is missed, or are away from zero."""

@@ -8,7 +8,6 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.motion.trajectory.nodes import Node
 from wholebody.workspace import Workspace
 
 DIP = 8e-5  # m: sweeps find dips deeper than this; frames themselves are met to 1e-5, so no dip is deeper than 0.1 mm
@@ -30,11 +29,6 @@ def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float
         if contact is not None:
             found[gap] = _deepest(workspace, q[gap], q[gap + 1], contact.fraction)
     return found
-
-
-def nodes_of(found: dict[int, float]) -> list[Node]:
-    """The nodes at the deepest places of gaps that dip."""
-    return [Node(gap, share) for gap, share in found.items()]
 
 
 def _deepest(workspace: Workspace, before: Array, after: Array, otherwise: float) -> float:
