@@ -71,14 +71,11 @@ def solve_growing(
 
 @compiled()
 def _contains(sorted_keys: Indices, key: int) -> bool:
-    """Whether keys (k,) in ascending order contain one. (numba's searchsorted loads scipy.linalg, 0.1 s of a start.)"""
+    """Whether keys (k,) in ascending order contain one; numba's searchsorted would load scipy.linalg at every start."""
     low, high = 0, len(sorted_keys)
     while low < high:
         middle = (low + high) // 2
-        if sorted_keys[middle] < key:
-            low = middle + 1
-        else:
-            high = middle
+        low, high = (middle + 1, high) if sorted_keys[middle] < key else (low, middle)
     return low < len(sorted_keys) and sorted_keys[low] == key
 
 
