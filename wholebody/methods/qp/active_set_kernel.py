@@ -44,8 +44,7 @@ def solve_growing(
     """
     k = len(least)
     for j in range(k):
-        place = np.searchsorted(known, key[j])
-        pushing[j] = place < len(known) and known[place] == key[j]
+        pushing[j] = _contains(known, key[j])
         chosen[j] = least[j] > -limits[0] or pushing[j]
     rounds = int(limits[1])
     for attempt in range(rounds + 1):
@@ -68,6 +67,16 @@ def solve_growing(
         if not missed:
             return attempt
     return rounds
+
+
+@compiled()
+def _contains(sorted_keys: Indices, key: int) -> bool:
+    """Whether keys (k,) in ascending order contain one; numba's searchsorted would load scipy.linalg at every start."""
+    low, high = 0, len(sorted_keys)
+    while low < high:
+        middle = (low + high) // 2
+        low, high = (middle + 1, high) if sorted_keys[middle] < key else (low, middle)
+    return low < len(sorted_keys) and sorted_keys[low] == key
 
 
 def work_size(variables: int, soft: int, elastic: int) -> int:
@@ -308,7 +317,7 @@ def _minimise_in_columns(
         multiplier: (size or more,) is filled with the weight times the residual of each row.
     """
     n = len(x)
-    free = np.flatnonzero(inverse)
+    free = inverse.nonzero()[0]
     columns = len(free)
     order = np.argsort(compliance[:size])
     table = np.zeros((size + columns, columns + 1))
