@@ -70,6 +70,7 @@ def solve_growing(
     return rounds
 
 
+@compiled()
 def work_size(variables: int, soft: int, elastic: int) -> int:
     """Floats that `settle` needs for a program of so many variables, soft rows and elastic rows."""
     rows = soft + elastic
@@ -310,7 +311,13 @@ def _minimise_in_columns(
     n = len(x)
     free = np.flatnonzero(inverse)
     columns = len(free)
-    order = np.argsort(compliance[:size])
+    order = np.arange(size)
+    for place in range(1, size):  # few weights, and most of them in order: cheaper than a general sort, and stable
+        own, back = order[place], place - 1
+        while back >= 0 and compliance[order[back]] > compliance[own]:
+            order[back + 1] = order[back]
+            back -= 1
+        order[back + 1] = own
     table = np.zeros((size + columns, columns + 1))
     for place in range(size):
         r = order[place]
