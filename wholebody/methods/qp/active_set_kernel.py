@@ -79,6 +79,7 @@ def _contains(sorted_keys: Indices, key: int) -> bool:
     return low < len(sorted_keys) and sorted_keys[low] == key
 
 
+@compiled()
 def work_size(variables: int, soft: int, elastic: int) -> int:
     """Floats that `settle` needs for a program of so many variables, soft rows and elastic rows."""
     rows = soft + elastic
@@ -319,7 +320,13 @@ def _minimise_in_columns(
     n = len(x)
     free = inverse.nonzero()[0]
     columns = len(free)
-    order = np.argsort(compliance[:size])
+    order = np.arange(size)
+    for place in range(1, size):  # few weights, and most of them in order: cheaper than a general sort, and stable
+        own, back = order[place], place - 1
+        while back >= 0 and compliance[order[back]] > compliance[own]:
+            order[back + 1] = order[back]
+            back -= 1
+        order[back + 1] = own
     table = np.zeros((size + columns, columns + 1))
     for place in range(size):
         r = order[place]
