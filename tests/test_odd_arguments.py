@@ -438,6 +438,19 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "drag_along", Call(tracking.drag_along, along)
     done = tracking.drag_along(ask, places, "qp")
     yield "judge_drag", Call(tracking.judge_drag, {"problem": ask, "dragged": done, "goal": 0})
+    clip = wb.Clip(arm, [q, q + 0.1], 0.1)  # type: ignore[arg-type]
+    yield "Clip", Call(wb.Clip, {"figure": arm, "q": [q, q], "dt": 0.1, "name": "it"}, lambda made: made.jerk())
+    yield "Clip.at", Call(clip.at, {"t": 0.05})
+    yield "Clip.resampled", Call(clip.resampled, {"dt": 0.05})
+    yield "Clip.joined", Call(clip.joined, {"other": clip})
+    yield "Clip.with_q", Call(clip.with_q, {"q": [q], "name": "other"})
+    yield "Clip.from_track", Call(wb.Clip.from_track, {"track": track, "figure": arm})
+    yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
+    for method in ("mirrored", "velocities", "accelerations", "jerk"):
+        yield f"Clip.{method}", Call(getattr(wb.Clip(hand, [hand.neutral], 0.1), method), {})  # type: ignore[arg-type]
+    yield "Clip(frames)", Call(lambda frames: clip[frames], {"frames": slice(0, 1)})
+    clip.write(path / "walk.npz")
+    yield "read_clip", Call(wb.read_clip, {"path": path / "walk.npz", "figure": arm})
     yield "spread", Call(tracking.spread, {"corners": places, "frames": 3, "dt": 0.1})
     yield "circle", Call(tracking.circle, {"center": at, "radius": 0.1, "normal": at})
     yield "read_path", Call(tracking.read_path, {"path": path / "path.txt"})

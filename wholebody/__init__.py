@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
+    from wholebody.motion.clip import Clip
+    from wholebody.motion.reading import read_clip
     from wholebody.problem import Problem
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
@@ -78,6 +80,7 @@ __all__ = [
     "Box",
     "Capsule",
     "CenterOfMass",
+    "Clip",
     "Constraint",
     "DampedLeastSquares",
     "Discomfort",
@@ -120,6 +123,7 @@ __all__ = [
     "assess",
     "follow_path",
     "load",
+    "read_clip",
     "read_task",
     "simplify",
     "solve",
@@ -138,6 +142,8 @@ _MODULES = {
     "wholebody.tracking.path_following": "follow_path",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
+    "wholebody.motion.clip": "Clip",
+    "wholebody.motion.reading": "read_clip",
     "wholebody.problem": "Problem",
     "wholebody.scene": "Scene",
     "wholebody.simplification.simplify": "simplify",
