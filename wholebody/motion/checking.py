@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.checks import function, instance, number
@@ -15,9 +14,9 @@ from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.swept_depth import SweptDepth
 from wholebody.motion.clip import Clip
-from wholebody.motion.clip_contacts import Contact, ContactTable
+from wholebody.motion.clip_contacts import Contact, ContactTable, contact_as_dict
 from wholebody.motion.feet import Sliding, sliding
-from wholebody.motion_assessment import jerk, velocities
+from wholebody.motion_assessment import root_mean_square, third_differences, velocities
 from wholebody.scene import Scene
 
 DEPTH = 1e-4
@@ -49,13 +48,6 @@ class Beyond:
     frame: int
     value: float
     limit: float
-
-    def as_dict(self, dt: float) -> dict[str, Any]:
-        """The same as JSON has it."""
-        return {
-            "joint": self.joint, "frames": self.frames, "frame": self.frame, "time": self.frame * dt,
-            "value": self.value, "limit": self.limit,
-        }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,9 +131,9 @@ class ClipCheck:
             "deepest": self.deepest,
             "deepest_between": self.deepest_between,
             "jerk": self.mean_jerk,
-            "contacts": [contact.as_dict(dt) for contact in self.contacts],
-            "limits": [beyond.as_dict(dt) for beyond in self.limits],
-            "speeds": [beyond.as_dict(dt) for beyond in self.speeds],
+            "contacts": [contact_as_dict(contact, dt) for contact in self.contacts],
+            "limits": [_beyond_as_dict(beyond, dt) for beyond in self.limits],
+            "speeds": [_beyond_as_dict(beyond, dt) for beyond in self.speeds],
             "sliding": [
                 {
                     "frame_name": each.frame, "distance": each.distance, "frame": each.at, "time": each.at * dt,
@@ -171,11 +163,13 @@ def check(
         progress: called with the number of frames that are done, and that of all.
 
     Raises:
-        InputError: no clip, a scene of a figure with other joints, a depth out of range, or a joint whose motion between
-            two postures cannot be bounded.
+        InputError: no clip, a scene of a figure with other joints, a depth out of range, or a joint whose motion
+            between two postures cannot be bounded.
     """
     instance(clip, Clip, "check: clip", "read one with wb.read_clip(path, figure)")
-    scene = Scene(clip.figure) if scene is None else instance(scene, Scene, "check: scene", "make one: wb.Scene(figure)")
+    scene = (
+        Scene(clip.figure) if scene is None else instance(scene, Scene, "check: scene", "make one: wb.Scene(figure)")
+    )
     same_joints(clip, scene.figure, "check")
     depth = number(depth, "check: depth", SMALLEST, LARGEST, "m")
     tell: Progress | None = function(progress, "check: progress") if progress is not None else None
@@ -201,9 +195,15 @@ def check(
         limits=beyond_limits(clip),
         speeds=too_fast(clip),
         sliding=sliding(clip.figure, clip.q, clip.dt),
-        jerk=jerk(clip.figure.model, clip.q, clip.dt),
+        jerk=root_mean_square(joint_jerk(clip)),
         queries=swept.asked,
     )
+
+
+def joint_jerk(clip: Clip) -> Array:
+    """(n - 3, k) third difference of the k joint coordinates over time, without a free root; rad/s^3, m/s^3."""
+    found = third_differences(clip.figure.model, clip.q, clip.dt)
+    return found[:, 6 if clip.figure.root == "free" else 0 :]
 
 
 def same_joints(clip: Clip, figure: Figure, what: str) -> None:
@@ -251,6 +251,13 @@ def too_fast(clip: Clip) -> tuple[Beyond, ...]:
             told = Beyond(name, int((excess > 0.0).sum()), worst, float(speed[worst, column]), float(limit[column]))
             found.append((float(excess[worst]), told))
     return _worst_first(found)
+
+
+def _beyond_as_dict(beyond: Beyond, dt: float) -> dict[str, Any]:
+    return {
+        "joint": beyond.joint, "frames": beyond.frames, "frame": beyond.frame, "time": beyond.frame * dt,
+        "value": beyond.value, "limit": beyond.limit,
+    }  # fmt: skip
 
 
 def _worst_first(found: list[tuple[float, Beyond]]) -> tuple[Beyond, ...]:

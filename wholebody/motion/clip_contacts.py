@@ -56,28 +56,6 @@ class Contact:
         """Both names, for messages."""
         return f"{self.first} and {self.second}"
 
-    def as_dict(self, dt: float) -> dict[str, Any]:
-        """The contact as JSON has it; lengths in metres, times in seconds."""
-        return {
-            "first": self.first,
-            "second": self.second,
-            "kind": self.kind,
-            "frames": self.frames,
-            "gaps": self.gaps,
-            "start": {"frame": self.start, "time": self.start * dt},
-            "deepest": {
-                "depth": self.deepest,
-                "frame": self.deepest_frame,
-                "time": self.deepest_frame * dt,
-                "between": self.deepest_between,
-            },
-            "longest": {
-                "first_frame": self.longest[0],
-                "last_frame": self.longest[1],
-                "seconds": (self.longest[1] - self.longest[0]) * dt,
-            },
-        }
-
 
 class ContactTable:
     """Depths of all pairs of owners, filled frame by frame."""
@@ -164,6 +142,29 @@ def contact(first: str, second: str, kind: Kind, depth: Array, between: Array, t
         depth=depth,
         between=between,
     )
+
+
+def contact_as_dict(contact: Contact, dt: float) -> dict[str, Any]:
+    """A contact as JSON has it; lengths in metres, times in seconds."""
+    return {
+        "first": contact.first,
+        "second": contact.second,
+        "kind": contact.kind,
+        "frames": contact.frames,
+        "gaps": contact.gaps,
+        "start": {"frame": contact.start, "time": contact.start * dt},
+        "deepest": {
+            "depth": contact.deepest,
+            "frame": contact.deepest_frame,
+            "time": contact.deepest_frame * dt,
+            "between": contact.deepest_between,
+        },
+        "longest": {
+            "first_frame": contact.longest[0],
+            "last_frame": contact.longest[1],
+            "seconds": (contact.longest[1] - contact.longest[0]) * dt,
+        },
+    }
 
 
 def runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
