@@ -36,7 +36,9 @@ if TYPE_CHECKING:
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
     from wholebody.motion.clip import Clip
-    from wholebody.motion.reading import read_clip
+    from wholebody.motion.reading import read_clip, read_skeleton
+    from wholebody.motion.retargeting import retarget
+    from wholebody.motion.skeleton import SkeletonMotion
     from wholebody.problem import Problem
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
@@ -112,6 +114,7 @@ __all__ = [
     "Relative",
     "Scene",
     "Shape",
+    "SkeletonMotion",
     "Solution",
     "Sphere",
     "StepLimit",
@@ -124,7 +127,9 @@ __all__ = [
     "follow_path",
     "load",
     "read_clip",
+    "read_skeleton",
     "read_task",
+    "retarget",
     "simplify",
     "solve",
 ]
@@ -143,7 +148,9 @@ _MODULES = {
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
     "wholebody.motion.clip": "Clip",
-    "wholebody.motion.reading": "read_clip",
+    "wholebody.motion.reading": "read_clip read_skeleton",
+    "wholebody.motion.retargeting": "retarget",
+    "wholebody.motion.skeleton": "SkeletonMotion",
     "wholebody.problem": "Problem",
     "wholebody.scene": "Scene",
     "wholebody.simplification.simplify": "simplify",
