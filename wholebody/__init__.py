@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
+    from wholebody.motion.checking import ClipCheck, check
     from wholebody.motion.clip import Clip
     from wholebody.motion.reading import read_clip, read_skeleton
     from wholebody.motion.retargeting import retarget
@@ -83,6 +84,7 @@ __all__ = [
     "Capsule",
     "CenterOfMass",
     "Clip",
+    "ClipCheck",
     "Constraint",
     "DampedLeastSquares",
     "Discomfort",
@@ -124,6 +126,7 @@ __all__ = [
     "WholebodyError",
     "__version__",
     "assess",
+    "check",
     "follow_path",
     "load",
     "read_clip",
@@ -147,6 +150,7 @@ _MODULES = {
     "wholebody.tracking.path_following": "follow_path",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
+    "wholebody.motion.checking": "ClipCheck check",
     "wholebody.motion.clip": "Clip",
     "wholebody.motion.reading": "read_clip read_skeleton",
     "wholebody.motion.retargeting": "retarget",
