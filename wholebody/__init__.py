@@ -37,7 +37,9 @@ if TYPE_CHECKING:
     from wholebody.methods.solve import solve
     from wholebody.motion.checking import ClipCheck, check
     from wholebody.motion.clip import Clip
-    from wholebody.motion.reading import read_clip
+    from wholebody.motion.reading import read_clip, read_skeleton
+    from wholebody.motion.retargeting import retarget
+    from wholebody.motion.skeleton import SkeletonMotion
     from wholebody.problem import Problem
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
@@ -114,6 +116,7 @@ __all__ = [
     "Relative",
     "Scene",
     "Shape",
+    "SkeletonMotion",
     "Solution",
     "Sphere",
     "StepLimit",
@@ -127,7 +130,9 @@ __all__ = [
     "follow_path",
     "load",
     "read_clip",
+    "read_skeleton",
     "read_task",
+    "retarget",
     "simplify",
     "solve",
 ]
@@ -147,7 +152,9 @@ _MODULES = {
     "wholebody.methods.solve": "solve",
     "wholebody.motion.checking": "ClipCheck check",
     "wholebody.motion.clip": "Clip",
-    "wholebody.motion.reading": "read_clip",
+    "wholebody.motion.reading": "read_clip read_skeleton",
+    "wholebody.motion.retargeting": "retarget",
+    "wholebody.motion.skeleton": "SkeletonMotion",
     "wholebody.problem": "Problem",
     "wholebody.scene": "Scene",
     "wholebody.simplification.simplify": "simplify",
