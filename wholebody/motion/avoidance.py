@@ -201,4 +201,3 @@ def _report(
     return AvoidanceReport(
         solved, message, method, seconds, result.posture_solves, result.programs, changed, was, now, missed
     )
-
