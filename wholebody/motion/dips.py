@@ -42,11 +42,10 @@ def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tu
     """
     near, dipping = [], False
     for gap in gaps:
-        depths = _depths(workspace, q[gap], q[gap + 1], FEW, NEAR)
-        place = int(np.argmax(depths))
-        dipping |= depths[place] > SAMPLED
-        if depths[place] > -NEAR:
-            near.append((gap, FEW[place]))
+        for share, one in zip(FEW, _depths(workspace, q[gap], q[gap + 1], FEW, NEAR), strict=True):
+            dipping |= one > SAMPLED
+            if one > -NEAR:
+                near.append((gap, share))
     return near if dipping else []
 
 
