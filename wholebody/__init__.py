@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
+    from wholebody.motion.checking import ClipCheck, check
     from wholebody.motion.clip import Clip
     from wholebody.motion.reading import read_clip
     from wholebody.problem import Problem
@@ -81,6 +82,7 @@ __all__ = [
     "Capsule",
     "CenterOfMass",
     "Clip",
+    "ClipCheck",
     "Constraint",
     "DampedLeastSquares",
     "Discomfort",
@@ -121,6 +123,7 @@ __all__ = [
     "WholebodyError",
     "__version__",
     "assess",
+    "check",
     "follow_path",
     "load",
     "read_clip",
@@ -142,6 +145,7 @@ _MODULES = {
     "wholebody.tracking.path_following": "follow_path",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
+    "wholebody.motion.checking": "ClipCheck check",
     "wholebody.motion.clip": "Clip",
     "wholebody.motion.reading": "read_clip",
     "wholebody.problem": "Problem",
