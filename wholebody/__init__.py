@@ -35,9 +35,14 @@ if TYPE_CHECKING:
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
+    from wholebody.motion.avoidance import AvoidanceReport, Avoided, avoid
     from wholebody.motion.checking import ClipCheck, check
     from wholebody.motion.clip import Clip
+    from wholebody.motion.fade import Fade
+    from wholebody.motion.per_frame import PerFrame
     from wholebody.motion.reading import read_clip
+    from wholebody.motion.stance import StanceFeet
+    from wholebody.motion.trajectory.method import Trajectory
     from wholebody.problem import Problem
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
@@ -75,6 +80,8 @@ __all__ = [
     "QP",
     "Assembly",
     "Assessment",
+    "AvoidanceReport",
+    "Avoided",
     "Axis",
     "Balance",
     "Bound",
@@ -90,6 +97,7 @@ __all__ = [
     "Drag",
     "Effort",
     "Ellipsoid",
+    "Fade",
     "Figure",
     "FileFormatError",
     "Frame",
@@ -104,6 +112,7 @@ __all__ = [
     "MissingPackageError",
     "Newton",
     "Orientation",
+    "PerFrame",
     "Placo",
     "Plane",
     "Point",
@@ -116,13 +125,16 @@ __all__ = [
     "Shape",
     "Solution",
     "Sphere",
+    "StanceFeet",
     "StepLimit",
     "Task",
+    "Trajectory",
     "UnknownNameError",
     "Viewer",
     "WholebodyError",
     "__version__",
     "assess",
+    "avoid",
     "check",
     "follow_path",
     "load",
@@ -145,9 +157,14 @@ _MODULES = {
     "wholebody.tracking.path_following": "follow_path",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
+    "wholebody.motion.avoidance": "AvoidanceReport Avoided avoid",
     "wholebody.motion.checking": "ClipCheck check",
     "wholebody.motion.clip": "Clip",
+    "wholebody.motion.fade": "Fade",
+    "wholebody.motion.per_frame": "PerFrame",
     "wholebody.motion.reading": "read_clip",
+    "wholebody.motion.stance": "StanceFeet",
+    "wholebody.motion.trajectory.method": "Trajectory",
     "wholebody.problem": "Problem",
     "wholebody.scene": "Scene",
     "wholebody.simplification.simplify": "simplify",

@@ -15,7 +15,7 @@ import pinocchio as pin
 from wholebody import checks
 from wholebody.arrays import Array
 from wholebody.methods.qp.method import QP
-from wholebody.motion.avoider import MethodResult, Progress, Watch
+from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import faults
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
@@ -58,6 +58,7 @@ class Fade:
 
     def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
+        check_input(clip, scene, progress)
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
         q, fade, solves, programs = np.array(clip.q), max(1, round(self.fade / clip.dt)), 0, 0
         with scene.lend() as workspace:

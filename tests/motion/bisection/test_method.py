@@ -66,9 +66,7 @@ def depths(scene: wb.Scene, q: Array) -> Array:
 
 def between(scene: wb.Scene, q: Array, parts: int = 12) -> float:
     """Deepest overlap at postures between those of a clip."""
-    steps = [
-        pin.interpolate(scene.model, a, b, k / parts) for a, b in pairwise(q) for k in range(parts)
-    ]
+    steps = [pin.interpolate(scene.model, a, b, k / parts) for a, b in pairwise(q) for k in range(parts)]
     return float(depths(scene, np.array(steps)).max())
 
 
