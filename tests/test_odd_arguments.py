@@ -496,6 +496,17 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "read_clip", Call(wb.read_clip, {"path": path / "walk.npz", "figure": arm})
     checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done, frames: None}
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
+    avoided = {"clip": clip, "scene": wb.Scene(arm), "constraints": [], "progress": lambda told: None}
+    yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
+    for method in (wb.Trajectory, wb.PerFrame, wb.Fade):
+        yield f"{method.__name__}.avoid", Call(method().avoid, avoided)
+    settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "solver": "osqp", "iterations": 10}
+    yield "Trajectory", Call(wb.Trajectory, settings)
+    yield "PerFrame", Call(wb.PerFrame, {"clearance": 0.01, "backward": True})
+    yield "Fade", Call(wb.Fade, {"clearance": 0.01, "fade": 0.2, "rounds": 2})
+    stance = {"feet": ["link1"], "speed": 0.1, "height": 0.05, "least": 0.1}
+    yield "StanceFeet", Call(wb.StanceFeet, stance, lambda made: made.names(arm))
+    yield "StanceFeet.names", Call(wb.StanceFeet(["link1"]).names, {"figure": arm})
     yield "timeline", Call(timeline, {"found": wb.check(clip), "scene": wb.Scene(arm)})
     pair = {"before": clip, "after": clip}
     for measure in (measures.deviation, measures.jerk_ratio, measures.foot_sliding):
@@ -552,7 +563,7 @@ ANSWERS = (
     "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "TraceEntry", "Assessment",
     "Task", "Step", "QPStep", "Simplified", "LeftOut",
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
-    "Scene.of_parts", "ClipCheck", "Beyond", "Contact", "Sliding", "Deviation",
+    "Scene.of_parts", "ClipCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 
