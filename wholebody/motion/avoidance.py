@@ -25,6 +25,7 @@ METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "trajectory": ("wholebody.motion.trajectory.method", "Trajectory"),
         "frames": ("wholebody.motion.per_frame", "PerFrame"),
+        "bisection": ("wholebody.motion.bisection.method", "Bisection"),
         "fade": ("wholebody.motion.fade", "Fade"),
         "bisection": ("wholebody.motion.bisection.method", "Bisection"),
     }
