@@ -453,7 +453,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Clip(frames)", Call(lambda frames: clip[frames], {"frames": slice(0, 1)})
     clip.write(path / "walk.npz")
     yield "read_clip", Call(wb.read_clip, {"path": path / "walk.npz", "figure": arm})
-    checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done, frames: None}
+    checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done: None}
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
     yield "timeline", Call(timeline, {"found": wb.check(clip), "scene": wb.Scene(arm)})
     pair = {"before": clip, "after": clip}
