@@ -20,7 +20,7 @@ LOOPS = (
     "wholebody.geometry.proximity",
     "wholebody.linearisation",
     "wholebody.methods.ccd.limbs",
-    "wholebody.methods.newton.linear_algebra.gram",
+    "wholebody.methods.newton.linear_algebra.normal_equations",
     "wholebody.methods.qp.active_set",
     "wholebody.methods.qp.solvers.osqp_solver",
     "wholebody.methods.qp.subproblem",

@@ -44,8 +44,7 @@ def solve_growing(
     """
     k = len(least)
     for j in range(k):
-        place = np.searchsorted(known, key[j])
-        pushing[j] = place < len(known) and known[place] == key[j]
+        pushing[j] = _contains(known, key[j])
         chosen[j] = least[j] > -limits[0] or pushing[j]
     rounds = int(limits[1])
     for attempt in range(rounds + 1):
@@ -70,6 +69,17 @@ def solve_growing(
     return rounds
 
 
+@compiled()
+def _contains(sorted_keys: Indices, key: int) -> bool:
+    """Whether keys (k,) in ascending order contain one; numba's searchsorted would load scipy.linalg at every start."""
+    low, high = 0, len(sorted_keys)
+    while low < high:
+        middle = (low + high) // 2
+        low, high = (middle + 1, high) if sorted_keys[middle] < key else (low, middle)
+    return low < len(sorted_keys) and sorted_keys[low] == key
+
+
+@compiled()
 def work_size(variables: int, soft: int, elastic: int) -> int:
     """Floats that `settle` needs for a program of so many variables, soft rows and elastic rows."""
     rows = soft + elastic
@@ -308,9 +318,15 @@ def _minimise_in_columns(
         multiplier: (size or more,) is filled with the weight times the residual of each row.
     """
     n = len(x)
-    free = np.flatnonzero(inverse)
+    free = inverse.nonzero()[0]
     columns = len(free)
-    order = np.argsort(compliance[:size])
+    order = np.arange(size)
+    for place in range(1, size):  # few weights, and most of them in order: cheaper than a general sort, and stable
+        own, back = order[place], place - 1
+        while back >= 0 and compliance[order[back]] > compliance[own]:
+            order[back + 1] = order[back]
+            back -= 1
+        order[back + 1] = own
     table = np.zeros((size + columns, columns + 1))
     for place in range(size):
         r = order[place]
