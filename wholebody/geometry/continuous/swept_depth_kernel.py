@@ -58,8 +58,8 @@ def screen(
 def lower_bounds(
     asked: Indices, pairs: Indices, places: Array, first_place: Indices, last_place: Indices, rows0: Array,
     rows1: Array, speed: Array, wanted: Array, share: float, accuracy: float, joint: Indices, turn: Array,
-    speeds: Array, carries: NDArray[np.bool_], reach: Array, points: Array, first_point: Indices, radius: Array, radii: Array,
-    faces: Array, first_face: Indices, bound: Array,
+    speeds: Array, carries: NDArray[np.bool_], reach: Array, points: Array, first_point: Indices, radius: Array,
+    radii: Array, faces: Array, first_face: Indices, bound: Array,
 ) -> None:  # fmt: skip
     """Bound the distances of pairs from below, over a part of a motion.
 
