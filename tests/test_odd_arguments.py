@@ -494,7 +494,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     }
     yield "retarget", Call(wb.retarget, {"motion": skeleton, "figure": arm, "names": bones, "progress": print})
     yield "read_clip", Call(wb.read_clip, {"path": path / "walk.npz", "figure": arm})
-    checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done, frames: None}
+    checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done: None}
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
     avoided = {"clip": clip, "scene": wb.Scene(arm), "constraints": [], "progress": lambda told: None}
     yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
