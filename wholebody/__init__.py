@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from wholebody.methods.solve import solve
     from wholebody.motion.clip import Clip
     from wholebody.motion.reading import read_clip
+    from wholebody.motion.strength import Strength
+    from wholebody.motion.torques import Torques, torques
     from wholebody.problem import Problem
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
@@ -115,7 +117,9 @@ __all__ = [
     "Solution",
     "Sphere",
     "StepLimit",
+    "Strength",
     "Task",
+    "Torques",
     "UnknownNameError",
     "Viewer",
     "WholebodyError",
@@ -127,6 +131,7 @@ __all__ = [
     "read_task",
     "simplify",
     "solve",
+    "torques",
 ]
 
 _MODULES = {
@@ -143,6 +148,8 @@ _MODULES = {
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
     "wholebody.motion.clip": "Clip",
+    "wholebody.motion.strength": "Strength",
+    "wholebody.motion.torques": "Torques torques",
     "wholebody.motion.reading": "read_clip",
     "wholebody.problem": "Problem",
     "wholebody.scene": "Scene",
