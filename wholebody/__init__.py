@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from wholebody.motion.reading import read_clip
     from wholebody.motion.stance import StanceFeet
     from wholebody.motion.trajectory.method import Trajectory
+    from wholebody.motion.strength import Strength
+    from wholebody.motion.torques import Torques, torques
     from wholebody.problem import Problem
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
@@ -131,8 +133,10 @@ __all__ = [
     "Sphere",
     "StanceFeet",
     "StepLimit",
+    "Strength",
     "Task",
     "Trajectory",
+    "Torques",
     "UnknownNameError",
     "Viewer",
     "WholebodyError",
@@ -148,6 +152,7 @@ __all__ = [
     "retarget",
     "simplify",
     "solve",
+    "torques",
 ]
 
 _MODULES = {
@@ -171,6 +176,8 @@ _MODULES = {
     "wholebody.motion.skeleton": "SkeletonMotion",
     "wholebody.motion.fade": "Fade",
     "wholebody.motion.per_frame": "PerFrame",
+    "wholebody.motion.strength": "Strength",
+    "wholebody.motion.torques": "Torques torques",
     "wholebody.motion.reading": "read_clip",
     "wholebody.motion.stance": "StanceFeet",
     "wholebody.motion.trajectory.method": "Trajectory",
