@@ -28,7 +28,7 @@ LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
 LARGEST_WITHIN = 0.5
 HEADROOM = 2.5  # pairs within this many times the last step's motion get rows, so that the next may be longer
 UNSEEN = 1e-4  # m: by which turning may bring things nearer than the linearisation says without being looked after
-FAR_FROM_CURVED = 10.0  # times what turning may bring nearer, roughly: a step that leaves more room is not looked after
+SPARE = 10.0  # times what turning brings nearer, roughly: a step that leaves all pairs more room is not looked at
 CORRECTIONS = 3  # programs that ask again for what turning brought nearer, before the step is cut
 CUTS = 6  # times that a step is halved before it is given up
 OF_A_FRAME = 1e-4  # m, rad: to which the goals of a frame are met
@@ -189,7 +189,7 @@ class QPTracker:
         share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
         displacement = answer.x.copy() if share == 1.0 else share * answer.x
         following, curved = None, 0.5 * share**2 * motion * answer.turn
-        if curved > UNSEEN and answer.spare < FAR_FROM_CURVED * curved:
+        if curved > UNSEEN and answer.spare < SPARE * curved:
             displacement, share, following = self._looked_after(at, displacement, share)
         self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
         if following is None:
