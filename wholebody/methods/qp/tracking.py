@@ -119,6 +119,7 @@ class QPTracker:
         self._query_distance = LEAST_WITHIN
         self._alone = OneAtATime("tracker")
         self.workspace = problem.workspace()
+        self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_shortfall`
         self._set_up()
 
     def step(self, q: Array, measures: bool = True) -> QPStep:
@@ -243,9 +244,10 @@ class QPTracker:
         workspace = self.workspace
         q = pin.integrate(workspace.model, at.q, displacement)
         near = workspace.near(q, float(np.maximum.reduce(at.clearance, initial=0.0)) + UNSEEN)
-        after = np.full(len(workspace.table.pairs), np.inf)
+        after = self._distance
         after[near.number] = near.distance
         short: Array = np.maximum(kept - after[at.contacts.number], 0.0)
+        after[near.number] = np.inf
         return short, q
 
     def _set_up(self) -> None:
