@@ -21,6 +21,7 @@ LOOPS = (
     "wholebody.methods.ccd.limbs",
     "wholebody.methods.newton.linear_algebra.gram",
     "wholebody.methods.qp.active_set",
+    "wholebody.methods.qp.curved_reach",
     "wholebody.methods.qp.solvers.osqp_solver",
     "wholebody.methods.qp.subproblem",
 )
