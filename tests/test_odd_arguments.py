@@ -23,8 +23,10 @@ import pytest
 import wholebody as wb
 from wholebody import tracking
 from wholebody.figures.state import State
+from wholebody.motion import measures
 from wholebody.view import Viewer
 from wholebody.view.parts import Part, Parts
+from wholebody.view.timeline import timeline
 
 ROOT = Path(__file__).resolve().parent.parent
 CIRCLE: list[Any] = []
@@ -438,6 +440,30 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "drag_along", Call(tracking.drag_along, along)
     done = tracking.drag_along(ask, places, "qp")
     yield "judge_drag", Call(tracking.judge_drag, {"problem": ask, "dragged": done, "goal": 0})
+    clip = wb.Clip(arm, [q, q + 0.1], 0.1)  # type: ignore[arg-type]
+    yield "Clip", Call(wb.Clip, {"figure": arm, "q": [q, q], "dt": 0.1, "name": "it"}, lambda made: made.jerk())
+    yield "Clip.at", Call(clip.at, {"t": 0.05})
+    yield "Clip.resampled", Call(clip.resampled, {"dt": 0.05})
+    yield "Clip.joined", Call(clip.joined, {"other": clip})
+    yield "Clip.with_q", Call(clip.with_q, {"q": [q], "name": "other"})
+    yield "Clip.from_track", Call(wb.Clip.from_track, {"track": track, "figure": arm})
+    yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
+    for method in ("mirrored", "velocities", "accelerations", "jerk"):
+        yield f"Clip.{method}", Call(getattr(wb.Clip(hand, [hand.neutral], 0.1), method), {})  # type: ignore[arg-type]
+    yield "Clip(frames)", Call(lambda frames: clip[frames], {"frames": slice(0, 1)})
+    clip.write(path / "walk.npz")
+    yield "read_clip", Call(wb.read_clip, {"path": path / "walk.npz", "figure": arm})
+    checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done, frames: None}
+    yield "check", Call(wb.check, checked, lambda found: found.as_dict())
+    yield "timeline", Call(timeline, {"found": wb.check(clip), "scene": wb.Scene(arm)})
+    pair = {"before": clip, "after": clip}
+    for measure in (measures.deviation, measures.jerk_ratio, measures.foot_sliding):
+        yield measure.__name__, Call(measure, pair)
+    one = wb.Clip(hand, [hand.neutral], 0.1)  # type: ignore[arg-type]
+    held = {"before": one, "after": one, "hand": "right_palm", "other": "left_palm"}
+    yield "hand_error", Call(measures.hand_error, held)
+    yield "share_deeper", Call(measures.share_deeper, {"found": wb.check(clip), "depth": 0.01})
+    yield "ClipCheck.as_dict", Call(wb.check(clip).as_dict, {})
     yield "spread", Call(tracking.spread, {"corners": places, "frames": 3, "dt": 0.1})
     yield "circle", Call(tracking.circle, {"center": at, "radius": 0.1, "normal": at})
     yield "read_path", Call(tracking.read_path, {"path": path / "path.txt"})
@@ -485,7 +511,7 @@ ANSWERS = (
     "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "TraceEntry", "Assessment",
     "Task", "Step", "QPStep", "Simplified", "LeftOut",
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
-    "Scene.of_parts",
+    "Scene.of_parts", "ClipCheck", "Beyond", "Contact", "Sliding", "Deviation",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 

@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
+    from wholebody.motion.checking import ClipCheck, check
+    from wholebody.motion.clip import Clip
+    from wholebody.motion.reading import read_clip
     from wholebody.problem import Problem
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
@@ -78,6 +81,8 @@ __all__ = [
     "Box",
     "Capsule",
     "CenterOfMass",
+    "Clip",
+    "ClipCheck",
     "Constraint",
     "DampedLeastSquares",
     "Discomfort",
@@ -118,8 +123,10 @@ __all__ = [
     "WholebodyError",
     "__version__",
     "assess",
+    "check",
     "follow_path",
     "load",
+    "read_clip",
     "read_task",
     "simplify",
     "solve",
@@ -138,6 +145,9 @@ _MODULES = {
     "wholebody.tracking.path_following": "follow_path",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
+    "wholebody.motion.checking": "ClipCheck check",
+    "wholebody.motion.clip": "Clip",
+    "wholebody.motion.reading": "read_clip",
     "wholebody.problem": "Problem",
     "wholebody.scene": "Scene",
     "wholebody.simplification.simplify": "simplify",

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 LOOPS = (
     "wholebody.geometry.contact_rows",
     "wholebody.geometry.continuous.moved_pairs",
+    "wholebody.geometry.continuous.swept_depth",
     "wholebody.geometry.proximity",
     "wholebody.linearisation",
     "wholebody.methods.ccd.limbs",

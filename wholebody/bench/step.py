@@ -21,6 +21,7 @@ from wholebody.bench.adapters.own import WholebodyTool
 from wholebody.bench.report import render
 from wholebody.bench.tables import filled, programs_text
 from wholebody.bench.track import CLEARANCE, DT, Track, Verdict, judge
+from wholebody.errors import InputError
 
 REFERENCE = "placo"
 GREY = "#666666"
@@ -249,18 +250,41 @@ def goal_lines(rows: Sequence[StepRow]) -> list[str]:
 
 def step_report(
     rows: Sequence[StepRow], facts: Mapping[str, str], differences: Mapping[str, Sequence[str]],
-    profile: Mapping[str, tuple[float, float]],
+    profile: Mapping[str, tuple[float, float]], refusals: Mapping[str, Mapping[str, str]] | None = None,
 ) -> str:  # fmt: skip
     """Tables of the tracking steps.
 
-    `differences` are what tools cannot express; `profile` is the median of a whole step and of its linearisation, by
-    reach [us].
+    Args:
+        rows: of all reaches.
+        facts: on the machine.
+        differences: what tools cannot express.
+        profile: median of a whole step and of its linearisation, by reach [us].
+        refusals: of reaches of other figures than the human: the sentences of tools that do not take them, by reach
+            and tool; None for the reaches of the human.
     """
     tools = dict.fromkeys(row.tool for row in rows)
     stated = [line for name in tools for line in differences.get(name, ())]
+    goals = goal_lines(rows) if refusals is None else []
     return render(
-        "step.md", rows=rows, facts=facts, stated=stated, profile=profile, goals=goal_lines(rows), track=setting
-    )
+        "step.md", rows=rows, facts=facts, stated=stated, profile=profile, goals=goals, track=setting,
+        refusals=refusals,
+    )  # fmt: skip
+
+
+def taking(track: Track, tools: Sequence[str]) -> tuple[list[str], dict[str, str]]:
+    """The tools that take a reach, and the sentences of those that do not.
+
+    A tool takes it if it can be set up and makes a first step.
+    """
+    taken, refused = [], {}
+    for name in tools:
+        try:
+            with _quiet():
+                make_tool(name, track).step(track.targets[0])
+            taken.append(name)
+        except (InputError, RuntimeError, ValueError) as error:
+            refused[name] = " ".join(str(error).split()).rstrip(".")
+    return taken, refused
 
 
 WITHIN_STEP = 0.06  # m beyond the clearance: as far as a step of `QP` looks

@@ -37,6 +37,7 @@ FREE = ((0.32, -0.20, 0.92), (0.38, 0.18, 1.12), (0.30, -0.22, 1.42))  # m: by w
 CHEST = 0.16  # m: before the origin of the thorax' frame, level with it
 ROOM_START, ROOM_WAY = 0.025, 0.075  # m: what objects leave free around the standing body and around the free way
 TOUCHING = 1e-3  # m: a pair nearer than the clearance and this is in contact
+TRIES = 5000  # places tried for one object: many times what the most crowded figures have needed
 SPACE = ((0.05, -0.90, 0.25), (0.85, 0.65, 1.85))  # m: where objects are put
 
 
@@ -51,6 +52,7 @@ class Track:
         targets: (steps, 3) where the fingertip is asked to be [m].
         tip: name of the frame that reaches.
         feet: names of the frames that stay where they are.
+        clearance: that every pair keeps [m].
     """
 
     name: str
@@ -59,6 +61,12 @@ class Track:
     targets: Array
     tip: str = "right_index_tip"
     feet: tuple[str, ...] = ("left_foot", "right_foot")
+    clearance: float = CLEARANCE
+
+    @property
+    def floating(self) -> bool:
+        """Whether the root moves."""
+        return self.scene.figure.root == "free"
 
     @property
     def pairs(self) -> int:
@@ -123,23 +131,46 @@ def smooth_way(places: Array, steps: int) -> Array:
 def add_objects(scene: wb.Scene, start: Array, way: Array, rng: np.random.Generator) -> None:
     """Put boxes, spheres and hulls around a body, clear of how it stands and of a way (k, 3) for its fingertip."""
     scene.add(wb.Box(BLOCK[0]), name="block", at=BLOCK[1])
-    standing = Occupied(scene.figure, (start,))
-    kinds = ["box"] * (BOXES - 1) + ["sphere"] * SPHERES + ["hull"] * HULLS
+    put_objects(scene, Occupied(scene.figure, (start,)), way, rng)
+
+
+def put_objects(
+    scene: wb.Scene, taken: Occupied, way: Array, rng: np.random.Generator, space: Array | None = None,
+    size: float = 1.0, boxes: int = BOXES - 1,
+) -> None:  # fmt: skip
+    """Put boxes, spheres and hulls into a space, clear of what is taken up and of a way for a tip.
+
+    Args:
+        scene: gets the objects.
+        taken: by the figure.
+        way: (k, 3) of the tip [m].
+        rng: of their kinds' sizes and places.
+        space: (2, 3) corners of the space [m]; `SPACE` where None.
+        size: of the objects and of the room around them, as a share of those of the human's reaches.
+        boxes: how many of them are boxes.
+
+    Raises:
+        InputError: no place was found for one of them.
+    """
+    low, high = np.array(SPACE) if space is None else space
+    kinds = ["box"] * boxes + ["sphere"] * SPHERES + ["hull"] * HULLS
     for number, kind in enumerate(kinds):
-        while True:
-            shape = _shape(kind, rng)
+        for _ in range(TRIES):
+            shape = _shape(kind, rng, size)
             turn = rng.normal(size=4)
-            at = (*rng.uniform(*SPACE), *(turn / np.linalg.norm(turn)))
-            if standing.clear_of(shape, at, ROOM_START) and _clear_of_way(shape, at, way):
+            at = (*rng.uniform(low, high), *(turn / np.linalg.norm(turn)))
+            if taken.clear_of(shape, at, size * ROOM_START) and _clear_of_way(shape, at, way, size * ROOM_WAY):
                 break
+        else:
+            raise InputError(f"no place was found for object {number} of {len(kinds)} around {scene.figure.name!r}")
         scene.add(shape, name=f"{kind} {number}", at=at)
 
 
-def _clear_of_way(shape: wb.Shape, at: tuple[float, ...], way: Array) -> bool:
+def _clear_of_way(shape: wb.Shape, at: tuple[float, ...], way: Array, room: float) -> bool:
     import coal
 
     place = pin.XYZQUATToSE3(np.array(at))
-    ball = coal.Sphere(ROOM_WAY)
+    ball = coal.Sphere(room)
     for piece in shape.pieces():
         there = place * piece.placement
         put = coal.Transform3s(there.rotation, there.translation)
@@ -151,14 +182,14 @@ def _clear_of_way(shape: wb.Shape, at: tuple[float, ...], way: Array) -> bool:
     return True
 
 
-def _shape(kind: str, rng: np.random.Generator) -> wb.Shape:
+def _shape(kind: str, rng: np.random.Generator, size: float) -> wb.Shape:
     if kind == "box":
-        edges = rng.uniform(0.06, 0.28, 3)
+        edges = size * rng.uniform(0.06, 0.28, 3)
         return wb.Box((float(edges[0]), float(edges[1]), float(edges[2])))
     if kind == "sphere":
-        return wb.Sphere(float(rng.uniform(0.04, 0.12)))
+        return wb.Sphere(size * float(rng.uniform(0.04, 0.12)))
     points = rng.normal(size=(HULL_POINTS, 3))
-    points *= rng.uniform(0.05, 0.12, 3) / np.linalg.norm(points, axis=1, keepdims=True)
+    points *= size * rng.uniform(0.05, 0.12, 3) / np.linalg.norm(points, axis=1, keepdims=True)
     return wb.Hull(points)
 
 
@@ -206,7 +237,7 @@ def judge(track: Track, postures: Array) -> Verdict:
     for pairs, target in zip(pairs_along(scene, postures), track.targets, strict=True):
         least.append(pairs.least)
         near.append(int((pairs.distance < WITHIN).sum()))
-        touching.append(int((pairs.distance < CLEARANCE + TOUCHING).sum()))
+        touching.append(int((pairs.distance < track.clearance + TOUCHING).sum()))
         error.append(float(np.linalg.norm(pairs.state.frame(tip).translation - target)))
         for foot, there in zip(feet, stood, strict=True):
             moved = there.actInv(pairs.state.frame(foot))
@@ -214,10 +245,11 @@ def judge(track: Track, postures: Array) -> Verdict:
             turn.append(float(np.linalg.norm(pin.log3(moved.rotation))))
     whole = np.vstack([track.start, postures])
     speed = np.abs(velocities(scene.model, whole, DT)).max(axis=0)
+    root, joints = np.split(speed, [6 if track.floating else 0])
     angles = np.vstack([track.start, whole])[:, figure.limits.idx_q]
     return Verdict(
         np.array(least), np.array(near), np.array(touching), np.array(error), max(drift), max(turn),
-        limit_violation(figure, postures), float(speed[6:].max()) / JOINT_SPEED,
-        max(float(speed[:3].max()) / ROOT_SPEED, float(speed[3:6].max()) / ROOT_TURN),
+        limit_violation(figure, postures), float(joints.max(initial=0.0)) / JOINT_SPEED,
+        max(float(root[:3].max(initial=0.0)) / ROOT_SPEED, float(root[3:].max(initial=0.0)) / ROOT_TURN),
         float(np.abs(np.diff(angles, 2, axis=0)).mean()) / DT**2,
     )  # fmt: skip

@@ -104,7 +104,8 @@ def test_its_robot_has_our_kinematics_mass_and_distances(human: wb.Figure) -> No
     problem = wb.Problem(scene, clearance=0.004)
     tip = human.frame_id("right_index_tip")
     frame = human.model.frames[tip]
-    robot = Robot(problem, {"tip": (frame.parentJoint, frame.placement)})
+    robot = Robot(human, {"tip": (frame.parentJoint, frame.placement)})
+    robot.add_pieces(problem)
     rng = np.random.default_rng(4)
     for _ in range(3):
         q = human.clamp(pin.integrate(human.model, human.neutral, 0.3 * rng.normal(size=human.model.nv)))

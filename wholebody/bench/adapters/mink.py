@@ -16,7 +16,7 @@ from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
 from wholebody.bench.adapters.loop import GAIN, NEAR, STEP, Loop, Stepper, kept_apart, pulls
 from wholebody.bench.adapters.mjcf import ROOT, mjcf
-from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
+from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
 from wholebody.figures.figure import Figure
 from wholebody.methods.differential import StepError
 from wholebody.problem import Problem
@@ -250,11 +250,13 @@ class _Order:
         return there
 
     def ours(self, there: Array) -> Array:
-        """Our posture (nq,), of a figure on a free root whose joints have limits, from MuJoCo's."""
+        """Our posture (nq,) from MuJoCo's."""
         q = np.empty(self._size[0])
-        q[:3], q[3:6], q[6] = there[:3], there[4:7], there[3]
+        if self._free:
+            q[:3], q[3:6], q[6] = there[:3], there[4:7], there[3]
         for address, joint in self._addresses:
-            q[joint.idx_q] = there[address]
+            angle = there[address]
+            q[joint.idx_q : joint.idx_q + joint.nq] = angle if joint.nq == 1 else (np.cos(angle), np.sin(angle))
         return q
 
 
@@ -292,16 +294,17 @@ class MinkTool(Tool):
             model,
             [([names[pair.first]], [names[pair.second]]) for pair in geometry.collisionPairs],
             gain=COLLISION_GAIN,
-            minimum_distance_from_collisions=CLEARANCE,
+            minimum_distance_from_collisions=track.clearance,
             collision_detection_distance=WITHIN,
         )
         self.pairs = len(apart.geom_id_pairs)
         self._limits = [
             mink.ConfigurationLimit(model),
             mink.VelocityLimit(model, dict.fromkeys(figure.joints, JOINT_SPEED)),
-            mink.FreeJointVelocityLimit(model, ROOT_SPEED, ROOT_TURN, joint_name=ROOT),
             apart,
         ]
+        if track.floating:
+            self._limits.append(mink.FreeJointVelocityLimit(model, ROOT_SPEED, ROOT_TURN, joint_name=ROOT))
 
     def _task(self, frame: str, position: float, orientation: float) -> Any:
         return self._mink.FrameTask(frame, "site", position_cost=position, orientation_cost=orientation)
@@ -317,7 +320,7 @@ class MinkTool(Tool):
         try:
             velocity = self._mink.solve_ik(
                 self._configuration, self._tasks, DT, solver="daqp", damping=POSTURE_COST**2,
-                limits=self._limits, constraints=self._feet,
+                limits=self._limits, constraints=self._feet or None,
             )  # fmt: skip
         except self._mink.NoSolutionFound:
             self.failures += 1

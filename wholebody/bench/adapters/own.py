@@ -11,7 +11,7 @@ import numpy as np
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import FIRST_FIT, LADDER, Adapter, Budget, Tool, few, made
-from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
+from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.base import Method
 from wholebody.methods.qp.active_set import guess_active_set
@@ -184,16 +184,17 @@ class WholebodyTool(Tool):
         """State the problem; the target is moved afterwards. The solver is one of `qp_settings`."""
         self.name = f"wholebody/{solver}" if solver else "wholebody"
         self._target = np.array(track.targets[0])
+        speed, turn = (ROOT_SPEED, ROOT_TURN) if track.floating else (np.inf, np.inf)
         self.problem = wb.Problem(
             track.scene,
             track.start,
             goals=[MovingPoint(track.tip, self._target)],
             constraints=[
                 *(wb.Hold(foot) for foot in track.feet),
-                wb.StepLimit(JOINT_SPEED, root_velocity=ROOT_SPEED, root_turn=ROOT_TURN),
+                wb.StepLimit(JOINT_SPEED, root_velocity=speed, root_turn=turn),
             ],
             measures=[wb.Displacement()],
-            clearance=CLEARANCE,
+            clearance=track.clearance,
         )
         self._tracker = wb.QP(**qp_settings(solver)).tracker(self.problem, DT)
         self._q = np.array(track.start)

@@ -15,7 +15,7 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
 from wholebody.bench.adapters.loop import GAIN, STEP, Loop, Stepper, kept_apart, pulls
-from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
+from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 from wholebody.methods.differential import StepError
 from wholebody.problem import Problem
 from wholebody.tasks.residuals import PlacementResidual
@@ -214,7 +214,9 @@ class PinkTool(Tool):
         self._pink, self._scene = pink, track.scene
         self._model = track.scene.model.copy()
         self._model.velocityLimit = np.full(self._model.nv, JOINT_SPEED)
-        self._model.floating_base_velocity_limit = FloatingBaseVelocityLimit(self._model, None, ROOT_SPEED, ROOT_TURN)
+        if track.floating:
+            root = FloatingBaseVelocityLimit(self._model, None, ROOT_SPEED, ROOT_TURN)
+            self._model.floating_base_velocity_limit = root
         self._solvers_failure = pink.exceptions.NoSolutionFound
         self.reset(track.start)
         self._reach = FrameTask(track.tip, position_cost=REACH_COST, orientation_cost=0.0)
@@ -225,7 +227,10 @@ class PinkTool(Tool):
         self._feet = [FrameTask(foot, position_cost=1.0, orientation_cost=1.0) for foot in track.feet]
         for task in self._feet:
             task.set_target_from_configuration(self._configuration)
-        self._barrier = SelfCollisionBarrier(n_collision_pairs=NEAREST_IN_STEPS, gain=BARRIER_GAIN, d_min=CLEARANCE)
+        pairs = min(NEAREST_IN_STEPS, track.pairs)
+        self._barriers = (
+            [SelfCollisionBarrier(n_collision_pairs=pairs, gain=BARRIER_GAIN, d_min=track.clearance)] if pairs else []
+        )
 
     def reset(self, q: Array) -> None:
         """Go to a posture."""
@@ -241,7 +246,7 @@ class PinkTool(Tool):
         try:
             velocity = self._pink.solve_ik(
                 self._configuration, self._tasks, DT, solver="daqp", damping=POSTURE_COST**2,
-                barriers=[self._barrier], constraints=self._feet, safety_break=False,
+                barriers=self._barriers, constraints=self._feet, safety_break=False,
             )  # fmt: skip
         except self._solvers_failure:
             self.failures += 1

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache, partial
 from typing import ClassVar
-from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
@@ -17,8 +16,8 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few, made
-from wholebody.bench.track import CLEARANCE, DT, JOINT_SPEED, WITHIN, Track
-from wholebody.figures.packaged_urdf import urdf_path
+from wholebody.bench.track import DT, JOINT_SPEED, WITHIN, Track
+from wholebody.methods.placo.robot import Robot
 
 SAMPLES = 2000
 ROOT_SPREAD = np.array([0.15, 0.15, 0.1, 0.2, 0.2, 0.2])  # m, rad
@@ -58,33 +57,38 @@ class PlacoTool(Tool):
         """Set the solver up."""
         import placo
 
-        self._robot = placo.RobotWrapper("", placo.Flags.ignore_collisions, _without_collisions())
-        model, ours = self._robot.model, track.scene.model
-        assert list(model.names) == list(ours.names)
-        pieces, scene = self._robot.collision_model, track.scene.geometry
+        figure, scene = track.scene.figure, track.scene.geometry
+        self._robot = Robot(figure, {name: _place(figure, name) for name in (track.tip, *track.feet)})
+        wrapper = self._robot.wrapper
+        pieces = wrapper.collision_model
         for piece in scene.geometryObjects:
-            pieces.addGeometryObject(pin.GeometryObject(piece.name, piece.parentJoint, piece.placement, piece.geometry))
+            there = self._robot.joint(piece.parentJoint)
+            pieces.addGeometryObject(pin.GeometryObject(piece.name, there, piece.placement, piece.geometry))
         for first, second in self.pairs(track):
             pieces.addCollisionPair(pin.CollisionPair(first, second))
-        self._robot.set_velocity_limits(JOINT_SPEED)
+        wrapper.set_velocity_limits(JOINT_SPEED)
         self.reset(track.start)
 
-        self._solver = placo.KinematicsSolver(self._robot)
+        self._solver = placo.KinematicsSolver(wrapper)
+        self._solver.mask_fbase(not track.floating)
+        self._robot.couple(self._solver)
         self._solver.dt = DT
         self._solver.enable_joint_limits(True)
         self._solver.enable_velocity_limits(True)
         self._reach = self._solver.add_position_task(track.tip, np.array(track.targets[0]))
         self._reach.configure("reach", "soft", REACH_COST**2)
         for foot in track.feet:
-            task = self._solver.add_frame_task(foot, self._robot.get_T_world_frame(foot))
+            task = self._solver.add_frame_task(foot, wrapper.get_T_world_frame(foot))
             task.configure(foot, "hard", 1.0, 1.0)
         posture = self._solver.add_joints_task()
-        posture.set_joints(track.scene.figure.joint_values(track.start))
+        values = figure.joint_values(track.start)
+        posture.set_joints({self._robot.joint_name(figure.joint_id(name)): value for name, value in values.items()})
         posture.configure("posture", "soft", POSTURE_COST**2)
         self._solver.add_regularization_task(POSTURE_COST**2)
-        apart = self._solver.add_avoid_self_collisions_constraint()
-        apart.self_collisions_margin, apart.self_collisions_trigger = CLEARANCE, WITHIN
-        apart.configure("apart", "hard", 1.0)
+        if track.pairs:
+            apart = self._solver.add_avoid_self_collisions_constraint()
+            apart.self_collisions_margin, apart.self_collisions_trigger = track.clearance, WITHIN
+            apart.configure("apart", "hard", 1.0)
 
     def pairs(self, track: Track) -> Sequence[tuple[int, int]]:
         """The pairs of pieces that it is given: all of the scene."""
@@ -92,8 +96,7 @@ class PlacoTool(Tool):
 
     def reset(self, q: Array) -> None:
         """Go to a posture."""
-        self._robot.state.q = np.array(q)
-        self._robot.update_kinematics()
+        self._robot.move(q)
         self.failures = 0
 
     def step(self, target: Array) -> None:
@@ -103,11 +106,11 @@ class PlacoTool(Tool):
             self._solver.solve(True)
         except RuntimeError:  # no solution of its program
             self.failures += 1
-        self._robot.update_kinematics()
+        self._robot.wrapper.update_kinematics()
 
     def posture(self) -> Array:
-        """Where it is: placo orders the joints as we do."""
-        return np.array(self._robot.state.q)
+        """Where it is."""
+        return self._robot.posture()
 
 
 class PrunedPlacoTool(PlacoTool):
@@ -126,7 +129,7 @@ class PrunedPlacoTool(PlacoTool):
 
     def remarks(self) -> dict[str, float]:
         """How many pairs it has."""
-        return {"pairs": float(len(self._robot.collision_model.collisionPairs))}
+        return {"pairs": float(len(self._robot.wrapper.collision_model.collisionPairs))}
 
 
 @lru_cache(maxsize=4)
@@ -142,7 +145,8 @@ def near_pairs(scene: wb.Scene, start: bytes) -> Sequence[tuple[int, int]]:
     workspace = scene.workspace()
     for _ in range(SAMPLES):
         move = np.zeros(model.nv)
-        move[:6] = rng.normal(size=6) * ROOT_SPREAD
+        if scene.figure.root == "free":
+            move[:6] = rng.normal(size=6) * ROOT_SPREAD
         posture = np.asarray(pin.integrate(model, q, move))
         posture[limits.idx_q] = rng.uniform(limits.lower, limits.upper)
         found[workspace.near(posture, WITHIN).number] = True
@@ -150,9 +154,7 @@ def near_pairs(scene: wb.Scene, start: bytes) -> Sequence[tuple[int, int]]:
     return [pair for pair, near in zip(pairs, found, strict=True) if near]
 
 
-def _without_collisions() -> str:
-    robot = ElementTree.parse(urdf_path("human")).getroot()
-    for link in robot.findall("link"):
-        for shape in (*link.findall("collision"), *link.findall("visual")):
-            link.remove(shape)
-    return ElementTree.tostring(robot, encoding="unicode")
+def _place(figure: wb.Figure, name: str) -> tuple[int, pin.SE3]:
+    """Joint of a frame, and its placement in it."""
+    frame = figure.model.frames[figure.frame_id(name)]
+    return int(frame.parentJoint), frame.placement

@@ -12,8 +12,10 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser = commands.add_parser(
         "step",
         help="one step of tracking by every tool",
-        description="The same 200-step reach by every tool that is installed, interleaved, judged independently.",
+        description="The same 200-step reach by every tool that is installed, interleaved, judged independently. With "
+        "--figure it is made by these figures in place of the standing human; tools that do not take one say why.",
     )
+    parser.add_argument("--figure", nargs="+", metavar="FILE", help="URDF or MJCF files, or names of figures")
     parser.add_argument("--repeats", type=int, default=5, metavar="N", help="timed runs of every tool (default: 5)")
     parser.add_argument("--steps", type=int, default=200, metavar="N", help="of each run (default: 200)")
     parser.add_argument("--tools", nargs="+", metavar="NAME", help="only these (default: all that are installed)")
@@ -24,8 +26,17 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 def run(arguments: argparse.Namespace) -> int:
     """Measure steps."""
     from wholebody.bench.adapters import chosen_tools, differences
+    from wholebody.bench.figure_track import figure_tracks
     from wholebody.bench.machine import machine
-    from wholebody.bench.step import goal_lines, least_distances, linearise_us, measure, step_report, step_times
+    from wholebody.bench.step import (
+        goal_lines,
+        least_distances,
+        linearise_us,
+        measure,
+        step_report,
+        step_times,
+        taking,
+    )
     from wholebody.bench.tables import write_rows
     from wholebody.bench.track import VARIANTS, track
 
@@ -33,26 +44,31 @@ def run(arguments: argparse.Namespace) -> int:
     repeats, steps = (1, 40) if arguments.quick else (arguments.repeats, arguments.steps)
     check_count(repeats, "--repeats")
     facts = machine() | {"steps": str(steps), "repeats": str(repeats)}
+    figures = arguments.figure
+    courses = [course for spec in figures or () for course in figure_tracks(spec, steps)]
+    refusals: dict[str, dict[str, str]] = {}
     rows, times, shares = [], [], {}
-    for name in VARIANTS:
-        course = track(name, steps)
-        print(f"{name} reach: {course.pairs} pairs that can touch, tools {', '.join(tools)}")
-        measured, timed = measure(course, tools, repeats, print)
+    for course in courses or (track(name, steps) for name in VARIANTS):
+        taken, refusals[course.name] = taking(course, tools) if figures else (list(tools), {})
+        print(f"{course.name} reach: {course.pairs} pairs that can touch, tools {', '.join(taken)}")
+        for tool, sentence in refusals[course.name].items():
+            print(f"{tool} does not take it: {sentence}")
+        measured, timed = measure(course, taken, repeats, print)
         rows += measured
         times += timed
-        if "wholebody" in tools:
-            shares[name] = linearise_us(course)
-    report = step_report(rows, facts, {name: differences(name) for name in tools}, shares)
-    write_rows(arguments.out / "step.csv", facts, rows)
-    write_rows(arguments.out / "step-times.csv", facts, times)
-    drawn = {
-        "step-times": step_times(times, arguments.out / "step-times"),
-        "step-distances": least_distances(times, arguments.out / "step-distances"),
-    }
-    captions = {
-        "step-times": "Time of a step of every tool",
-        "step-distances": "Least distance of any pair after every step",
-    }
-    publish("step", report, drawn, captions, arguments)
-    print("\n".join(goal_lines(rows)))
+        if "wholebody" in taken:
+            shares[course.name] = linearise_us(course)
+    stated = {name: differences(name) for name in tools}
+    report = step_report(rows, facts, stated, shares, refusals if figures else None)
+    name = "step-figures" if figures else "step"
+    write_rows(arguments.out / f"{name}.csv", facts, rows)
+    write_rows(arguments.out / f"{name}-times.csv", facts, times)
+    drawn = {f"{name}-times": step_times(times, arguments.out / f"{name}-times")}
+    captions = {f"{name}-times": "Time of a step of every tool"}
+    if not figures:
+        drawn["step-distances"] = least_distances(times, arguments.out / "step-distances")
+        captions["step-distances"] = "Least distance of any pair after every step"
+    publish(name, report, drawn, captions, arguments)
+    if not figures:
+        print("\n".join(goal_lines(rows)))
     return 0

@@ -125,7 +125,8 @@ class _Room:
             raise UnsupportedTermError("placo", refused)
         frames = named_frames(problem)
         if self._robot is None or not self._robot.serves(problem, frames):
-            self._robot = Robot(problem, frames)
+            self._robot = Robot(problem.scene.figure, frames)
+            self._robot.add_pieces(problem)
         self._robot.place_objects(workspace.geometry)
         return self._robot
 
@@ -138,6 +139,7 @@ class _Programs:
 
         self._robot = robot
         self._solver: Any = placo.KinematicsSolver(robot.wrapper)
+        robot.couple(self._solver)
         self._tasks = add_terms(self._solver, robot, problem)
         self._regular = self._solver.add_regularization_task(REGULAR * COMFORT)
         self._solver.dt = 1.0

@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.errors import MissingPackageError
+from wholebody.figures.description import Follower
 from wholebody.figures.figure import Figure
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.problem import Problem
@@ -29,6 +30,8 @@ direction; enlarged pieces overlap there instead.
 
 ENDLESS = 1e6  # rad, m: limit of a joint that has none
 BASE = "base"
+FOLLOWS = "JointModelMimic"
+"""Pinocchio's name of a joint that follows another."""
 
 
 class Robot:
@@ -39,11 +42,11 @@ class Robot:
         frames: the frames that tasks can name -> the index of the joint and the placement in it.
     """
 
-    def __init__(self, problem: Problem, frames: Mapping[str, tuple[int, pin.SE3]]) -> None:
-        """Build it.
+    def __init__(self, figure: Figure, frames: Mapping[str, tuple[int, pin.SE3]]) -> None:
+        """Build it, without pieces.
 
         Args:
-            problem: gives the scene, and the clearances of its pairs.
+            figure: whose joints and frames it gets.
             frames: names of the frames that tasks use -> joint of our model and placement in it.
 
         Raises:
@@ -58,13 +61,12 @@ class Robot:
             raise MissingPackageError(
                 f"placo cannot be imported ({error}); install what it was built for: pip install 'wholebody[placo]'"
             ) from None
-        figure = problem.scene.figure
         self.frames, self._root = dict(frames), figure.root
-        self._clearances = problem.clearances.copy()
+        self._clearances = np.zeros(0)
         text = ElementTree.tostring(_skeleton(figure, self.frames), encoding="unicode")
         self.wrapper = placo.RobotWrapper("", placo.Flags.ignore_collisions, text)
         self._copy_model(figure)
-        self._pieces = self._copy_pieces(problem)
+        self._pieces: list[int] = []
 
     @property
     def floating(self) -> bool:
@@ -75,8 +77,21 @@ class Robot:
         """Move to our posture q (nq,)."""
         theirs = pin.neutral(self.wrapper.model)
         theirs[self._idx_q] = q
+        for place, law in self._followers.items():
+            theirs[place] = law.slope * q[law.idx_q] + law.offset
         self.wrapper.state.q = theirs
         self.wrapper.update_kinematics()
+
+    def posture(self) -> Array:
+        """Our posture (nq,) where it is now."""
+        return np.array(self.wrapper.state.q)[self._idx_q]
+
+    def couple(self, solver: Any) -> None:
+        """Add the laws of joints that follow others to a `placo.KinematicsSolver`, as hard gear tasks."""
+        for name, law in self._laws.items():
+            gear = solver.add_gear_task()
+            gear.set_gear(*(self.joint_name(self._ids[joint]) for joint in (name, law.joint)), law.slope)
+            gear.configure(f"gear {name}", "hard", 1.0)
 
     def serves(self, problem: Problem, frames: Mapping[str, tuple[int, pin.SE3]]) -> bool:
         """Whether it fits another problem of the same scene: the same clearances, and these frames or more."""
@@ -96,7 +111,7 @@ class Robot:
         """Name in placo of a joint of our model."""
         return f"j{joint:05d}"
 
-    def _joint(self, ours: int) -> int:
+    def joint(self, ours: int) -> int:
         """Index of our joint in placo's model."""
         if ours == 0:
             return 0
@@ -107,13 +122,18 @@ class Robot:
         ours, theirs = figure.model, self.wrapper.model
         idx_q, idx_v = np.zeros(ours.nq, dtype=np.intp), np.zeros(ours.nv, dtype=np.intp)
         lower, upper = theirs.lowerPositionLimit.copy(), theirs.upperPositionLimit.copy()
+        self._laws, self._ids = figure.followers, {name: index for index, name in enumerate(ours.names)}
+        self._followers: dict[int, Follower] = {}
         for index in range(1, ours.njoints):
-            joint, other = ours.joints[index], theirs.joints[self._joint(index)]
+            joint, other = ours.joints[index], theirs.joints[self.joint(index)]
             idx_q[joint.idx_q : joint.idx_q + joint.nq] = np.arange(other.idx_q, other.idx_q + joint.nq)
             idx_v[joint.idx_v : joint.idx_v + joint.nv] = np.arange(other.idx_v, other.idx_v + joint.nv)
             theirs.jointPlacements[other.id] = ours.jointPlacements[index]
             theirs.inertias[other.id] = ours.inertias[index]
-            if joint.nq == 1:
+            if ours.names[index] in figure.followers:
+                self._followers[int(other.idx_q)] = figure.followers[ours.names[index]]
+                lower[other.idx_q], upper[other.idx_q] = -ENDLESS, ENDLESS
+            elif joint.nq == 1:
                 lower[other.idx_q] = max(ours.lowerPositionLimit[joint.idx_q], -ENDLESS)
                 upper[other.idx_q] = min(ours.upperPositionLimit[joint.idx_q], ENDLESS)
         theirs.lowerPositionLimit, theirs.upperPositionLimit = lower, upper
@@ -121,14 +141,14 @@ class Robot:
         for name, (_, placement) in self.frames.items():
             theirs.frames[theirs.getFrameId(name)].placement = placement
 
-    def _copy_pieces(self, problem: Problem) -> list[int]:
-        """Add the pieces of all pairs; return the number of each one in our geometry model.
+    def add_pieces(self, problem: Problem) -> None:
+        """Add the pieces of all pairs of a problem.
 
         placo has one margin for all pairs, but a problem has a clearance for each. So the first piece of a pair is
         enlarged by the clearance, once for every clearance that it has.
         """
         scene, model = problem.scene.geometry, self.wrapper.collision_model
-        numbers: list[int] = []
+        self._clearances = problem.clearances.copy()
         made: dict[tuple[int, float], int] = {}
 
         def piece(number: int, radius: float) -> int:
@@ -137,15 +157,14 @@ class Robot:
                 shape = ours.geometry.clone()
                 shape.setSweptSphereRadius(ours.geometry.getSweptSphereRadius() + radius)
                 name = f"{ours.name} {radius!r}"
-                added = pin.GeometryObject(name, self._joint(ours.parentJoint), ours.placement, shape)
+                added = pin.GeometryObject(name, self.joint(ours.parentJoint), ours.placement, shape)
                 made[number, radius] = model.addGeometryObject(added)
-                numbers.append(number)
+                self._pieces.append(number)
             return made[number, radius]
 
         for pair, clearance in zip(scene.collisionPairs, problem.clearances.tolist(), strict=True):
             first, second = piece(pair.first, clearance + SWELL), piece(pair.second, 0.0)
             model.addCollisionPair(pin.CollisionPair(first, second))
-        return numbers
 
 
 def _skeleton(figure: Figure, frames: Mapping[str, tuple[int, pin.SE3]]) -> ElementTree.Element:
@@ -180,13 +199,17 @@ def unsupported_joints(figure: Figure) -> list[str]:
     """The first joint of a kind that placo's robots do not have, with the reason; empty if there is none."""
     model = figure.model
     for index in range(2 if figure.root == "free" else 1, model.njoints):
+        name, kind = model.names[index], model.joints[index].shortname()
         if _urdf_kind(model.joints[index]) is None:
-            kind = model.joints[index].shortname()
-            return [f"joint {model.names[index]!r}, a {kind} (its robots have turning and sliding joints and one root)"]
+            return [f"joint {name!r}, a {kind} (its robots have turning and sliding joints and one root)"]
+        if name in figure.followers and figure.followers[name].offset:
+            return [f"joint {name!r}, which mimics another with an offset (its gears have none)"]
     return []
 
 
 def _urdf_kind(joint: Any) -> str | None:
+    if joint.shortname() == FOLLOWS:
+        return "prismatic" if _motion(joint)[:3].any() else "revolute"
     kinds = {("R", 1): "revolute", ("R", 2): "continuous", ("P", 1): "prismatic"}
     return kinds.get((joint.shortname().removeprefix("JointModel")[0], joint.nq)) if joint.nv == 1 else None
 
@@ -197,7 +220,13 @@ def _kind(model: Any, index: int) -> tuple[str, Array]:
     kind = _urdf_kind(joint)
     if kind is None:
         raise UnsupportedTermError("placo", [f"joint {model.names[index]!r}, a {joint.shortname()}"])
-    data = joint.createData()
-    joint.calc(data, pin.neutral(model))
-    motion = np.array(data.S).ravel()
+    motion = _motion(joint)
     return kind, motion[:3] if kind == "prismatic" else motion[3:]
+
+
+def _motion(joint: Any) -> Array:
+    """(6,) motion of a joint of one degree of freedom, of unit length; of one that follows another, its own."""
+    data = joint.createData()
+    joint.calc(data, np.zeros(joint.idx_q + max(joint.nq, 2)))
+    motion = np.array(data.S).ravel()
+    return motion / joint.extract().scaling if joint.shortname() == FOLLOWS else motion
