@@ -8,17 +8,17 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from types import MappingProxyType
 
-import numpy as np
-
-from wholebody.checks import function, instance, listed, shown
+from wholebody.checks import instance, listed, shown
 from wholebody.errors import InputError, UnknownNameError
-from wholebody.motion.avoider import Avoider, MethodResult, Progress
+from wholebody.motion.avoider import Avoider, MethodResult, Progress, check_input
+from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
-from wholebody.motion_assessment import assess_motion, passed
+from wholebody.motion_assessment import limit_violation
 from wholebody.scene import Scene
 
 COLLISION = 1e-4  # m: a frame, or the motion between two, that is deeper collides
+HELD = 1e-3  # m, rad: by which what is held may be missed in a solved clip
 ROUNDING = 1e-6  # rad, m: by which limits may be missed
 
 METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
@@ -33,42 +33,21 @@ METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
 
 
 @dataclass(frozen=True)
-class Collisions:
-    """The collisions of a clip, counted from all pairs of all frames, and from sweeps between them.
-
-    Attributes:
-        frames: how many frames are deeper than 0.1 mm.
-        deepest: depth of the deepest overlap in a frame, metres.
-        dips: how many motions from one frame to the next get deeper than 0.1 mm where both frames do not.
-        limits: largest violation of a joint limit, radians or metres.
-    """
-
-    frames: int
-    deepest: float
-    dips: int
-    limits: float
-
-    @property
-    def free(self) -> bool:
-        """Whether nothing collides and all limits hold."""
-        return not self.frames and not self.dips and self.limits <= ROUNDING
-
-
-@dataclass(frozen=True)
 class AvoidanceReport:
     """What a method did to a clip, and what it left.
 
     Attributes:
-        solved: whether the clip is free now, by the independent count; only then is it called so.
+        solved: whether the clip is free, limits hold and what is held is missed by at most 1 mm or 1 mrad, by a check
+            that shares nothing with the methods.
         message: one sentence that says what is left, or that all is free.
         method: name of the method.
         seconds: wall time of the method, without the judgement.
         posture_solves: how many postures were solved for on their own.
         programs: how many quadratic programs were solved.
         frames_changed: how many frames are others than before.
-        before: collisions of the clip as it was.
-        after: collisions of the answer.
         missed: largest miss of a constraint in any frame, metres or radians.
+        before: the check of the clip as it was.
+        after: the check of the answer.
     """
 
     solved: bool
@@ -78,9 +57,9 @@ class AvoidanceReport:
     posture_solves: int
     programs: int
     frames_changed: int
-    before: Collisions
-    after: Collisions
     missed: float
+    before: ClipCheck = field(repr=False)
+    after: ClipCheck = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +72,7 @@ class Avoided:
     """
 
     clip: Clip
-    report: AvoidanceReport = field(repr=True)
+    report: AvoidanceReport
 
 
 def avoider_named(name: str) -> Avoider:
@@ -136,7 +115,7 @@ def avoid(
     Args:
         clip: the original postures; they may collide and be beyond limits.
         scene: its figure with carried things, and the things around; None for the figure alone.
-        method: "trajectory", "frames", "fade", or configured, such as `wb.Trajectory(clearance=0.005)`.
+        method: "trajectory", "frames", "fade", "bisection", or configured, such as `wb.Trajectory(clearance=0.005)`.
         constraints: what holds in every frame. What a term takes from the start it takes from the original posture of
             its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has. See also
             `wb.StanceFeet`.
@@ -151,16 +130,11 @@ def avoid(
         UnknownNameError: there is no such method, or a constraint names what the figure does not have.
     """
     instance(clip, Clip, "avoid: clip", "read one with wb.read_clip(path, figure)")
-    scene = Scene(clip.figure) if scene is None else instance(scene, Scene, "avoid: scene", "wb.Scene(clip.figure)")
-    if list(scene.model.names) != list(clip.figure.model.names) or scene.model.nq != clip.figure.model.nq:
-        raise InputError(
-            f"avoid: the scene's figure {scene.figure.name} has other joints than the clip's {clip.figure.name}; make "
-            "the scene with wb.Scene(clip.figure)"
-        )
+    scene = Scene(clip.figure) if scene is None else scene
+    check_input(clip, scene, progress)
     chosen = as_avoider(method)
     given: tuple[Given, ...] = tuple(listed(constraints, "avoid: constraints", "[wb.Freeze('root')]"))
     terms = frame_terms(scene, clip.q, clip.dt, given)
-    function(progress, "avoid: progress")
     began = time.perf_counter()
     result = chosen.avoid(clip, scene, given, progress)
     seconds = time.perf_counter() - began
@@ -168,38 +142,31 @@ def avoid(
     return Avoided(found, _report(clip, found, terms, result, chosen.name, seconds))
 
 
-def collisions(clip: Clip, scene: Scene) -> Collisions:
-    """Count the collisions of a clip: all pairs of all frames, and sweeps between frames that are free."""
-    judged = assess_motion(scene, clip.q, clip.dt)
-    deep = judged.depth > COLLISION
-    between = sum(
-        bool(passed(scene, clip.q[frame : frame + 2], COLLISION))
-        for frame in np.flatnonzero(~deep[:-1] & ~deep[1:]).tolist()
-    )
-    return Collisions(int(deep.sum()), float(judged.depth.max()), between, judged.limit_violation)
-
-
 def _report(
     before: Clip, after: Clip, terms: FrameTerms, result: MethodResult, method: str, seconds: float
 ) -> AvoidanceReport:
     scene = terms.scene
-    was, now = collisions(before, scene), collisions(after, scene)
+    was, now = check(before, scene, depth=COLLISION), check(after, scene, depth=COLLISION)
     changed, missed = len(after), 0.0
     if len(before) == len(after):
         changed = int((before.q != after.q).any(axis=1).sum())
         if terms.holds:
             state = scene.state(after.q[0])
             missed = max(terms.missed(frame, state.update(q)) for frame, q in enumerate(after.q))
-    solved = now.free
+    beyond = limit_violation(scene.figure, after.q)
     left = [] if not result.message else [result.message]
-    if now.frames:
-        left.append(f"{now.frames} frames collide, {1e3 * now.deepest:.3g} mm deep at most")
+    if now.colliding:
+        left.append(f"{now.colliding} frames collide, {1e3 * now.deepest:.3g} mm deep at most")
     if now.dips:
-        left.append(f"{now.dips} motions between frames dip deeper than 0.1 mm")
-    if now.limits > ROUNDING:
-        left.append(f"a joint limit is missed by {now.limits:.3g} rad or m")
+        left.append(f"{now.dips} motions between frames dip, {1e3 * now.deepest_between:.3g} mm deep at most")
+    if beyond > ROUNDING:
+        left.append(f"a joint limit is missed by {beyond:.3g} rad or m")
+    if missed > HELD:
+        left.append(f"what is to hold is missed by {missed:.3g} m or rad")
+    solved = now.free and beyond <= ROUNDING and missed <= HELD
+    if not (solved or left):
+        left = ["something collides between two frames that collide"]
     message = "; ".join(left) if left else "nothing collides, in the frames and between them, to 0.1 mm"
     return AvoidanceReport(
-        solved, message, method, seconds, result.posture_solves, result.programs, changed, was, now, missed
+        solved, message, method, seconds, result.posture_solves, result.programs, changed, missed, was, now
     )
-

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple, Protocol
 
 from wholebody.arrays import Array
+from wholebody.checks import function, instance
+from wholebody.errors import InputError
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import Given
 from wholebody.scene import Scene
@@ -61,6 +63,24 @@ class Avoider(Protocol):
             constraints: what holds in every frame; see `wholebody.motion.frame_terms`.
             progress: called with the share done; where it returns True, the method ends with what it has.
         """
+
+
+def check_input(clip: object, scene: object, progress: object) -> None:
+    """Check what a method gets.
+
+    Raises:
+        InputError: no clip, no scene, a scene of a figure with other joints, or progress that cannot be called.
+    """
+    instance(clip, Clip, "avoid: clip", "read one with wb.read_clip(path, figure)")
+    instance(scene, Scene, "avoid: scene", "make one with wb.Scene(clip.figure)")
+    assert isinstance(clip, Clip)
+    assert isinstance(scene, Scene)
+    if list(scene.model.names) != list(clip.figure.model.names) or scene.model.nq != clip.figure.model.nq:
+        raise InputError(
+            f"avoid: the scene's figure {scene.figure.name} has other joints than the clip's {clip.figure.name}; make "
+            "the scene with wb.Scene(clip.figure)"
+        )
+    function(progress, "avoid: progress")
 
 
 class Watch:

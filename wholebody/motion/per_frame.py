@@ -16,8 +16,9 @@ import pinocchio as pin
 from wholebody import checks
 from wholebody.arrays import Array
 from wholebody.methods.qp.method import QP
-from wholebody.motion.avoider import MethodResult, Progress, Watch
+from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
+from wholebody.motion.dips import dips
 from wholebody.motion.faults import DEPTH, depth, faults
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.windows import Window, windows
@@ -30,6 +31,8 @@ from wholebody.workspace import Workspace
 MARGIN = 0.3  # s, before and after a collision: in which the pass begins and ends at the original posture
 BACK = 1e-4  # rad, m: a posture this near to the original one is the original one
 MOST = 6  # steps of one frame
+ROOM = 5e-4  # m: more room that the frames beside a dip are first asked for; it doubles from round to round
+LIFTS = 6  # rounds of asking for more
 STEP = 1e-4  # rad, m: a step no longer than this ends a frame
 
 
@@ -47,15 +50,21 @@ class Follower:
             terms: original postures, and what is held.
             clearance: least distance of every pair, metres.
         """
-        self._terms, self.programs = terms, 0
+        self._terms, self._clearance, self.programs = terms, clearance, 0
         q = terms.scene.figure.clamp(terms.q[0])
         self._problem = Problem(terms.scene, q, goals=[Posture(terms.q[0])], measures=(), clearance=0.0)
-        self._problem.clearances = np.full_like(self._problem.clearances, clearance)
         self._tracker = QP(restarts=0).tracker(self._problem, terms.dt)
 
-    def frame(self, number: int, q: Array) -> Array:
-        """The posture of a frame, begun at a posture (nq,): steps until they are short."""
+    def frame(self, number: int, q: Array, more: float = 0.0) -> Array:
+        """The posture of a frame, begun at a posture (nq,): steps until they are short.
+
+        Args:
+            number: of the frame.
+            q: (nq,) where the steps begin.
+            more: metres that are asked of every pair beyond the clearance.
+        """
         terms, problem = self._terms, self._problem
+        problem.clearances = np.full_like(problem.clearances, self._clearance + more)
         goal = Posture(terms.q[number]).resolve(terms.scene, problem.start)
         held = terms.held(number)
         problem.goals = (goal, *(term for term in held if isinstance(term, Goal)))
@@ -97,6 +106,7 @@ class PerFrame:
 
     def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
+        check_input(clip, scene, progress)
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
         q = np.array(clip.q)
         with scene.lend() as workspace:
@@ -109,6 +119,7 @@ class PerFrame:
                 if follower is None or watch.tell(done / total, "frames"):
                     break
                 self._free(window, q, terms, follower, workspace)
+                _lift(window, q, follower, workspace)
                 done += len(window)
         ended = "the caller ended it" if watch.ended else ""
         return MethodResult(q, 0, 0 if follower is None else follower.programs, ended)
@@ -135,6 +146,21 @@ def _passed(follower: Follower, terms: FrameTerms, frames: range) -> Array:
         here = follower.frame(frame, here)
         found.append(here)
     return np.array(found)
+
+
+def _lift(window: Window, q: Array, follower: Follower, workspace: Workspace) -> None:
+    """Ask for more room in the frames on both sides of motions that dip, until none does."""
+    more = np.zeros(len(q))
+    gaps = list(range(max(0, window.first - 1), min(len(q) - 1, window.end)))
+    for _ in range(LIFTS):
+        dipping = list(dips(workspace, q, gaps))
+        if not dipping:
+            return
+        frames = sorted({frame + end for frame in dipping for end in (0, 1)})
+        for frame in frames:
+            more[frame] = 2.0 * more[frame] + ROOM
+            q[frame] = follower.frame(frame, q[frame], float(more[frame]))
+        gaps = sorted({gap for frame in frames for gap in (frame - 1, frame) if 0 <= gap < len(q) - 1})
 
 
 def _smooth(share: float) -> float:

@@ -52,6 +52,7 @@ class StanceFeet:
             UnknownNameError: the figure has no such frame.
             InputError: no feet are named, and the figure has none of the usual names.
         """
+        checks.instance(figure, Figure, "StanceFeet: figure", "load one with wb.load('human')")
         if self.feet is not None:
             for name in self.feet:
                 figure.frame_id(name)

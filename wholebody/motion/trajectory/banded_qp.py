@@ -20,7 +20,7 @@ from wholebody.arrays import Array
 from wholebody.checks import shown
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
-PIQP_ACCURACY = 1e-7  # of the optimality conditions: a tenth of what a step is judged by; smaller costs an iteration
+PIQP_ACCURACY = 1e-5  # of the optimality conditions: a tenth of what a step is judged by; smaller costs an iteration
 OSQP_ACCURACY = 1e-6
 OSQP_ITERATIONS = 8000
 POLISH = 5  # steps of refinement of OSQP's polishing

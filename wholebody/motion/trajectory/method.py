@@ -9,7 +9,7 @@ import numpy as np
 
 from wholebody import checks
 from wholebody.arrays import Array
-from wholebody.motion.avoider import MethodResult, Progress, Watch
+from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import faults
 from wholebody.motion.frame_terms import Given, frame_terms
@@ -61,6 +61,7 @@ class Trajectory:
 
     def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
+        check_input(clip, scene, progress)
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
         q: Array = np.array(clip.q)
         _, solve = banded_solver(self.solver)

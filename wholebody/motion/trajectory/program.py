@@ -19,6 +19,7 @@ from wholebody.motion.trajectory.nodes import Rows
 from wholebody.motion.trajectory.objective import Objective
 
 SLACK_CURVATURE = 1e-2  # 1/m^2, of a share of the penalty: keeps equal splits of a shortfall unique
+ONE_STEP = 0.03  # m, rad: of a deeper shortfall one step asks for this much; the normals are looked at again on the way
 NEAR_SPEED = 0.5  # share of a bound on speed from which a change has a row; what passes unseen has one in the next step
 TIGHT = 1e-6  # m, rad: a row nearer than this to being missed at a program's answer is active
 
@@ -191,7 +192,7 @@ def _contact_part(
         if not many:
             continue
         index = np.arange(number, number + many)
-        bound = -one.gap[keep]
+        bound = np.minimum(-one.gap[keep], ONE_STEP)
         for offset, part in enumerate((one.first, one.second)):
             if part is not None:
                 own = part[np.ix_(keep, dofs)]

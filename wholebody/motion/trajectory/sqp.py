@@ -99,10 +99,10 @@ class WindowProgram:
         """More places to look at."""
         self.nodes = sorted({*self.nodes, *nodes})
 
-    def run(self, x: Array, cancel: Cancel) -> Found:
-        """Iterate from deviations x (n, nv)."""
+    def run(self, x: Array, cancel: Cancel, radius: float = RADIUS) -> Found:
+        """Iterate from deviations x (n, nv), with a first trust region of this radius."""
         here = self._at(x)
-        radius, penalty = RADIUS, PENALTY
+        penalty = PENALTY
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
         entries: list[tuple[float, float]] = []
         counts = self._counts(here)

@@ -11,12 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.methods.qp.method import QP
+from wholebody.motion.fade import freed_posture
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.per_frame import BACK, Follower
 from wholebody.motion.windows import Window, outwards
-from wholebody.problem import Problem
-from wholebody.tasks.base import Bound, Constraint, Goal
 
 PATIENCE = 0.25  # s: a run of frames at the original posture this long ends the following
 
@@ -40,26 +38,15 @@ class Carried:
         """How many quadratic programs the following took."""
         return 0 if self._follower is None else self._follower.programs
 
-    def freed(self, frame: int) -> Array:
-        """A posture (nq,) without overlap near the original one of a frame."""
-        terms = self._terms
-        held = terms.held(frame)
-        goals = [term for term in held if isinstance(term, Goal)]
-        others = [term for term in held if isinstance(term, Constraint)]
-        bounds = [term for term in terms.given if isinstance(term, Bound)]
-        start = terms.scene.figure.clamp(terms.q[frame])
-        problem = Problem(terms.scene, start, goals=goals, constraints=[*others, *bounds])
-        problem.clearances = np.full_like(problem.clearances, self._clearance)
-        self.posture_solves += 1
-        return QP().solve(problem).q
-
     def outwards(self, window: Window, middle: int) -> Array:
         """(n, nq) postures of a window, followed from the freed posture of a frame in the middle."""
         terms = self._terms
         if self._follower is None:
             self._follower = Follower(terms, self._clearance)
         q = np.array(terms.q[window.first : window.end])
-        q[middle - window.first] = self.freed(middle)
+        freed, _ = freed_posture(terms, middle, terms.q[middle], self._clearance)
+        self.posture_solves += 1
+        q[middle - window.first] = freed
         patience, calm, side = max(2, round(PATIENCE / terms.dt)), 0, 1
         for frame, neighbour in outwards(window, middle):
             if frame - neighbour != side:

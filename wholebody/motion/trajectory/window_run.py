@@ -8,19 +8,20 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.motion.dips import dips
+from wholebody.motion.dips import dips, sampled_dips
 from wholebody.motion.frame_terms import FrameTerms, speed_limits
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.chart import Chart
 from wholebody.motion.trajectory.nodes import Looking, Node
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
-from wholebody.motion.trajectory.sqp import WindowProgram
+from wholebody.motion.trajectory.sqp import MET, RADIUS, WindowProgram
 from wholebody.motion.trajectory.starts import Carried
 from wholebody.motion.windows import Window
 from wholebody.workspace import Workspace
 
-ROUNDS = 8  # of sweeping and adding places between frames
+ROUNDS = 12  # of sweeping and adding places between frames
+NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few rows are near enough to count then
 NOTHING = 1e-9  # rad, m: a deviation no larger is none
 
 
@@ -61,9 +62,9 @@ class _Attempt(NamedTuple):
     objective: float
 
     @property
-    def rank(self) -> tuple[bool, float, float]:
+    def rank(self) -> tuple[bool, bool, float]:
         """The best attempt has the least."""
-        return self.dipping > 0 or self.worst > 1e-5, self.worst, self.objective
+        return self.worst > MET, self.dipping > 0, self.objective if self.worst <= MET else self.worst
 
 
 class ClipRun:
@@ -120,11 +121,11 @@ class ClipRun:
             if attempt is None:
                 return Freed(chart.original, "")
             best = attempt if best is None or attempt.rank < best.rank else best
-            if not best.rank[0]:
+            if best.worst <= MET:
                 break
         assert best is not None
         missed = ""
-        if best.rank[0]:
+        if best.worst > MET or best.dipping:
             dipping = f", and {best.dipping} motions between frames dip" if best.dipping else ""
             missed = f"{1e3 * best.worst:.3g} mm or mrad are missed{dipping}"
         changed = np.abs(best.x).max(axis=1) > NOTHING
@@ -146,20 +147,22 @@ class ClipRun:
         cancel: Callable[[float], bool],
     ) -> _Attempt | None:  # fmt: skip
         program = WindowProgram(looking, objective, limits, self._solve, self._settings.iterations)
-        clean: dict[int, bytes] = {}  # gaps that were swept, and between which deviations
-        found = None
+        found, radius = None, RADIUS
         for _ in range(ROUNDS):
-            found = program.run(x, lambda count, worst: cancel(count / self._settings.iterations))
+            found = program.run(x, lambda count, worst: cancel(count / self._settings.iterations), radius)
+            radius = NEARLY
             self._programs += found.programs
             if found.cancelled:
                 return None
             x = found.x
-            gaps = [gap for gap in range(len(x) - 1) if clean.get(gap) != x[gap : gap + 2].tobytes()]
-            dipping = dips(self._workspace, chart.postures(x), gaps)
-            clean.update({gap: x[gap : gap + 2].tobytes() for gap in gaps if gap not in dipping})
+            q = chart.postures(x)
+            gaps = [gap for gap in range(len(x) - 1) if x[gap : gap + 2].any()]
+            dipping = sampled_dips(self._workspace, q, gaps) if found.met else []
+            if not dipping:
+                dipping = list(dips(self._workspace, q, gaps).items())
             if not dipping or not found.met:
                 return _Attempt(x, found.worst, len(dipping), objective.value(x))
-            program.add([Node(gap, share) for gap, share in dipping.items()])
+            program.add([Node(gap, share) for gap, share in dipping])
         assert found is not None
         return _Attempt(x, found.worst, len(dipping), objective.value(x))
 
