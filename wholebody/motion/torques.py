@@ -149,9 +149,9 @@ def torques(
         else checks.instance(strength, Strength, "torques: strength", "give wb.Strength(percentile=50, sex='female')")
     )
     figure = clip.figure
-    feet = checks.listed(feet, "torques: feet", "['left_foot', 'right_foot']")
-    if tuple(feet) == FEET:
+    if feet is FEET:
         feet = [name for name in FEET if name in figure.segments]
+    feet = checks.listed(feet, "torques: feet", "['left_foot', 'right_foot']")
     for name in feet:
         figure.frame_id(name)
     if not sum(inertia.mass for inertia in figure.model.inertias[1:]) > 0.0:
