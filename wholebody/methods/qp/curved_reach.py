@@ -35,7 +35,7 @@ RADIUS = 0.5  # rad, m: of the first step
 LARGEST_RADIUS = 1.0
 LEAST_RADIUS = 1e-4
 FLAT = 1e-3  # share of the violation that a step must be foreseen to gain, or the posture is stationary
-WORTH, POOR, GOOD = 0.05, 0.25, 0.6  # shares of the gain foreseen: a step is taken, was too long, may be longer
+POOR, GOOD = 0.25, 0.6  # shares of the gain foreseen: a step was too long, may be longer
 SHRINK = 0.3
 DAMPING = 1e-2  # share of the largest curvature that every direction has at least; less: sets that go in circles
 NEGLIGIBLE = 1e-2  # share of the largest curvature below which a direction is left out
@@ -109,12 +109,12 @@ class CurvedReach:
             )
             ratio = (here.violation.total - there.violation.total) / gain
             step = float(np.abs(x).max(initial=0.0))
-            blocked = ratio > WORTH and within > 0.0 and self._jumps(here, there)
+            blocked = ratio > 0.0 and within > 0.0 and self._jumps(here, there)
             if ratio < POOR or blocked:
                 radius = SHRINK * min(radius, step)
             elif ratio > GOOD and step > 0.7 * radius:
                 radius = min(2.0 * radius, LARGEST_RADIUS)
-            if ratio > WORTH and not blocked:
+            if ratio > 0.0 and not blocked:
                 push = rows.soft_weight * (rows.soft @ x + rows.soft_error)
                 here = there
         return LocalSolution(here.at.q, here.violation, here.at.measure, converged, used)
