@@ -165,7 +165,10 @@ def _support(piece: int, normal: Array, points: Array, first_point: Indices, rad
     for k in range(first_point[piece], first_point[piece + 1]):
         most = max(most, points[k, 0] * normal[0] + points[k, 1] * normal[1] + points[k, 2] * normal[2])
     if most == -np.inf:
-        return float(np.sqrt(np.sum((radii[piece] * normal) ** 2)))
+        total = 0.0  # numba's sum would load scipy.linalg at every start
+        for axis in range(3):
+            total += (radii[piece, axis] * normal[axis]) ** 2
+        return float(np.sqrt(total))
     return float(most + radius[piece])
 
 
