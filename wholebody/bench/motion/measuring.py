@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,15 +94,6 @@ class MotionRow:
     def measured(self) -> bool:
         """Whether there is a clip to measure."""
         return self.outcome in ("free", "left")
-
-
-def methods() -> tuple[str, ...]:
-    """Names of the methods that free a clip."""
-    if find_spec("wholebody.motion.avoidance") is None:
-        return ()
-    from wholebody.motion.avoidance import METHODS
-
-    return tuple(METHODS)
 
 
 def made(name: str, recording: str, path: str) -> tuple[int, float]:
