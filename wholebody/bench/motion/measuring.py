@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from wholebody.bench.motion.cases import SYNTHETIC, WEAPON, dressed, recorded, synthetic
 from wholebody.bench.tables import read_rows, write_rows
 from wholebody.errors import InputError, WholebodyError
@@ -23,7 +25,7 @@ CHECKED = "check"  # in place of a method: the clip as it is
 MAKING = 600.0  # s: to read a clip and bring it onto the figure
 START = 120.0  # s of the deadline of a case that its clip's length does not count for: imports, compilation
 SLOWEST = 60.0  # s for a second of motion, after which a method is ended
-MIDDLE = 7  # frames with which everything is compiled or read back first
+MIDDLE = 7  # frames, around a collision, with which everything is compiled or read back first
 
 LIMIT = 1e-6  # rad, m: by which a limit may be missed
 
@@ -157,7 +159,7 @@ def _freed(row: MotionRow, clip: Clip, found: ClipCheck, scene: Any) -> MotionRo
     if row.clip in WEAPON:
         hand, other = WEAPON[row.clip]
         constraints.append(Hold(other, relative_to=hand))
-    avoid(clip[:MIDDLE], scene, method=row.method, constraints=constraints)
+    avoid(_colliding(clip, found), scene, method=row.method, constraints=constraints)  # compiles what is needed
     began = time.process_time()
     try:
         freed = avoid(clip, scene, method=row.method, constraints=constraints)
@@ -171,6 +173,12 @@ def _freed(row: MotionRow, clip: Clip, found: ClipCheck, scene: Any) -> MotionRo
     found = check(freed.clip, scene)
     row = replace(row, check_ms=1e3 * (time.process_time() - began) / len(clip))
     return _judged(row, clip, freed.clip, found)
+
+
+def _colliding(clip: Clip, found: ClipCheck) -> Clip:
+    """A few frames around the first collision; the first ones where there is none."""
+    first = max(0, int(np.argmax(found.depth > found.tolerance)) - MIDDLE // 2)
+    return clip[first : first + MIDDLE]
 
 
 def _judged(row: MotionRow, before: Clip, after: Clip, found: ClipCheck) -> MotionRow:
