@@ -183,7 +183,7 @@ class Search:
             self._accept(self._stay(self.best), self.how)
         if self._out_of_reach:
             self._come_near()
-        elif self.best.violation.left > tolerance:
+        elif self.best.violation.worst > tolerance:
             self._near_best()
         if self.best.violation.left <= tolerance:
             return
@@ -229,9 +229,7 @@ class Search:
 
     def _near_best(self) -> None:
         """Come as near as goes from the best posture; where that comes to rest nothing nearer is near."""
-        nearest = self._curved().among_things(
-            self.best.q, self.settings.tolerance, self._at_most(COMING_NEAR)
-        )
+        nearest = self._curved().among_things(self.best.q, self.settings.tolerance, self._at_most(COMING_NEAR))
         self.spent += nearest.iterations
         if not nearest.converged:
             self._accept(nearest, self.how)
