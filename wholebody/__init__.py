@@ -38,16 +38,15 @@ if TYPE_CHECKING:
     from wholebody.motion.avoidance import AvoidanceReport, Avoided, avoid
     from wholebody.motion.checking import ClipCheck, check
     from wholebody.motion.clip import Clip
+    from wholebody.motion.fade import Fade
+    from wholebody.motion.per_frame import PerFrame
     from wholebody.motion.reading import read_clip, read_skeleton
     from wholebody.motion.retargeting import retarget
     from wholebody.motion.skeleton import SkeletonMotion
-    from wholebody.motion.fade import Fade
-    from wholebody.motion.per_frame import PerFrame
-    from wholebody.motion.reading import read_clip
     from wholebody.motion.stance import StanceFeet
-    from wholebody.motion.trajectory.method import Trajectory
     from wholebody.motion.strength import Strength
     from wholebody.motion.torques import Torques, torques
+    from wholebody.motion.trajectory.method import Trajectory
     from wholebody.problem import Problem
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
@@ -135,8 +134,8 @@ __all__ = [
     "StepLimit",
     "Strength",
     "Task",
-    "Trajectory",
     "Torques",
+    "Trajectory",
     "UnknownNameError",
     "Viewer",
     "WholebodyError",
@@ -178,7 +177,6 @@ _MODULES = {
     "wholebody.motion.per_frame": "PerFrame",
     "wholebody.motion.strength": "Strength",
     "wholebody.motion.torques": "Torques torques",
-    "wholebody.motion.reading": "read_clip",
     "wholebody.motion.stance": "StanceFeet",
     "wholebody.motion.trajectory.method": "Trajectory",
     "wholebody.problem": "Problem",

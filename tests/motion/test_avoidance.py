@@ -78,10 +78,14 @@ def test_the_trajectory_is_the_least_of_its_objective(planar_arm: Callable[..., 
 
     begun = (found - clip.q).ravel()
     assert gaps(begun).min() > -1e-5
-    best = minimize(objective, begun, method="SLSQP", constraints={"type": "ineq", "fun": gaps}, options={"maxiter": 200})
+    best = minimize(
+        objective, begun, method="SLSQP", constraints={"type": "ineq", "fun": gaps}, options={"maxiter": 200}
+    )
     assert objective(begun) <= 1.02 * best.fun + 1e-6
     # the same from a start of its own: the way around the ball that the trajectory took is not far longer
-    own = minimize(objective, 1.2 * begun, method="SLSQP", constraints={"type": "ineq", "fun": gaps}, options={"maxiter": 400})
+    own = minimize(
+        objective, 1.2 * begun, method="SLSQP", constraints={"type": "ineq", "fun": gaps}, options={"maxiter": 400}
+    )
     assert objective(begun) <= 1.02 * own.fun + 1e-6
 
 
@@ -156,9 +160,7 @@ def arm_into_trunk(human: Figure, frames: int = 60) -> wb.Clip:
     turned = {"right_elbow_flexion": 1.2, "right_shoulder_rotation": 0.9, "right_shoulder_abduction": -0.1}
     values = human.joint_values(q0)
     q = [
-        human.clamp(
-            human.with_joints(q0, {name: (1 - one) * values[name] + one * end for name, end in turned.items()})
-        )
+        human.clamp(human.with_joints(q0, {name: (1 - one) * values[name] + one * end for name, end in turned.items()}))
         for one in wave
     ]
     return wb.Clip(human, np.array(q), DT, "forearm")

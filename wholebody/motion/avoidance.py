@@ -27,7 +27,6 @@ METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "frames": ("wholebody.motion.per_frame", "PerFrame"),
         "bisection": ("wholebody.motion.bisection.method", "Bisection"),
         "fade": ("wholebody.motion.fade", "Fade"),
-        "bisection": ("wholebody.motion.bisection.method", "Bisection"),
     }
 )
 """Methods by name: module and class of the settings."""
