@@ -30,10 +30,10 @@ TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}
 STANDING = 30.0
 """Weight of the distance of a foot that stands."""
 
-POSTURE = 0.01
+POSTURE = 0.03
 """Weight of the difference of each joint from the neutral posture, metres per radian, for what no goal determines."""
 
-NEARBY = 0.02
+NEARBY = 0.3
 """Weight of the difference from the smooth posture where a limb is brought back into its reach cone."""
 
 OWN, FROM_NEIGHBOUR, ROUNDS = 25, 6, 4

@@ -21,7 +21,7 @@ ACCELERATION = 1e-4
 ROOT_ACCELERATION = 1e-4
 """Weight of an acceleration of the root, metres per metre (or radian) a second squared."""
 
-CONE = 1.0
+CONE = 3.0
 """Weight of an angle outside of a reach cone, metres per radian."""
 
 HELD = 1e6
