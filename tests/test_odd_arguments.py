@@ -471,6 +471,11 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
     for method in ("mirrored", "velocities", "accelerations", "jerk"):
         yield f"Clip.{method}", Call(getattr(wb.Clip(hand, [hand.neutral], 0.1), method), {})  # type: ignore[arg-type]
+    yield "Strength", Call(wb.Strength, {"percentile": 50.0, "sex": "female"}, lambda made: made.limits(arm))
+    yield "Strength.limits", Call(wb.Strength().limits, {"figure": arm})
+    found = wb.torques(clip)
+    yield "Torques.largest", Call(found.largest, {})
+    yield "torques", Call(wb.torques, {"clip": clip, "friction": 0.5, "cutoff": 6.0, "strength": wb.Strength()})
     yield "Clip(frames)", Call(lambda frames: clip[frames], {"frames": slice(0, 1)})
     clip.write(path / "walk.npz")
     (path / "walk.bvh").write_text(BVH)
@@ -494,8 +499,19 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     }
     yield "retarget", Call(wb.retarget, {"motion": skeleton, "figure": arm, "names": bones, "progress": print})
     yield "read_clip", Call(wb.read_clip, {"path": path / "walk.npz", "figure": arm})
-    checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done, frames: None}
+    checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done: None}
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
+    avoided = {"clip": clip, "scene": wb.Scene(arm), "constraints": [], "progress": lambda told: None}
+    yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
+    for method in (wb.Trajectory, wb.PerFrame, wb.Fade):
+        yield f"{method.__name__}.avoid", Call(method().avoid, avoided)
+    settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "solver": "osqp", "iterations": 10}
+    yield "Trajectory", Call(wb.Trajectory, settings)
+    yield "PerFrame", Call(wb.PerFrame, {"clearance": 0.01, "backward": True})
+    yield "Fade", Call(wb.Fade, {"clearance": 0.01, "fade": 0.2, "rounds": 2})
+    stance = {"feet": ["link1"], "speed": 0.1, "height": 0.05, "least": 0.1}
+    yield "StanceFeet", Call(wb.StanceFeet, stance, lambda made: made.names(arm))
+    yield "StanceFeet.names", Call(wb.StanceFeet(["link1"]).names, {"figure": arm})
     yield "timeline", Call(timeline, {"found": wb.check(clip), "scene": wb.Scene(arm)})
     pair = {"before": clip, "after": clip}
     for measure in (measures.deviation, measures.jerk_ratio, measures.foot_sliding):
@@ -552,7 +568,9 @@ ANSWERS = (
     "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "TraceEntry", "Assessment",
     "Task", "Step", "QPStep", "Simplified", "LeftOut",
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
-    "Scene.of_parts", "ClipCheck", "Beyond", "Contact", "Sliding", "Deviation",
+    "Scene.of_parts", "ClipCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
+    "Recording", "Torques", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
+    "Scene.of_parts",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 

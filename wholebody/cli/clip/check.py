@@ -95,7 +95,7 @@ def checked(clip: Clip, scene: Scene, depth: float) -> ClipCheck:
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
         work = bar.add_task("checking every pair", total=len(clip))
-        return check(clip, scene, depth=depth, progress=lambda done, _: bar.update(work, completed=done))
+        return check(clip, scene, depth=depth, progress=lambda done: bar.update(work, completed=done))
 
 
 def show(console: Console, found: ClipCheck) -> None:

@@ -56,10 +56,10 @@ def screen(
 
 @compiled()
 def lower_bounds(
-    asked: Indices, pairs: Indices, place0: Array, place1: Array, rows0: Array, rows1: Array, speed: Array,
-    wanted: Array, share: float, accuracy: float, joint: Indices, turn: Array, speeds: Array,
-    carries: NDArray[np.bool_], reach: Array, points: Array, first_point: Indices, radius: Array, radii: Array,
-    faces: Array, first_face: Indices, bound: Array,
+    asked: Indices, pairs: Indices, places: Array, first_place: Indices, last_place: Indices, rows0: Array,
+    rows1: Array, speed: Array, wanted: Array, share: float, accuracy: float, joint: Indices, turn: Array,
+    speeds: Array, carries: NDArray[np.bool_], reach: Array, points: Array, first_point: Indices, radius: Array,
+    radii: Array, faces: Array, first_face: Indices, bound: Array,
 ) -> None:  # fmt: skip
     """Bound the distances of pairs from below, over a part of a motion.
 
@@ -70,13 +70,14 @@ def lower_bounds(
     Args:
         asked: (k,) places of the pairs.
         pairs: (p, 2) the pieces of each pair.
-        place0: (n, 4, 3) where the pieces are at the beginning of the part.
-        place1: (n, 4, 3) where they are at its end.
+        places: (m, n, 4, 3) where the pieces are at some times.
+        first_place: (k,) the time, of `places`, at which the part begins.
+        last_place: (k,) the time at which it ends.
         rows0: (k, 4) distance and normal, from the first piece to the second, at the beginning.
         rows1: (k, 4) the same at the end.
         speed: (k,) by how much a pair can come nearer during the whole motion.
         wanted: (k,) a bound that is sufficient.
-        share: the part, of the whole motion.
+        share: length of each part, of the whole motion.
         accuracy: metres to which the distances are known.
         joint: (n,) joint of each piece.
         turn: (njoints,) see `MotionBounds`.
@@ -94,6 +95,7 @@ def lower_bounds(
     normal = np.empty(3)
     for k in range(len(asked)):
         first, second = pairs[asked[k], 0], pairs[asked[k], 1]
+        place0, place1 = places[first_place[k]], places[last_place[k]]
         best = 0.5 * (rows0[k, 0] + rows1[k, 0] - speed[k] * share) - accuracy
         for side in range(4):
             if best >= wanted[k]:
