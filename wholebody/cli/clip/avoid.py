@@ -28,9 +28,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         help="what the body wears: a ready name such as pack, or a mesh that is put on its back; may be repeated",
     )  # fmt: skip
     parser.add_argument("--feet", action="store_true", help="hold feet where they stand")
-    parser.add_argument(
-        "--out", type=Path, metavar="FILE", help="default: <name>-free.npz, beside FILE"
-    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="default: <name>-free.npz, beside FILE")
     parser.set_defaults(run=run)
 
 
