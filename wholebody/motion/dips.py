@@ -15,7 +15,8 @@ DIP = 8e-5  # m: a deeper overlap between two frames is a dip; `wb.check` allows
 SAMPLED = 4e-5  # m: the same where a gap is looked at in a few places only; the deepest one may be elsewhere
 NEAR = 2e-4  # m: what is nearer than this between frames gets rows as soon as something dips
 FAR = 0.1  # m: distances beyond it are as good as this
-HALVINGS = 8  # of the search for the deepest place: to 0.001 of a gap
+BEHIND = 2e-3  # share of a gap behind the first contact of a sweep at which it is looked at
+HALVINGS = 8  # of the search for the deepest place: to a fiftieth of what is between two places
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 FEW = tuple(float(k) / 6.0 for k in range(1, 6))
 MANY = tuple(float(k) / 64.0 for k in range(1, 64))
@@ -50,10 +51,11 @@ def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tu
     """
     near, dipping = [], False
     for gap in gaps:
-        for share, one in zip(FEW, _depths(workspace, q[gap], q[gap + 1], FEW, NEAR), strict=True):
-            dipping |= one > SAMPLED
-            if one > -NEAR:
-                near.append((gap, share))
+        depths = _depths(workspace, q[gap], q[gap + 1], FEW, NEAR)
+        place = int(np.argmax(depths))
+        dipping |= depths[place] > SAMPLED
+        if depths[place] > -NEAR:
+            near.append((gap, FEW[place]))
     return near if dipping else []
 
 
@@ -64,8 +66,11 @@ def _deepest(workspace: Workspace, before: Array, after: Array, number: int) -> 
         near = workspace.near(np.asarray(pin.interpolate(workspace.model, before, after, share)), FAR)
         return float(near.distance[near.number == number].min(initial=FAR))
 
-    place = int(np.argmin([distance(share) for share in MANY]))
-    low, high = (MANY[min(max(place + side, 0), len(MANY) - 1)] for side in (-1, 1))
+    contact = workspace.sweep.first_contact(before, after, tolerance=DIP)
+    begun = () if contact is None else (contact.fraction, contact.fraction + BEHIND)
+    shares = sorted({0.0, *MANY, *begun, 1.0})
+    place = 1 + int(np.argmin([distance(share) for share in shares[1:-1]]))
+    low, high = shares[place - 1], shares[place + 1]
     for _ in range(HALVINGS):
         first, second = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         low, high = (low, second) if distance(first) < distance(second) else (first, high)

@@ -21,7 +21,8 @@ from wholebody.motion.windows import Window
 from wholebody.workspace import Workspace
 
 ROUNDS = 12  # of sweeping and adding places between frames
-SIDES = (0.0, -0.01, 0.01)  # shares of a gap beside its deepest place that become nodes with it
+NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
+SIDES = (0.0, -0.005, 0.005)  # shares of a gap beside its deepest place that become nodes with it
 NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few rows are near enough to count then
 NOTHING = 1e-9  # rad, m: a deviation no larger is none
 
@@ -166,7 +167,10 @@ class ClipRun:
                 dipping += sampled_dips(self._workspace, q, gaps)
             if not dipping or not found.met:
                 return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), objective.value(x))
-            program.add([Node(gap, float(np.clip(share, 0.005, 0.995))) for gap, share in dipping])
+            before = len(program.nodes)
+            program.add([Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in dipping])
+            if len(program.nodes) == before:
+                break
         assert found is not None
         return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), objective.value(x))
 
