@@ -1,0 +1,95 @@
+"""How much nearer two pieces can come while every joint moves by a bounded amount, wherever the joints are.
+
+A joint that turns by at most w moves a point at distance r from its origin by at most w r. From the origin of a joint
+to a point of a piece it is no farther than the sum of the distances between the joints on the way, which are constant,
+and of the travel of those that slide. Joints that carry both pieces do not count.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.geometry.continuous.motion_bounds import TURNING_AXES
+from wholebody.geometry.proximity import PairTable
+
+
+def largest_approach(table: PairTable, centres: Array, most: Array) -> Array:
+    """Most by which the distance of every pair can fall (pairs,), metres; infinite where nothing is known.
+
+    Args:
+        table: the pieces and pairs.
+        centres: (n,) most that a piece's origin is away from that of its joint, metres; infinite where it may be placed
+            anew.
+        most: (nv,) largest displacement of every degree of freedom, radians and metres; may be infinite.
+    """
+    model = table.model
+    moved = [_motion(model, joint, most) for joint in range(model.njoints)]
+    lengths = [_length(model, joint) for joint in range(model.njoints)]
+    own = centres + table.reach
+    first, second = table.joint[table.pairs].T
+    ways = np.zeros((2, len(table.pairs)))
+    for a, b in {*zip(first.tolist(), second.tolist(), strict=True)}:
+        here = (first == a) & (second == b)
+        for side, (joint, other) in enumerate(((a, b), (b, a))):
+            fixed, turn = _way(model, joint, other, moved, lengths)
+            if turn > 0.0:
+                ways[side, here] = fixed + turn * own[table.pairs[here, side]]
+            else:
+                ways[side, here] = fixed
+    return np.asarray(ways.sum(axis=0))
+
+
+def _way(
+    model: pin.Model, joint: int, other: int, moved: list[tuple[float, float]], lengths: list[float]
+) -> tuple[float, float]:
+    """Motion of what a joint carries by the joints that do not carry `other`: at its origin, and more a metre off."""
+    carrying, above = set(), other
+    while above > 0:
+        carrying.add(above)
+        above = int(model.parents[above])
+    fixed, turned, lever = 0.0, 0.0, 0.0
+    while joint > 0 and joint not in carrying:
+        slide, turn = moved[joint]
+        fixed += slide + (turn * lever if turn > 0.0 else 0.0)
+        turned += turn
+        lever += lengths[joint]
+        joint = int(model.parents[joint])
+    return fixed, turned
+
+
+def _motion(model: pin.Model, joint: int, most: Array) -> tuple[float, float]:
+    """How far a joint can slide, and how far it can turn."""
+    if joint == 0:
+        return 0.0, 0.0
+    kind: Any = model.joints[joint]
+    size = most[kind.idx_v : kind.idx_v + kind.nvExtended]
+    if not np.isfinite(size).all():
+        return np.inf, 0.0
+    if any(word in kind.shortname() for word in TURNING_AXES):
+        return np.inf, 0.0
+    part = np.abs(_axes(model, kind)) @ size
+    return float(np.linalg.norm(part[:3])), float(np.linalg.norm(part[3:]))
+
+
+def _length(model: pin.Model, joint: int) -> float:
+    """Most that the origin of a joint can be away from the origin of the one that carries it."""
+    kind: Any = model.joints[joint]
+    if joint == 0:
+        return 0.0
+    length = float(np.linalg.norm(model.jointPlacements[joint].translation))
+    if not _axes(model, kind)[:3].any():
+        return length
+    if kind.nq != 1:
+        return np.inf
+    return length + float(max(abs(model.lowerPositionLimit[kind.idx_q]), abs(model.upperPositionLimit[kind.idx_q])))
+
+
+def _axes(model: pin.Model, joint: Any) -> Array:
+    """(6, k) motions of a joint by its k degrees of freedom, in its own frame."""
+    data = joint.createData()
+    joint.calc(data, pin.neutral(model))
+    return np.asarray(data.S).reshape(6, -1)
