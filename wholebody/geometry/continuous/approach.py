@@ -27,38 +27,24 @@ def largest_approach(table: PairTable, centres: Array, most: Array) -> Array:
         most: (nv,) largest displacement of every degree of freedom, radians and metres; may be infinite.
     """
     model = table.model
-    moved = [_motion(model, joint, most) for joint in range(model.njoints)]
-    lengths = [_length(model, joint) for joint in range(model.njoints)]
-    own = centres + table.reach
-    first, second = table.joint[table.pairs].T
-    ways = np.zeros((2, len(table.pairs)))
-    for a, b in {*zip(first.tolist(), second.tolist(), strict=True)}:
-        here = (first == a) & (second == b)
-        for side, (joint, other) in enumerate(((a, b), (b, a))):
-            fixed, turn = _way(model, joint, other, moved, lengths)
-            if turn > 0.0:
-                ways[side, here] = fixed + turn * own[table.pairs[here, side]]
-            else:
-                ways[side, here] = fixed
-    return np.asarray(ways.sum(axis=0))
-
-
-def _way(
-    model: pin.Model, joint: int, other: int, moved: list[tuple[float, float]], lengths: list[float]
-) -> tuple[float, float]:
-    """Motion of what a joint carries by the joints that do not carry `other`: at its origin, and more a metre off."""
-    carrying, above = set(), other
-    while above > 0:
-        carrying.add(above)
-        above = int(model.parents[above])
-    fixed, turned, lever = 0.0, 0.0, 0.0
-    while joint > 0 and joint not in carrying:
-        slide, turn = moved[joint]
-        fixed += slide + (turn * lever if turn > 0.0 else 0.0)
-        turned += turn
-        lever += lengths[joint]
-        joint = int(model.parents[joint])
-    return fixed, turned
+    moved = np.array([_motion(model, joint, most) for joint in range(model.njoints)])
+    lengths = np.array([_length(model, joint) for joint in range(model.njoints)])
+    parents = np.array(list(model.parents), dtype=np.intp)
+    joint = table.joint[table.pairs]
+    fixed, turned, lever = np.zeros((3, *joint.shape))
+    with np.errstate(invalid="ignore"):  # an infinite lever of what does not turn
+        # a joint comes after the one that carries it: the later of two is never an ancestor of the other
+        while len(row := np.flatnonzero(joint[:, 0] != joint[:, 1])):
+            later = (row, (joint[row, 1] > joint[row, 0]).astype(np.intp))
+            number = joint[later]
+            slide, turn = moved[number].T
+            fixed[later] += slide + np.where(turn > 0.0, turn * lever[later], 0.0)
+            turned[later] += turn
+            lever[later] += lengths[number]
+            joint[later] = parents[number]
+        own = (centres + table.reach)[table.pairs]
+        ways = fixed + np.where(turned > 0.0, turned * own, 0.0)
+    return np.asarray(ways.sum(axis=1))
 
 
 def _motion(model: pin.Model, joint: int, most: Array) -> tuple[float, float]:
