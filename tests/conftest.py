@@ -28,6 +28,8 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # Pieces of meshes are made anew in every run of the tests, by the code under test.
 _CACHE = tempfile.TemporaryDirectory(prefix="wholebody-cache-")
 os.environ["WHOLEBODY_CACHE"] = _CACHE.name
+# Child processes keep the byte code of modules, as those of users do: without it each compiles 150 files again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 

@@ -90,3 +90,15 @@ def test_all_loops_are_compiled_by_one_call() -> None:
     for name in compiled.LOOPS:
         loops = vars(sys.modules[name].compiled_kernel()).values()
         assert any(loop.signatures for loop in loops if hasattr(loop, "signatures")), name
+
+
+def test_kept_loops_are_read_back_without_scipy(root: Path) -> None:
+    # numba's array functions (numba.np.arraymath) load scipy.linalg, a tenth of the time that `wholebody pose` needs.
+    compiled.compile_all()
+    code = (
+        "import sys, wholebody.compiled as c; c.compile_all();print(c.compile_seconds(), 'scipy.linalg' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
+    seconds, loaded = done.stdout.split()
+    if float(seconds) == 0.0:  # where no folder can be written to, nothing is kept
+        assert loaded == "False"

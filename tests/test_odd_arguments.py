@@ -23,8 +23,10 @@ import pytest
 import wholebody as wb
 from wholebody import tracking
 from wholebody.figures.state import State
+from wholebody.motion import measures
 from wholebody.view import Viewer
 from wholebody.view.parts import Part, Parts
+from wholebody.view.timeline import timeline
 
 ROOT = Path(__file__).resolve().parent.parent
 CIRCLE: list[Any] = []
@@ -115,6 +117,27 @@ ARM = """<robot name="arm">
   <link name="base"><collision><geometry><sphere radius="0.05"/></geometry></collision></link>
   {links}
 </robot>"""
+BVH = """HIERARCHY
+ROOT hips
+{
+OFFSET 0 0 0
+CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+JOINT b
+{
+OFFSET 0 0.5 0
+CHANNELS 3 Zrotation Xrotation Yrotation
+JOINT a
+{
+OFFSET 0 1 0
+CHANNELS 3 Zrotation Xrotation Yrotation
+}
+}
+}
+MOTION
+Frames: 1
+Frame Time: 0.1
+0 0 0 0 0 0 10 0 0 0 0 0
+"""
 LINK = """<link name="link{n}"><inertial><mass value="1"/>
   <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
   <collision><origin xyz="0 0 0.2"/><geometry><sphere radius="0.05"/></geometry></collision></link>
@@ -438,6 +461,66 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "drag_along", Call(tracking.drag_along, along)
     done = tracking.drag_along(ask, places, "qp")
     yield "judge_drag", Call(tracking.judge_drag, {"problem": ask, "dragged": done, "goal": 0})
+    clip = wb.Clip(arm, [q, q + 0.1], 0.1)  # type: ignore[arg-type]
+    yield "Clip", Call(wb.Clip, {"figure": arm, "q": [q, q], "dt": 0.1, "name": "it"}, lambda made: made.jerk())
+    yield "Clip.at", Call(clip.at, {"t": 0.05})
+    yield "Clip.resampled", Call(clip.resampled, {"dt": 0.05})
+    yield "Clip.joined", Call(clip.joined, {"other": clip})
+    yield "Clip.with_q", Call(clip.with_q, {"q": [q], "name": "other"})
+    yield "Clip.from_track", Call(wb.Clip.from_track, {"track": track, "figure": arm})
+    yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
+    for method in ("mirrored", "velocities", "accelerations", "jerk"):
+        yield f"Clip.{method}", Call(getattr(wb.Clip(hand, [hand.neutral], 0.1), method), {})  # type: ignore[arg-type]
+    yield "Strength", Call(wb.Strength, {"percentile": 50.0, "sex": "female"}, lambda made: made.limits(arm))
+    yield "Strength.limits", Call(wb.Strength().limits, {"figure": arm})
+    found = wb.torques(clip)
+    yield "Torques.largest", Call(found.largest, {})
+    yield "torques", Call(wb.torques, {"clip": clip, "friction": 0.5, "cutoff": 6.0, "strength": wb.Strength()})
+    yield "Clip(frames)", Call(lambda frames: clip[frames], {"frames": slice(0, 1)})
+    clip.write(path / "walk.npz")
+    (path / "walk.bvh").write_text(BVH)
+    skeleton = wb.read_skeleton(path / "walk.bvh")
+    yield "read_skeleton", Call(wb.read_skeleton, {"path": path / "walk.bvh", "unit": "metres", "up": "y"})
+    moving_skeleton = {
+        "names": ("hips", "head"), "parents": [-1, 0], "offsets": np.zeros((2, 3)),
+        "dt": 0.1, "name": "it", "notes": (),
+        "rotations": np.tile(np.eye(3), (3, 2, 1, 1)), "positions": np.zeros((3, 2, 3)),
+    }  # fmt: skip
+    yield "SkeletonMotion", Call(wb.SkeletonMotion, moving_skeleton, lambda made: made.rest())
+    yield "SkeletonMotion.part", Call(skeleton.part, {"first": 0, "last": 1})
+    local = {**moving_skeleton, "local": np.tile(np.eye(3), (3, 2, 1, 1)), "root": np.zeros((3, 3))}
+    del local["rotations"], local["positions"]
+    yield "SkeletonMotion.moved", Call(wb.SkeletonMotion.moved, local)
+    for method in ("rest", "reversed", "length"):
+        yield f"SkeletonMotion.{method}", Call(getattr(skeleton, method), {})
+    bones = {
+        "skeleton": {"left_wrist": "a", "left_elbow": "b"},
+        "figure": {"left_wrist": "link4", "left_elbow": "link2"},
+    }
+    yield "retarget", Call(wb.retarget, {"motion": skeleton, "figure": arm, "names": bones, "progress": print})
+    yield "read_clip", Call(wb.read_clip, {"path": path / "walk.npz", "figure": arm})
+    checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done: None}
+    yield "check", Call(wb.check, checked, lambda found: found.as_dict())
+    avoided = {"clip": clip, "scene": wb.Scene(arm), "constraints": [], "progress": lambda told: None}
+    yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
+    for method in (wb.Trajectory, wb.PerFrame, wb.Fade):
+        yield f"{method.__name__}.avoid", Call(method().avoid, avoided)
+    settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "solver": "osqp", "iterations": 10}
+    yield "Trajectory", Call(wb.Trajectory, settings)
+    yield "PerFrame", Call(wb.PerFrame, {"clearance": 0.01, "backward": True})
+    yield "Fade", Call(wb.Fade, {"clearance": 0.01, "fade": 0.2, "rounds": 2})
+    stance = {"feet": ["link1"], "speed": 0.1, "height": 0.05, "least": 0.1}
+    yield "StanceFeet", Call(wb.StanceFeet, stance, lambda made: made.names(arm))
+    yield "StanceFeet.names", Call(wb.StanceFeet(["link1"]).names, {"figure": arm})
+    yield "timeline", Call(timeline, {"found": wb.check(clip), "scene": wb.Scene(arm)})
+    pair = {"before": clip, "after": clip}
+    for measure in (measures.deviation, measures.jerk_ratio, measures.foot_sliding):
+        yield measure.__name__, Call(measure, pair)
+    one = wb.Clip(hand, [hand.neutral], 0.1)  # type: ignore[arg-type]
+    held = {"before": one, "after": one, "hand": "right_palm", "other": "left_palm"}
+    yield "hand_error", Call(measures.hand_error, held)
+    yield "share_deeper", Call(measures.share_deeper, {"found": wb.check(clip), "depth": 0.01})
+    yield "ClipCheck.as_dict", Call(wb.check(clip).as_dict, {})
     yield "spread", Call(tracking.spread, {"corners": places, "frames": 3, "dt": 0.1})
     yield "circle", Call(tracking.circle, {"center": at, "radius": 0.1, "normal": at})
     yield "read_path", Call(tracking.read_path, {"path": path / "path.txt"})
@@ -485,6 +568,8 @@ ANSWERS = (
     "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "TraceEntry", "Assessment",
     "Task", "Step", "QPStep", "Simplified", "LeftOut",
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
+    "Scene.of_parts", "ClipCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
+    "Recording", "Torques", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
     "Scene.of_parts",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""

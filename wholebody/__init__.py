@@ -35,6 +35,18 @@ if TYPE_CHECKING:
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
+    from wholebody.motion.avoidance import AvoidanceReport, Avoided, avoid
+    from wholebody.motion.checking import ClipCheck, check
+    from wholebody.motion.clip import Clip
+    from wholebody.motion.fade import Fade
+    from wholebody.motion.per_frame import PerFrame
+    from wholebody.motion.reading import read_clip, read_skeleton
+    from wholebody.motion.retargeting import retarget
+    from wholebody.motion.skeleton import SkeletonMotion
+    from wholebody.motion.stance import StanceFeet
+    from wholebody.motion.strength import Strength
+    from wholebody.motion.torques import Torques, torques
+    from wholebody.motion.trajectory.method import Trajectory
     from wholebody.problem import Problem
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
@@ -72,12 +84,16 @@ __all__ = [
     "QP",
     "Assembly",
     "Assessment",
+    "AvoidanceReport",
+    "Avoided",
     "Axis",
     "Balance",
     "Bound",
     "Box",
     "Capsule",
     "CenterOfMass",
+    "Clip",
+    "ClipCheck",
     "Constraint",
     "DampedLeastSquares",
     "Discomfort",
@@ -85,6 +101,7 @@ __all__ = [
     "Drag",
     "Effort",
     "Ellipsoid",
+    "Fade",
     "Figure",
     "FileFormatError",
     "Frame",
@@ -99,6 +116,7 @@ __all__ = [
     "MissingPackageError",
     "Newton",
     "Orientation",
+    "PerFrame",
     "Placo",
     "Plane",
     "Point",
@@ -109,20 +127,31 @@ __all__ = [
     "Relative",
     "Scene",
     "Shape",
+    "SkeletonMotion",
     "Solution",
     "Sphere",
+    "StanceFeet",
     "StepLimit",
+    "Strength",
     "Task",
+    "Torques",
+    "Trajectory",
     "UnknownNameError",
     "Viewer",
     "WholebodyError",
     "__version__",
     "assess",
+    "avoid",
+    "check",
     "follow_path",
     "load",
+    "read_clip",
+    "read_skeleton",
     "read_task",
+    "retarget",
     "simplify",
     "solve",
+    "torques",
 ]
 
 _MODULES = {
@@ -138,6 +167,18 @@ _MODULES = {
     "wholebody.tracking.path_following": "follow_path",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
+    "wholebody.motion.avoidance": "AvoidanceReport Avoided avoid",
+    "wholebody.motion.checking": "ClipCheck check",
+    "wholebody.motion.clip": "Clip",
+    "wholebody.motion.reading": "read_clip read_skeleton",
+    "wholebody.motion.retargeting": "retarget",
+    "wholebody.motion.skeleton": "SkeletonMotion",
+    "wholebody.motion.fade": "Fade",
+    "wholebody.motion.per_frame": "PerFrame",
+    "wholebody.motion.strength": "Strength",
+    "wholebody.motion.torques": "Torques torques",
+    "wholebody.motion.stance": "StanceFeet",
+    "wholebody.motion.trajectory.method": "Trajectory",
     "wholebody.problem": "Problem",
     "wholebody.scene": "Scene",
     "wholebody.simplification.simplify": "simplify",

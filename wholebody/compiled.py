@@ -16,12 +16,15 @@ from typing import Any, TypeVar
 LOOPS = (
     "wholebody.geometry.contact_rows",
     "wholebody.geometry.continuous.moved_pairs",
+    "wholebody.geometry.continuous.swept_depth",
     "wholebody.geometry.proximity",
     "wholebody.linearisation",
     "wholebody.methods.ccd.limbs",
-    "wholebody.methods.newton.linear_algebra.gram",
+    "wholebody.methods.newton.linear_algebra.normal_equations",
     "wholebody.methods.qp.active_set",
+    "wholebody.methods.qp.curved_reach",
     "wholebody.methods.qp.solvers.osqp_solver",
+    "wholebody.methods.qp.step_program",
     "wholebody.methods.qp.subproblem",
 )
 """Modules with compiled loops; each has a function `compiled_kernel`, which compiles or loads them."""

@@ -65,6 +65,40 @@ class Linearisation(NamedTuple):
     upper: Array
 
 
+_NO_CONTACTS = Contacts(
+    np.zeros((0, 2), dtype=np.intp), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)),
+    np.zeros(0, dtype=np.intp), np.zeros((0, 4, 3)),
+)  # fmt: skip
+
+
+class Passing(NamedTuple):
+    """A linearisation in as few arrays as can be; `Linearisation` says what they mean.
+
+    Attributes:
+        q: (nq,) the posture.
+        goals: how many rows goals have.
+        value: (g + c,) errors of the goals, then values of the constraints.
+        jacobian: (g + c + r, nv) their rows, then those of the gaps.
+        contacts: the pairs near enough to count.
+        gap: (r,) gaps of the contact rows.
+        gap_contact: (r,) the contact a row belongs to.
+        clearance: (r,) least gap asked of each row.
+        measure: (2, nv + 1) derivative and curvature of the measures; the last column holds their sum.
+        box: (2, nv) lower and upper bounds on dq.
+    """
+
+    q: Array
+    goals: int
+    value: Array
+    jacobian: Array
+    contacts: Contacts
+    gap: Array
+    gap_contact: Indices
+    clearance: Array
+    measure: Array
+    box: Array
+
+
 class Lineariser:
     """Linearises one problem at many postures, in the room of one run.
 
@@ -101,6 +135,7 @@ class Lineariser:
         self._kernel = compiled_kernel()
         self.goals: Sequence[Goal] = goals
         self._plan = self._planned(goals)
+        self._passing: Passing | None = None
         self._grow(64)
         self._approach = self._largest_approach()
         self.take(goals, clearances)
@@ -116,10 +151,21 @@ class Lineariser:
             raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
         if goals is not self.goals:
             again = self._plan.with_goals(goals, self.state.model)
-            self._plan = self._planned(goals) if again is None else again
+            if again is None or any(np.size(term.value(self.state)) != term.rows for term in again.others):
+                self._plan, self._passing = self._planned(goals), None
+            else:
+                self._plan = again
         self.goals, self.clearances = goals, clearances
-        self._largest_clearance = float(clearances.max()) if len(clearances) else 0.0
+        self._largest_clearance = float(np.maximum.reduce(clearances)) if len(clearances) else 0.0
         self._most = None if self._approach is None else clearances + self._approach
+
+    def goal_rows(self) -> list[int]:
+        """How many rows each goal has."""
+        others = iter(self._plan.others)
+        return [
+            next(others).rows if entries is None else sum(entry.rows for entry in entries)
+            for entries in self._plan.goals
+        ]
 
     def relaxed(self, depth: float) -> Lineariser:
         """The same, with less distance asked of every pair by `depth` metres; both move one workspace."""
@@ -135,18 +181,60 @@ class Lineariser:
         Raises:
             InputError: q is no posture, or a term of one's own has another number of rows than at the start.
         """
-        state, workspace, plan = self.state, self.workspace, self._plan
+        contacts, clearance, count = self._contacts(q, within)
+        nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
+        value, jacobian = np.empty(rows), np.empty((rows + count, nv))
+        box, measure = np.empty((2, nv)), np.empty((2, nv + 1))
+        self._terms(count, value, jacobian, box, measure)
+        goals, contact = self._plan.goal_rows, self._contact[:count].copy()
+        return Linearisation(
+            self.state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts,
+            self._gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
+            measure[0, :nv], measure[1, :nv], box[0], box[1],
+        )  # fmt: skip
+
+    def passing(self, q: Array, within: float) -> Passing:
+        """What `at` returns, in arrays that the next call of this overwrites.
+
+        Raises:
+            InputError: as for `at`.
+        """
+        contacts, clearance, count = self._contacts(q, within)
+        if self._passing is None or len(self._passing.jacobian) < len(self._passing.value) + count:
+            self._passing = self._made()
+        room = self._passing
+        jacobian = room.jacobian[: len(room.value) + count]
+        self._terms(count, room.value, jacobian, room.box, room.measure)
+        contact = self._contact[:count]
+        return Passing(
+            self.state.q, room.goals, room.value, jacobian, contacts, self._gap[:count], contact, clearance[contact],
+            room.measure, room.box,
+        )  # fmt: skip
+
+    def _made(self) -> Passing:
+        nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
+        none = np.zeros(0)
+        return Passing(
+            none, self._plan.goal_rows, np.empty(rows), np.empty((rows + len(self._gap), nv)), _NO_CONTACTS, none,
+            none.astype(np.intp), none, np.empty((2, nv + 1)), np.empty((2, nv)),
+        )  # fmt: skip
+
+    def _contacts(self, q: Array, within: float) -> tuple[Contacts, Array, int]:
+        """Contacts at a posture, the clearance asked of each, and how many rows were written of them."""
+        workspace = self.workspace
         contacts = workspace.near(q, within + self._largest_clearance, self._most)
         clearance = self.clearances[contacts.number]
         if len(clearance) * (1 + MOST_ENDS) > len(self._gap):
             self._grow(2 * len(clearance))
         count = workspace.rows.write(contacts, clearance, self._wrench, self._gap, self._contact, self._joints)
-        nv, rows = state.model.nv, plan.goal_rows + plan.value_rows
-        value, jacobian = np.empty(rows), np.empty((rows + count, nv))
-        box, measure = np.empty((2, nv)), np.empty((2, nv + 1))
+        return contacts, clearance, count
+
+    def _terms(self, count: int, value: Array, jacobian: Array, box: Array, measure: Array) -> None:
+        """Write all terms where the state is, and the Jacobian of `count` rows of contacts."""
+        state, plan = self.state, self._plan
         self._kernel.linearise(
-            state.joints, state.jacobian.T, plan.support, state.q, plan.floats, plan.integers, plan.layout,
-            self._wrench, self._joints, count, np.empty((rows, 6)), value, jacobian, box, measure,
+            state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
+            self._wrench, self._joints, count, self._term_wrench, value, jacobian, box, measure,
         )  # fmt: skip
         if plan.others:
             self._evaluate(plan.others, value, jacobian)
@@ -154,15 +242,11 @@ class Lineariser:
             self._bound(plan.other_bounds, box)
         if plan.other_measures:
             self._measure(plan.other_measures, measure)
-        goals, contact = plan.goal_rows, self._contact[:count].copy()
-        return Linearisation(
-            state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts,
-            self._gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
-            measure[0, :nv], measure[1, :nv], box[0], box[1],
-        )  # fmt: skip
 
     def _planned(self, goals: Sequence[Goal]) -> TermPlan:
-        return make_plan(self._limits, goals, self.constraints, self.bounds, self.measures, self.dt, self.state)
+        plan = make_plan(self._limits, goals, self.constraints, self.bounds, self.measures, self.dt, self.state)
+        self._term_wrench = np.empty((plan.goal_rows + plan.value_rows, 6))
+        return plan
 
     def _largest_approach(self) -> Array | None:
         """Most by which every pair (pairs,) can come nearer in a step; None where speeds are not bounded."""
@@ -177,12 +261,15 @@ class Lineariser:
         rows = contacts * (1 + MOST_ENDS)
         self._wrench, self._gap = np.zeros((rows, 6)), np.zeros(rows)
         self._contact, self._joints = np.zeros(rows, dtype=np.intp), np.zeros((rows, 2), dtype=np.intp)
+        self._passing = None
 
     def _evaluate(self, others: Sequence[OtherTerm], value: Array, jacobian: Array) -> None:
         """Write values and rows of terms of other classes."""
         state = self.state
         for term, evaluate, row, rows in others:
-            part, derivative = np.atleast_1d(evaluate(state)), term.jacobian(state)
+            part, derivative = evaluate(state), term.jacobian(state)
+            if np.ndim(part) != 1:
+                part = np.atleast_1d(part)
             checked_rows(term, part, derivative, rows)
             value[row : row + rows] = part
             dense = state.wrench_jacobian(derivative) if isinstance(derivative, Wrench) else derivative
@@ -211,7 +298,7 @@ def compiled_kernel() -> Any:
     plan = make_plan(Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0))), (), (), (), (), None, state)
     nv = state.model.nv
     term_kernel.linearise(
-        state.joints, state.jacobian.T, plan.support, state.q, plan.floats, plan.integers, plan.layout,
+        state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
         np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp), 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
         np.zeros((2, nv)), np.zeros((2, nv + 1)),
     )  # fmt: skip

@@ -103,8 +103,8 @@ def third_differences(model: pin.Model, q: Array, dt: float) -> Array:
 
 
 def root_mean_square(values: Array) -> Array:
-    """(n,) root mean square of each row of (n, k)."""
-    return np.asarray(np.sqrt((values**2).mean(axis=1)))
+    """(n,) root mean square of each row of (n, k); 0 where the rows are empty."""
+    return np.asarray(np.sqrt((values**2).sum(axis=1) / max(1, values.shape[1])))
 
 
 def passed(scene: Scene, q: Array, depth: float) -> tuple[int, ...]:

@@ -169,7 +169,7 @@ class Scene:
             to: the segment or frame that carries it.
             name: a name that nothing else in the scene has.
             at: its placement in that frame; as for `add`.
-            rests_on: more segments that it is not tested against.
+            rests_on: more segments, and carried things, that it is not tested against.
             color: red, green, blue and, if wanted, alpha, each from 0 to 1.
 
         Raises:
@@ -179,8 +179,11 @@ class Scene:
         self.frame_id(to)
         name = self._new_name(name)
         rests = tuple(checks.listed(rests_on, f"attach {name!r}: rests_on", "['thorax']"))
-        for segment in rests:
-            checks.known(segment, self.figure.segments, "segment", f"attach {name!r}: rests_on")
+        carried = [thing.name for thing in self._objects.values() if thing.segment is not None]
+        for other in rests:
+            checks.known(
+                other, {*self.figure.segments, *carried}, "segment or carried thing", f"attach {name!r}: rests_on"
+            )
         return self._put(name, shape, at, color, to, rests)
 
     def move(self, name: str, *, at: Any) -> Scene:

@@ -36,7 +36,7 @@ class SceneObject:
         placement: in the world, or in the segment's frame for a carried thing.
         segment: the segment that carries it; None for a thing in the world.
         color: red, green, blue, alpha from 0 to 1, or None for the viewer's choice.
-        rests_on: segments that a carried thing is not tested against.
+        rests_on: segments and carried things that a carried thing is not tested against.
     """
 
     name: str
@@ -181,6 +181,8 @@ def _leaning(
 
     found: dict[tuple[str, str], str] = {}
     for name, thing in carried.items():
+        # A thing rests on things that were attached before it, whose pieces come first.
+        found.update({(other, name): "said to rest on it" for other in thing.rests_on if other in carried})
         carrier = figure.model.frames[figure.frame_id(str(thing.segment))].parentJoint
         for segment in dict.fromkeys(segments):
             near = [other for other, joint in joint_of.items() if joint == carrier]

@@ -43,6 +43,9 @@ def deepest(problem: wb.Problem, q: Any) -> tuple[float, str]:
     model, pieces, owners = scene.model, scene.geometry.geometryObjects, scene.piece_owner
     data = model.createData()
     pin.forwardKinematics(model, data, q)
+    places = [data.oMi[piece.parentJoint] * piece.placement for piece in pieces]
+    turned = [coal.Transform3s(place.rotation, place.translation) for place in places]
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
     least, where = np.inf, ""
     for second, thing in enumerate(pieces):
         if owners[second] in scene.figure.segments:
@@ -51,11 +54,8 @@ def deepest(problem: wb.Problem, q: Any) -> tuple[float, str]:
             pair = owners[first], owners[second]
             if thing.parentJoint == other.parentJoint == 0 or pair in REST_ON or pair[0] == pair[1]:
                 continue
-            placed = [data.oMi[piece.parentJoint] * piece.placement for piece in (other, thing)]
-            turned = [coal.Transform3s(place.rotation, place.translation) for place in placed]
-            distance = coal.distance(
-                other.geometry, turned[0], thing.geometry, turned[1], coal.DistanceRequest(), coal.DistanceResult()
-            )
+            result.clear()
+            distance = coal.distance(other.geometry, turned[first], thing.geometry, turned[second], request, result)
             if distance < least:
                 least, where = distance, f"{pair[0]} and {pair[1]}"
     return least, where

@@ -1,11 +1,10 @@
-"""What the tests of this room share: a small scene, and distances pair by pair in coal."""
+"""What the tests of this room share: a small scene, and distances of all pairs by Pinocchio."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -28,21 +27,11 @@ def scene(hand: wb.Figure) -> wb.Scene:
 
 @pytest.fixture(scope="session")
 def least() -> Least:
-    """Least signed distance of all collision pairs, by Pinocchio's kinematics and one call of coal a pair."""
+    """Least signed distance of all collision pairs, by Pinocchio's kinematics and distances, without a guess."""
 
     def measure(scene: wb.Scene, q: Any) -> float:
-        data = scene.model.createData()
-        pin.forwardKinematics(scene.model, data, np.asarray(q))
-        pieces = scene.geometry.geometryObjects
-        places = [data.oMi[piece.parentJoint] * piece.placement for piece in pieces]
-        turned = [coal.Transform3s(place.rotation, place.translation) for place in places]
-        request = coal.DistanceRequest()
-        return min(
-            coal.distance(
-                pieces[pair.first].geometry, turned[pair.first], pieces[pair.second].geometry, turned[pair.second],
-                request, coal.DistanceResult(),
-            )
-            for pair in scene.geometry.collisionPairs
-        )  # fmt: skip
+        data, results = scene.model.createData(), scene.geometry.createData()
+        pin.computeDistances(scene.model, data, scene.geometry, results, np.asarray(q))
+        return min(result.min_distance for result in results.distanceResults)
 
     return measure

@@ -17,11 +17,10 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench import plot_style
 from wholebody.bench.adapters import adapters
-from wholebody.bench.closed import said
 from wholebody.bench.problem_sets.bodies import CLEARANCE, TIPS
 from wholebody.bench.problem_sets.reaching import THINGS, reach_among
 from wholebody.bench.report import render
-from wholebody.bench.tables import filled
+from wholebody.bench.tables import filled, programs_text
 
 TOLERANCE = 1e-5  # m, rad: what methods are asked for
 
@@ -89,7 +88,7 @@ def solve_reach(seed: int, method: str, figure: wb.Figure | None = None) -> Reac
         judged,
         seed=seed,
         method=method,
-        programs=said(solution.programs),
+        programs=programs_text(solution.programs),
         how=solution.message.removeprefix("solved "),
         milliseconds=1e3 * solution.seconds,
         witness_measure=wb.assess(made.problem, made.witness).measure,
@@ -123,7 +122,7 @@ def reach_times(rows: Sequence[ReachRow], path: Path) -> tuple[Path, Path]:
         mine = [row for row in rows if row.method == method]
         times = np.sort([row.milliseconds for row in mine if row.status == "solved"])
         share = 100.0 * np.arange(1, len(times) + 1) / len(mine)
-        color = plot_style.look(method).color
+        color = plot_style.method_style(method).color
         axis.step(times, share, where="post", color=color, linewidth=1.8, label=method)
     plot_style.plain_log(axis)
     axis.set(ylim=(0.0, 103.0), xlabel="time of a solve [ms]", ylabel="reaches solved [%]")

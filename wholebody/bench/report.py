@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wholebody.bench.closed import summed
 from wholebody.bench.machine import sentence
+from wholebody.bench.tables import summed_programs
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -51,7 +51,7 @@ def _environment() -> Environment:
         "quantile": quantile,
         "scaled": scaled,
         "strong": strong,
-        "summed": summed,
+        "summed": summed_programs,
         "upfirst": upfirst,
         "words": words,
     }

@@ -14,8 +14,8 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.bench.adapters.base import Adapter
-from wholebody.bench.closed import said
 from wholebody.bench.report import render
+from wholebody.bench.tables import programs_text
 from wholebody.errors import WholebodyError
 from wholebody.files import Scratch
 
@@ -107,7 +107,7 @@ def measure(task: Path, adapter: Adapter, count: int) -> list[SolveRow]:
                 pairs=len(used.scene.geometry.collisionPairs),
                 status=unsolved[0] if unsolved else "solved",
                 iterations=int(np.median([solution.iterations for solution in solutions])),
-                programs=said(solutions[-1].programs),
+                programs=programs_text(solutions[-1].programs),
                 median_ms=float(np.median(wall)),
                 p95_ms=float(np.quantile(wall, 0.95)),
                 cpu_median_ms=float(np.median(cpu)),

@@ -18,9 +18,8 @@ from wholebody.bench import track as setting
 from wholebody.bench.adapters import make_tool
 from wholebody.bench.adapters.base import Tool
 from wholebody.bench.adapters.own import WholebodyTool
-from wholebody.bench.closed import said
 from wholebody.bench.report import render
-from wholebody.bench.tables import filled
+from wholebody.bench.tables import filled, programs_text
 from wholebody.bench.track import CLEARANCE, DT, Track, Verdict, judge
 from wholebody.errors import InputError
 
@@ -200,7 +199,7 @@ def _row(track: Track, name: str, runs: dict[str, list[_Run]], verdict: Verdict)
         near=float(verdict.near.mean()),
         touching=float(verdict.touching.mean()),
         failures=mine[0].tool.failures,
-        programs=said(mine[0].tool.programs()),
+        programs=programs_text(mine[0].tool.programs()),
         **{name: told.get(name, float("nan")) for name in ("rows", "exact")},
     )
 

@@ -1,11 +1,12 @@
-"""Results as files: CSV with the machine at its head, and sections of the documentation between two markers."""
+"""Results as files: CSV with the machine at its head, texts of its cells, sections of pages between two markers."""
 
 from __future__ import annotations
 
 import csv
 import dataclasses
 import io
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
@@ -65,6 +66,21 @@ def filled(kind: type[_R], *sources: object, **values: Any) -> _R:
     for name in names:
         values[name] = next(getattr(source, name) for source in sources if hasattr(source, name))
     return kind(**values)
+
+
+def programs_text(programs: Mapping[str, int]) -> str:
+    """How many programs each solver closed, most first, such as "active set 7, osqp 1"; empty where there were none."""
+    return ", ".join(f"{by} {count}" for by, count in sorted(programs.items(), key=lambda entry: (-entry[1], entry[0])))
+
+
+def summed_programs(texts: Iterable[str]) -> str:
+    """Several texts of `programs_text` as one."""
+    total: Counter[str] = Counter()
+    for text in filter(None, texts):
+        for part in text.split(", "):
+            by, _, count = part.rpartition(" ")
+            total[by] += int(count)
+    return programs_text(total)
 
 
 def replace_section(path: Path, name: str, text: str) -> None:

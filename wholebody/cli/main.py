@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from wholebody.cli import bench, demo, doctor, drag, figure, interact, pose, show
+from wholebody.cli import bench, clip, demo, doctor, drag, figure, interact, pose, show
 from wholebody.errors import WholebodyError
 from wholebody.version import __version__
 
@@ -31,7 +31,7 @@ def parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="wholebody", description=DESCRIPTION, epilog=EXIT_CODES, formatter_class=shape)
     top.add_argument("--version", action="version", version=f"wholebody {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command in (pose, show, figure, demo, interact, drag, bench, doctor):
+    for command in (pose, show, figure, demo, interact, drag, clip, bench, doctor):
         command.add_to(commands)
     return top
 

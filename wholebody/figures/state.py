@@ -14,6 +14,7 @@ from wholebody.checks import instance, posture, whole
 from wholebody.errors import InputError
 from wholebody.geometry.memory_views import placement_view
 
+DOUBLE = np.dtype(np.float64)
 UNIT_TOLERANCE = 1e-3  # how far a quaternion's length may be from 1 before it is taken for a mistake
 
 
@@ -42,6 +43,7 @@ class State:
     Attributes:
         jacobian: (6, n) columns of the joints, world frame. n is nv, and one more for each degree of freedom of a joint
             that follows another (mimic): `folded` and `spread` translate.
+        columns: (n, 6) the same, transposed.
         support: (njoints, n) 1 where a column moves a joint, else 0.
         column_joint: (n,) the joint that a column belongs to.
         parents: (njoints,) the joint that carries each joint.
@@ -59,7 +61,9 @@ class State:
         self._columns = extended_columns(model)
         if self._columns is not None:
             self._fold = np.eye(model.nv)[self._columns]
-        self.jacobian: Array = np.zeros((6, self.support.shape[1]), order="F")
+        self._nq = model.nq
+        self._take_jacobian()
+        self._shared = np.shares_memory(self.jacobian, self.data.J)
         self._joints = placement_view(self.data.oMi)
         self._frames: dict[int, pin.SE3] = {}
         self._center_of_mass: Array | None = None
@@ -72,19 +76,24 @@ class State:
         Raises:
             InputError: q has the wrong shape, or a value that is not finite.
         """
-        usual = type(q) is np.ndarray and q.dtype == np.float64 and q.shape == (self.model.nq,)
+        usual = type(q) is np.ndarray and q.dtype is DOUBLE and q.shape == (self._nq,)
         if not usual or not isfinite(q.dot(q)):
-            q = posture(q, self.model.nq)
+            q = posture(q, self._nq)
         if not pin.isNormalized(self.model, q, UNIT_TOLERANCE):
             raise InputError(
                 "the posture's quaternion is not of unit length; normalise it with pin.normalize(model, q)"
             )
         pin.computeJointJacobians(self.model, self.data, q)
         self.q = q
-        self.jacobian = self.data.J.reshape(6, -1)  # of one degree of freedom Pinocchio gives (6,)
+        if not self._shared:
+            self._take_jacobian()
         self._frames.clear()
         self._center_of_mass = None
         return self
+
+    def _take_jacobian(self) -> None:
+        self.jacobian: Array = self.data.J.reshape(6, -1)  # of one degree of freedom Pinocchio gives (6,)
+        self.columns: Array = self.jacobian.T
 
     @property
     def joints(self) -> Array:
@@ -129,7 +138,10 @@ class State:
 
     def wrench_jacobian(self, wrench: Wrench) -> Array:
         """Jacobian (m, nv) of one `Wrench`."""
-        return self.folded((wrench.rows @ self.jacobian) * (self.support[wrench.joint] - self.support[wrench.against]))
+        moved = self.support[wrench.joint]
+        if wrench.against:
+            moved = moved - self.support[wrench.against]
+        return self.folded((wrench.rows @ self.jacobian) * moved)
 
     def folded(self, rows: Array) -> Array:
         """Rows (k, nv) of rows (k, n) over the columns of `jacobian`: joints that follow another move with it."""

@@ -139,9 +139,10 @@ class Proximity:
         self._kernel = compiled_kernel()
         count, pairs = self.geometry.ngeoms, len(table.pairs)
         self._singly = pairs >= SINGLY
-        self._active = np.zeros((0, 0) if self._singly else (count, count), dtype=bool, order="F")
+        side = 2 if self._singly else max(count, 2)  # numba takes a matrix of one entry for another type
+        self._active = np.zeros((side, side), dtype=bool, order="F")
         self._index = np.zeros(pairs, dtype=np.intp)
-        self._marked = self._index[:0]
+        self._marked, self._count = np.zeros(0 if self._singly else pairs, dtype=np.intp), 0
         self._travelled, self._bound = np.zeros(count), np.full(pairs, -np.inf)
         self._endless = np.full(pairs, np.inf)
         self._last, self._extent = np.zeros((count, 4, 3)), np.zeros((count, 3))
@@ -190,10 +191,9 @@ class Proximity:
     def _asked(self, placements: Array, within: float, most: Array) -> Indices:
         """Compute with coal the distances of all pairs that can be nearer than `within`; their indices."""
         table, kernel = self.table, self._kernel
-        kernel.travel(placements, self._last, table.reach, self._travelled)
-        count = kernel.cull(
-            placements, table.pairs, table.reach, table.half, self._travelled, self._bound, self._extent, within,
-            most, self._index,
+        count, others = kernel.look(
+            placements, self._last, table.pairs, table.reach, table.half, self._travelled, self._bound, self._extent,
+            within, most, self._index, self._active, self._marked, self._count,
         )  # fmt: skip
         index = self._index[:count]
         self.asked += count
@@ -203,9 +203,9 @@ class Proximity:
             for number in index.tolist():
                 pin.computeDistance(self.geometry, self.results, number)
             return index
-        kernel.mark(self._active, table.pairs, self._marked, index)
-        self._marked = index.copy()
-        self.results.setActiveCollisionPairs(self.geometry, self._active, True)
+        if others:
+            self._count = count
+            self.results.setActiveCollisionPairs(self.geometry, self._active, True)
         pin.computeDistances(self.geometry, self.results)
         return index
 
@@ -249,11 +249,12 @@ def compiled_kernel() -> Any:
 
     placement, one, none = np.zeros((1, 4, 3)), np.zeros(1), np.zeros(0)
     index, pairs = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
-    proximity_kernel.travel(placement, placement.copy(), one, one.copy())
-    proximity_kernel.cull(placement, pairs, one, np.zeros((1, 3)), one, none, np.zeros((1, 3)), 0.0, none, index)
+    proximity_kernel.look(
+        placement, placement.copy(), pairs, one, np.zeros((1, 3)), one.copy(), none, np.zeros((1, 3)), 0.0, none, index,
+        np.zeros((2, 2), dtype=bool, order="F"), index, 0,
+    )  # fmt: skip
     proximity_kernel.gather(
         np.zeros((0, 20))[:, :10], index, pairs, none, one, none, 0.0, 0.0, none, np.zeros((0, 10)), index,
         pairs,
     )  # fmt: skip
-    proximity_kernel.mark(np.zeros((1, 1), dtype=bool, order="F"), pairs, index, index)
     return proximity_kernel

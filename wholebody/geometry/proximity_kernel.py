@@ -153,9 +153,49 @@ def gather(
 
 
 @compiled()
-def mark(active: NDArray[np.bool_], pairs: Indices, before: Indices, index: Indices) -> None:
-    """Set the entries (first, second) of the pairs `index` in a matrix that has those of `before`."""
-    for p in before:
-        active[pairs[p, 0], pairs[p, 1]] = False
-    for p in index:
-        active[pairs[p, 0], pairs[p, 1]] = True
+def mark(active: NDArray[np.bool_], pairs: Indices, marked: Indices, before: int, index: Indices, count: int) -> bool:
+    """Set the entries (first, second) of the pairs ``index[:count]`` in a matrix that has those of ``marked[:before]``.
+
+    Both become the same pairs.
+
+    Returns:
+        Whether they were others before.
+    """
+    same = before == count
+    for k in range(count):
+        same = same and marked[k] == index[k]
+    if same:
+        return False
+    for k in range(before):
+        active[pairs[marked[k], 0], pairs[marked[k], 1]] = False
+    for k in range(count):
+        marked[k] = index[k]
+        active[pairs[index[k], 0], pairs[index[k], 1]] = True
+    return True
+
+
+@compiled()
+def look(
+    placement: Array,
+    last: Array,
+    pairs: Indices,
+    reach: Array,
+    half: Array,
+    travelled: Array,
+    bound: Array,
+    extent: Array,
+    within: float,
+    most: Array,
+    index: Indices,
+    active: NDArray[np.bool_],
+    marked: Indices,
+    before: int,
+) -> tuple[int, bool]:
+    """`travel`, `cull` and, where there is room in `marked`, `mark`.
+
+    Returns:
+        How many pairs may be near, and whether they are others than those that were marked.
+    """
+    travel(placement, last, reach, travelled)
+    count = cull(placement, pairs, reach, half, travelled, bound, extent, within, most, index)
+    return count, len(marked) > 0 and count > 0 and mark(active, pairs, marked, before, index, count)

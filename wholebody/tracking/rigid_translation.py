@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.errors import InputError
-from wholebody.geometry.continuous.bisection import last_free
+from wholebody.geometry.continuous.passing_through import last_free
 from wholebody.geometry.penetration import global_depth
 from wholebody.scene import Scene
 from wholebody.tracking.overlap_strategy import Resolution

@@ -111,12 +111,13 @@ if __name__ == "__main__":
 """
 
 
-def test_a_killed_run_goes_on_where_it_was(fakes: ModuleType, tmp_path: Path) -> None:
+def test_a_killed_run_goes_on_where_it_was(fakes: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FAKES_SLEEP", "0.01")
     asked = settings(fakes, "solves", "sleeps", cases=6)
     script, folder = tmp_path / "run.py", tmp_path / "killed"
     script.write_text(SCRIPT)
     call = [sys.executable, str(script), str(Path(fakes.__file__).parent), str(folder)]
-    slowly = os.environ | {"FAKES_SLEEP": "2.0"}  # or it may be over before it is killed
+    slowly = os.environ | {"FAKES_SLEEP": "1.0"}  # or it may be over before it is killed
     process = subprocess.Popen(call, start_new_session=True, env=slowly)
     lines = folder / NAME
     end = time.monotonic() + 200.0

@@ -8,7 +8,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.geometry.continuous.moved_pairs import Placed
-from wholebody.geometry.continuous.passing_through import doubtful_pairs, first_passed, passes_through
+from wholebody.geometry.continuous.passing_through import doubtful_pairs, first_passed, last_free, passes_through
 
 WITHIN = 0.05
 
@@ -121,3 +121,17 @@ def test_turning_bodies_are_judged_by_their_farthest_points(free_bodies):
     first, last, least = depth_on_the_way(scene, q0, q1)
     assert min(first, last) > 0.05 > 0.0 > least
     assert jumped(scene, q0, q1)
+
+
+@pytest.mark.parametrize("halvings", [1, 5, 12])
+def test_the_end_is_free_and_as_near_to_the_wall_as_was_asked(halvings: int) -> None:
+    model, wall, asked = pin.Model(), 0.7, []
+    model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
+
+    def overlaps(q: np.ndarray) -> bool:
+        asked.append(float(q[0]))
+        return bool(q[0] > wall)
+
+    q = last_free(model, np.array([0.0]), np.array([2.0]), overlaps, halvings)
+    assert wall - 2.0 * 0.5**halvings <= q[0] <= wall
+    assert len(asked) == halvings

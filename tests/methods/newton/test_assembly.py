@@ -12,7 +12,7 @@ from wholebody.arrays import Array
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.batches import Key
-from wholebody.methods.newton.linear_algebra.gram import Gram
+from wholebody.methods.newton.linear_algebra.normal_equations import Gram
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 
 Y = (0.0, 1.0, 0.0)

@@ -8,7 +8,7 @@ import pytest
 from wholebody.errors import UnknownNameError
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern
 from wholebody.methods.newton.linear_algebra.choice import dense_columns, linear_algebra
-from wholebody.methods.newton.linear_algebra.gram import Gram
+from wholebody.methods.newton.linear_algebra.normal_equations import Gram
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.linear_algebra.reference import Dense
 

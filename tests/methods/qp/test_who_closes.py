@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.closed import said, summed
+from wholebody.bench.tables import programs_text, summed_programs
 from wholebody.methods.qp.solvers import registry
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 
@@ -145,6 +145,6 @@ def test_a_program_counts_once_and_as_what_it_needed():
 
 
 def test_counts_as_a_table_says_them():
-    assert said({"osqp": 1, "active set": 7}) == "active set 7, osqp 1"
-    assert summed(["active set 7, osqp 1", "", "osqp 2"]) == "active set 7, osqp 3"
-    assert summed([]) == ""
+    assert programs_text({"osqp": 1, "active set": 7}) == "active set 7, osqp 1"
+    assert summed_programs(["active set 7, osqp 1", "", "osqp 2"]) == "active set 7, osqp 3"
+    assert summed_programs([]) == ""

@@ -17,9 +17,9 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.assessment import Assessment, assess
 from wholebody.bench.adapters.base import Adapter, Budget
-from wholebody.bench.closed import said
 from wholebody.bench.compare.record import ANSWERED, DEFAULT, FAILED, REFUSED, Record
 from wholebody.bench.problem_sets.case import Case, ProblemSet
+from wholebody.bench.tables import programs_text
 from wholebody.compiled import compile_all
 from wholebody.errors import WholebodyError
 from wholebody.methods.base import SolvedStep, Tracker
@@ -165,7 +165,7 @@ def _once(method: Any, problem: Problem, empty: Record) -> Record:
         seconds=max(spent, 0.0),
         cpu_seconds=max(worked, 0.0),
         iterations=float(solution.iterations),
-        programs=said(solution.programs),
+        programs=programs_text(solution.programs),
     )
     return judged(filled, judgement)
 

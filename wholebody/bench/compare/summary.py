@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from math import inf, nan
 from typing import NamedTuple
 
-from wholebody.bench.closed import summed
 from wholebody.bench.compare.record import COARSE, FAILED, FINE, OVERTIME, REFUSED
 from wholebody.bench.compare.results import Results, effort_excess, middle
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.report import words
+from wholebody.bench.tables import summed_programs
 
 SHOWN = 110  # characters of a message
 GOOD = 0.98  # share of the cases that a method has to solve to be called dependable
@@ -107,7 +107,7 @@ def _summary(results: Results, family: str, adapter: str) -> Summary:
         cpu_median_ms=1e3 * middle([record.cpu_seconds for record in answered]),
         setup_ms=1e3 * middle([record.setup_seconds for record in answered]),
         iterations=middle([record.iterations for record in answered]),
-        programs=summed(record.programs for record in answered),
+        programs=summed_programs(record.programs for record in answered),
         worst_median=middle([record.worst for record in answered]),
         deepest_mm=1e3 * max((record.penetration for record in answered), default=nan),
         effort=middle(efforts),

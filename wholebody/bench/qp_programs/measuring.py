@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import NamedTuple
@@ -13,6 +13,7 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.bench.qp_programs.recording import Recorded
+from wholebody.bench.report import render
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.active_set_solver import ActiveSetSolver
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
@@ -223,3 +224,16 @@ def _summary(solver: str, mine: Sequence[QPRow], seed: int) -> QPSummary:
 
 def _quantile(values: Array, share: float) -> float:
     return float(np.quantile(values, share)) if len(values) else float("nan")
+
+
+def qp_report(rows: Sequence[QPRow], totals: Sequence[QPSummary], facts: Mapping[str, str]) -> str:
+    """Tables: all programs by every solver, and the times set by set."""
+    times = {
+        (family, total.solver): np.quantile(
+            [row.wall_us for row in rows if (row.set, row.solver) == (family, total.solver)], (0.5, 0.95)
+        )
+        for family in dict.fromkeys(row.set for row in rows)
+        for total in totals
+    }
+    first = [row for row in rows if row.solver == totals[0].solver]
+    return render("qp.md", totals=totals, times=times, programs=first, facts=facts)

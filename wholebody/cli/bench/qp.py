@@ -32,9 +32,8 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.machine import machine
     from wholebody.bench.problem_sets.registry import SETS, problem_set
     from wholebody.bench.qp_programs import files
-    from wholebody.bench.qp_programs.measuring import measure, summaries
+    from wholebody.bench.qp_programs.measuring import measure, qp_report, summaries
     from wholebody.bench.qp_programs.recording import record
-    from wholebody.bench.qp_programs.report import qp_report
     from wholebody.bench.tables import write_rows
     from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 

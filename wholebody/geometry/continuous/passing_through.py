@@ -8,6 +8,7 @@ describe. The remaining pairs are swept.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -63,6 +64,29 @@ def is_free(queries: Queries, before: Array, after: Array, unswept: float) -> bo
     if np.isinf(unswept) or np.abs(pin.difference(queries.model, before, after)).max(initial=0.0) <= unswept:
         return True
     return queries.sweep.first_contact(before, after, tolerance=GRAZE) is None
+
+
+def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array], object], halvings: int) -> Array:
+    """Bisect the motion from a free posture to one that overlaps something; the result was tested to be free.
+
+    Algorithm 1, step 4, of Schmidl and Lin. If the motion is free again after an overlap, the result may be on either
+    side.
+
+    Args:
+        model: of the figure.
+        free: (nq,) posture without overlap.
+        q: (nq,) posture with overlap.
+        overlaps: whether something overlaps at a posture (nq,).
+        halvings: number of halvings; the result is accurate to 2 to the power of minus this.
+    """
+    inside, outside = 0.0, 1.0
+    for _ in range(halvings):
+        middle = 0.5 * (inside + outside)
+        if overlaps(np.asarray(pin.interpolate(model, free, q, middle))):
+            outside = middle
+        else:
+            inside = middle
+    return np.asarray(pin.interpolate(model, free, q, inside))
 
 
 def passes_through(queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array) -> bool:

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.checks import posture
-from wholebody.geometry.continuous.bisection import last_free
+from wholebody.geometry.continuous.passing_through import last_free
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError
 from wholebody.methods.ccd.overlap_resolution.frames import PERTURBATIONS
 from wholebody.methods.ccd.overlap_resolution.resolver import TOLERANCE, OverlapResolver

@@ -93,7 +93,15 @@ class Rows(NamedTuple):
 
 
 class Subproblem:
-    """Builds programs for one problem."""
+    """Builds programs for one problem.
+
+    Attributes:
+        goal_share: (g,) weights of the goals' rows, as shares of the largest.
+        kind: (c,) of each constraint's value: whether it is an equality (0), has a lower bound (1), an upper bound (2),
+            both (3) or none (-1).
+        bound: (2, c) lower and upper bounds of the values.
+        one_sided: number of the inequalities.
+    """
 
     def __init__(self, problem: Problem, state: State) -> None:
         """Read off which constraint rows are equalities.
@@ -113,7 +121,7 @@ class Subproblem:
         self._lower = np.concatenate(lower) if lower else np.zeros(0)
         self._upper = np.concatenate(upper) if upper else np.zeros(0)
         goal_weight = np.concatenate(weight) if weight else np.zeros(0)
-        self._goal_share = np.maximum(goal_weight / goal_weight.max(initial=1e-300), LEAST_SHARE)
+        self.goal_share = np.maximum(goal_weight / goal_weight.max(initial=1e-300), LEAST_SHARE)
         self.scale = 1.0
         """What measures are multiplied by, so that heavy ones do not outweigh goals."""
         heaviest = sum((m.weight * m.curvature(state) for m in problem.measures), np.zeros(state.model.nv))
@@ -124,10 +132,10 @@ class Subproblem:
         """How many rows of each constraint are equalities."""
         low = (self._lower != self._upper) & np.isfinite(self._lower)
         high = (self._lower != self._upper) & np.isfinite(self._upper)
-        self._one_sided = int(low.sum() + high.sum())
+        self.one_sided = int(low.sum() + high.sum())
         neither = (self._lower != self._upper) & ~low & ~high
-        self._kind = np.where(neither, -1, low + 2 * high).astype(np.intp)
-        self._bound = np.array([self._lower, self._upper]).reshape(2, -1)
+        self.kind = np.where(neither, -1, low + 2 * high).astype(np.intp)
+        self.bound = np.array([self._lower, self._upper]).reshape(2, -1)
         self._kernel = compiled_kernel()
 
     def rows(self, at: Linearisation) -> Rows:
@@ -137,31 +145,35 @@ class Subproblem:
             InputError: the terms have other numbers of rows than when this was set up.
         """
         goals = len(at.goal_error)
-        if goals != len(self._goal_share) or len(at.value) != len(self._lower):
-            raise InputError(
-                f"goals and constraints have {goals} and {len(at.value)} rows here, and had {len(self._goal_share)} "
-                f"and {len(self._lower)} at the start; give each term one number of rows at all postures"
-            )
-        nv, soft, elastic = len(at.gradient), goals + len(self._equal), self._one_sided + len(at.gap)
+        self.check_rows(goals, len(at.value))
+        nv, soft, elastic = len(at.gradient), goals + len(self._equal), self.one_sided + len(at.gap)
         soft_rows, soft_values = np.empty((soft, nv)), np.empty((2, soft))
         elastic_rows, violated = np.empty((elastic, nv)), np.empty(elastic)
         labels = np.empty((2, elastic), dtype=np.intp)
         self._kernel.sort_rows(
             at.goal_error, at.goal_jacobian, at.value, at.value_jacobian, at.gap, at.gap_jacobian, at.gap_contact,
-            at.clearance, at.contacts.number, self._kind, self._bound, self._goal_share, FORCE, MOST_ROWS, soft_rows,
+            at.clearance, at.contacts.number, self.kind, self.bound, self.goal_share, FORCE, MOST_ROWS, soft_rows,
             soft_values, elastic_rows, violated, labels,
         )  # fmt: skip
-        contacts = self._one_sided + len(at.contacts.distance)
+        contacts = self.one_sided + len(at.contacts.distance)
         return Rows(
             soft_rows, soft_values[0], soft_values[1], goals, elastic_rows, violated, labels[0], contacts, labels[1],
         )  # fmt: skip
+
+    def check_rows(self, goals: int, values: int) -> None:
+        """Raise InputError where goals and constraints have other numbers of rows than when this was set up."""
+        if goals != len(self.goal_share) or values != len(self.kind):
+            raise InputError(
+                f"goals and constraints have {goals} and {values} rows here, and had {len(self.goal_share)} "
+                f"and {len(self.kind)} at the start; give each term one number of rows at all postures"
+            )
 
     def violation(self, rows: Rows, displacement: Array | None = None) -> Violation:
         """Violation at the linearised posture, or what the linearisation predicts after a displacement (nv,)."""
         way = _NONE if displacement is None else displacement
         return Violation(
             *self._kernel.violation(
-                rows.soft_error, rows.soft, rows.elastic_violation, rows.elastic, rows.contact, self._goal_share,
+                rows.soft_error, rows.soft, rows.elastic_violation, rows.elastic, rows.contact, self.goal_share,
                 np.empty(rows.contacts), way,
             )
         )  # fmt: skip

@@ -168,11 +168,24 @@ def program(
             columns[0, i] += damping * lever * heaviest_error
     else:
         # half way between joints that move alike, which takes the fewest steps, and as the measures would have them
-        middle = np.sort(columns[0])[nv // 2]
+        middle = _middle(columns[0])
         for i in range(nv):
             columns[0, i] += damping * square * heaviest * np.sqrt(columns[0, i] / middle)
     for r in range(len(least)):
         least[r] = min(violated[r], most)
+
+
+@compiled()
+def _middle(values: Array) -> float:
+    """Entry that half of the values (n,) are less than."""
+    ordered = values.copy()
+    for place in range(1, len(values)):
+        own, back = ordered[place], place - 1
+        while back >= 0 and ordered[back] > own:
+            ordered[back + 1] = ordered[back]
+            back -= 1
+        ordered[back + 1] = own
+    return float(ordered[len(values) // 2])
 
 
 @compiled()

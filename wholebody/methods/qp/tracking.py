@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -13,33 +12,28 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.checks import flag, number, posture, time_step
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
-from wholebody.linearisation import Linearisation
+from wholebody.linearisation import Passing
 from wholebody.methods.base import Method, goal_error, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem, compiled_kernel
+from wholebody.methods.qp.step_program import StepProgram
+from wholebody.methods.qp.subproblem import Rows
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
-from wholebody.tasks.base import Goal
 
 LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
 LARGEST_WITHIN = 0.5
 HEADROOM = 2.5  # pairs within this many times the last step's motion get rows, so that the next may be longer
-RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
 UNSEEN = 1e-4  # m: by which turning may bring things nearer than the linearisation says without being looked after
+SPARE = 10.0  # times what turning brings nearer, roughly: a step that leaves all pairs more room is not looked at
 CORRECTIONS = 3  # programs that ask again for what turning brought nearer, before the step is cut
 CUTS = 6  # times that a step is halved before it is given up
 OF_A_FRAME = 1e-4  # m, rad: to which the goals of a frame are met
 PROGRAMS = 3  # most of a frame; more = nearer to a goal that turns quickly, dearer frames where it cannot be met
 WORTH = 0.5  # share of the error that another program must leave at most for one more to follow
-DAMPING = 1.0  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at obstacles
-SETTLING = (
-    0.3  # s: in which measures lessen by 1/e: longer = slower to settle, shorter = joints swing about the optimum
-)
 
 
 class QPStep(NamedTuple):
@@ -80,20 +74,6 @@ class FrameStep(NamedTuple):
 
     q: Array
     iterations: int
-
-
-class _Before(NamedTuple):
-    """The step before.
-
-    Attributes:
-        q: (nq,) where it ended.
-        foreseen: (m,) errors of the goals and equalities there, to first order.
-        left: what it left of the way to the goals that it was to go, metres and radians: they are out of reach.
-    """
-
-    q: Array
-    foreseen: Array
-    left: float
 
 
 class QPTracker:
@@ -139,9 +119,8 @@ class QPTracker:
         self._query_distance = LEAST_WITHIN
         self._alone = OneAtATime("tracker")
         self.workspace = problem.workspace()
-        self._before: _Before | None = None
+        self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_shortfall`
         self._set_up()
-        self._kernel = compiled_kernel()
 
     def step(self, q: Array, measures: bool = True) -> QPStep:
         """One step from q, shape (nq,); a posture out of limits is brought back first.
@@ -198,128 +177,111 @@ class QPTracker:
         self.problem.check_fresh()
         self.workspace.refresh()
         self._renew()
-        at, rows, program, answer = self._solved(q, measures)
-        motion, turn = self._motion(at, answer.x)
-        if motion > 0.5 * self._query_distance and rows.elastic_violation.max(initial=0.0) > UNSEEN:
+        program = self._program
+        at = self._lineariser.passing(q, self._query_distance)
+        answer = program.solve(at, measures)
+        motion = answer.motion
+        if motion > 0.5 * self._query_distance and answer.worst > UNSEEN:
             # something came in fast: to get out of its way, one must look as far as one has to go
             self._query_distance = min(HEADROOM * motion, LARGEST_WITHIN)
-            at, rows, program, answer = self._solved(q, measures)
-            motion, turn = self._motion(at, answer.x)
+            at = self._lineariser.passing(q, self._query_distance)
+            answer = program.solve(at, measures)
+            motion = answer.motion
         share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
-        displacement = answer.x if share == 1.0 else share * answer.x
-        if 0.5 * share**2 * motion * turn > UNSEEN:
-            displacement, share = self._looked_after(at, rows, program, displacement, share)
+        displacement = answer.x.copy() if share == 1.0 else share * answer.x
+        following, curved = None, 0.5 * share**2 * motion * answer.turn
+        if curved > UNSEEN and answer.spare < SPARE * curved:
+            displacement, share, following = self._looked_after(at, displacement, share)
         self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
-        following = pin.integrate(self.problem.scene.model, at.q, displacement)
-        gone = rows.soft @ displacement
-        left = gone[: rows.goals] - program.target[: rows.goals]
-        self._before = _Before(following.copy(), rows.soft_error + gone, sqrt(left @ left))
+        if following is None:
+            following = pin.integrate(self.workspace.model, q, displacement)
+            program.ended(following, displacement, share == 1.0)
+        else:
+            program.ended(following, displacement, False)
         return QPStep(
             following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
             answer.iterations, answer.by, self._working_set.solver.counted(), share,
         )  # fmt: skip
 
-    def _solved(self, q: Array, measures: bool) -> tuple[Linearisation, Rows, QuadraticProgram, QPSolution]:
-        """Linearisation, rows, program and its answer at a posture (nq,)."""
-        at = self._lineariser.at(q, self._query_distance)
-        rows = self._subproblem.rows(at)
-        shift, damping, goals = np.zeros(len(rows.soft_error)), 0.0, rows.goals
-        before = self._before
-        if before is not None and np.array_equal(before.q, q):
-            # what held constraints miss, because the last step was curved, the next one will miss again
-            shift[goals:] = rows.soft_error[goals:] - before.foreseen[goals:]
-            error = sqrt(at.goal_error @ at.goal_error)
-            damping = DAMPING * min(1.0, before.left / max(error, 1e-12))
-        gain = min(1.0, self.dt / SETTLING) if goals else 1.0  # without goals the measures are the task
-        program = self._subproblem.program(at, rows, RADIUS, PULL * RADIUS, damping, shift, measures, gain)
-        return at, rows, program, self._working_set.solve(program, rows.key)
-
-    def _looked_after(
-        self, at: Linearisation, rows: Rows, program: QuadraticProgram, displacement: Array, share: float
-    ) -> tuple[Array, float]:
+    def _looked_after(self, at: Passing, displacement: Array, share: float) -> tuple[Array, float, Array]:
         """A step that turns far is looked at where it ends: what turning brought nearer is asked for, or the step cut.
 
         Args:
             at: where the step begins.
-            rows: its rows.
-            program: its program.
             displacement: (nv,) of the step.
             share: of the program's own displacement.
 
         Returns:
-            The displacement (nv,) and its share.
+            The displacement (nv,), its share, and the posture (nq,) where it ends.
         """
-        began = np.minimum(at.contacts.distance, at.clearance[: len(at.contacts.distance)])
-        groups = np.zeros(rows.contacts)
+        contacts, asked = at.contacts, at.clearance[: len(at.contacts.distance)]
+        began = np.minimum(contacts.distance, asked)
+        rows, groups = self._program.rows(at), None
         for _ in range(CORRECTIONS):
-            short = self._shortfall(at, displacement, np.maximum(began, self._foreseen(at, rows, displacement)))
-            if short.max(initial=0.0) <= UNSEEN:
-                return displacement, share
+            short, q = self._shortfall(at, displacement, np.maximum(began, _foreseen(rows, asked, displacement)))
+            if np.maximum.reduce(short, initial=0.0) <= UNSEEN:
+                return displacement, share, q
+            groups = np.zeros(rows.contacts) if groups is None else groups
             groups[rows.contacts - len(short) :] += short
+            program = self._program.program()
             again = self._working_set.solve(replace(program, least=program.least + groups[rows.contact]), rows.key)
             self.workspace.state.update(at.q)  # where motion begins
-            motion, _ = self._motion(at, again.x)
+            motion, _ = self._program.motion(at, again.x)
             share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
             displacement = share * again.x
         for _ in range(CUTS):
-            if self._shortfall(at, displacement, began).max(initial=0.0) <= UNSEEN:
-                return displacement, share
+            short, q = self._shortfall(at, displacement, began)
+            if np.maximum.reduce(short, initial=0.0) <= UNSEEN:
+                return displacement, share, q
             displacement, share = 0.5 * displacement, 0.5 * share
-        return 0.0 * displacement, 0.0
+        return 0.0 * displacement, 0.0, at.q.copy()
 
-    def _foreseen(self, at: Linearisation, rows: Rows, displacement: Array) -> Array:
-        """Distance (k,) that each contact has after a displacement (nv,) as its rows have it, at most what is asked."""
-        violated = np.zeros(rows.contacts)
-        np.maximum.at(violated, rows.contact, rows.elastic_violation - rows.elastic @ displacement)
-        count = len(at.contacts.distance)
-        foreseen: Array = at.clearance[:count] - violated[rows.contacts - count :]
-        return foreseen
+    def _shortfall(self, at: Passing, displacement: Array, kept: Array) -> tuple[Array, Array]:
+        """By how much each contact (k,) is nearer after a displacement (nv,) than the distances (k,) it should keep.
 
-    def _shortfall(self, at: Linearisation, displacement: Array, kept: Array) -> Array:
-        """By how much each contact (k,) is nearer after a displacement (nv,) than the distances (k,) it should keep."""
+        And the posture (nq,) after it.
+        """
         workspace = self.workspace
         q = pin.integrate(workspace.model, at.q, displacement)
-        near = workspace.near(q, float(at.clearance.max(initial=0.0)) + UNSEEN)
-        after = np.full(len(workspace.table.pairs), np.inf)
+        near = workspace.near(q, float(np.maximum.reduce(at.clearance, initial=0.0)) + UNSEEN)
+        after = self._distance
         after[near.number] = near.distance
         short: Array = np.maximum(kept - after[at.contacts.number], 0.0)
-        return short
+        after[near.number] = np.inf
+        return short, q
 
     def _set_up(self) -> None:
         """Take the problem's terms as they are now."""
         problem = self.problem
-        self._subproblem = Subproblem(problem, self.workspace.state)
+        self._program = StepProgram(problem, self.workspace, self._working_set, self.dt)
         self._lineariser = problem.lineariser(self.workspace, self.dt)
-        self._goals = self._signatures(problem.goals)
-        self._before = None
+        self._goals = self._signatures()
 
     def _renew(self) -> None:
         """Take what was replaced of the problem since the last step; where targets moved only, keep what is set up."""
         problem, own = self.problem, self._lineariser
-        others = (
+        anew = (
             problem.constraints is not own.constraints
             or problem.bounds is not own.bounds
             or problem.measures is not own.measures
         )
-        if others or (problem.goals is not own.goals and self._signatures(problem.goals) != self._goals):
+        if not anew:
+            moved = problem.goals is not own.goals
+            own.take(problem.goals, problem.clearances)
+            anew = moved and self._signatures() != self._goals
+        if anew:
             self._set_up()
             self._working_set.forget()
-        else:
-            own.take(problem.goals, problem.clearances)
 
-    def _signatures(self, goals: Sequence[Goal]) -> list[tuple[type, float, int]]:
+    def _signatures(self) -> list[tuple[type, float, int]]:
         """What programs are set up from: kind, weight and number of rows of each goal."""
-        state = self.workspace.state  # wherever it is
-        return [(type(goal), goal.weight, np.size(goal.error(state))) for goal in goals]
+        rows = self._lineariser.goal_rows()
+        return [(type(goal), goal.weight, count) for goal, count in zip(self._lineariser.goals, rows, strict=True)]
 
-    def _motion(self, at: Linearisation, displacement: Array) -> tuple[float, float]:
-        """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,).
 
-        The workspace's state is where the linearisation is.
-        """
-        state = self.workspace.state
-        way, turn = self._kernel.motion(
-            state.spread(displacement), state.jacobian.T, state.column_joint, state.parents, self.workspace.table.joint,
-            at.contacts.placements, self.workspace.table.reach,
-        )  # fmt: skip
-        return way, turn
+def _foreseen(rows: Rows, asked: Array, displacement: Array) -> Array:
+    """Distance (k,) of each contact after a displacement (nv,) as its rows have it, at most what is asked (k,)."""
+    violated = np.zeros(rows.contacts)
+    np.maximum.at(violated, rows.contact, rows.elastic_violation - rows.elastic @ displacement)
+    foreseen: Array = asked - violated[rows.contacts - len(asked) :]
+    return foreseen

@@ -20,6 +20,10 @@ class WorkingSet:
     """Solves one program after the other, each from the active set of the one before.
 
     Rows come and go with the contacts; they are recognised by their keys.
+
+    Attributes:
+        held: (2, n) lower and upper bounds that held the last answer; None where none is known.
+        pushing: keys of the elastic rows that pushed in it, in ascending order.
     """
 
     def __init__(self, solver: QPSolver) -> None:
@@ -38,21 +42,23 @@ class WorkingSet:
             program: the full program.
             key: (k,) names of its elastic rows.
         """
-        if self.solver.hot_start and self._lower is not None and self._upper is not None:
-            answer = self._from_the_last(program, key, self._lower, self._upper)
+        if self.hot:
+            answer = self._from_the_last(program, key)
             if answer is not None:
                 return answer
         return self._round_by_round(program, key)
 
     def forget(self) -> None:
         """Drop the guess."""
-        self._lower: Mask | None = None
-        self._upper: Mask | None = None
-        self._pushing = np.zeros(0, dtype=np.intp)
+        self.held: Mask | None = None
+        self.pushing = np.zeros(0, dtype=np.intp)
 
-    def _from_the_last(
-        self, program: QuadraticProgram, key: NDArray[np.intp], lower: Mask, upper: Mask
-    ) -> QPSolution | None:
+    @property
+    def hot(self) -> bool:
+        """Whether the next program is to begin from the answer of the last."""
+        return self.held is not None and self.solver.hot_start
+
+    def _from_the_last(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution | None:
         """The answer by the active set of the program before, corrected; None where that does not settle."""
         n, k = program.size, len(key)
         size = self._kernel.work_size(n, len(program.target), k)
@@ -61,11 +67,12 @@ class WorkingSet:
         if 2 * k > len(self._places):
             self._places = np.empty(4 * k, dtype=np.intp)
         x: Array = np.empty(n)
-        active = ActiveSet(lower.copy(), upper.copy(), np.empty(k, dtype=bool))
+        assert self.held is not None
+        active = ActiveSet(self.held[0].copy(), self.held[1].copy(), np.empty(k, dtype=bool))
         program.check_shapes(active)
         rounds = self._kernel.solve_growing(
             program.diagonal, program.linear, program.rows, program.target, program.weight, program.elastic,
-            program.least, program.elastic_weight, program.lower, program.upper, key, self._pushing, *active,
+            program.least, program.elastic_weight, program.lower, program.upper, key, self.pushing, *active,
             np.empty(k, dtype=bool), LIMITS, self._work, self._places, x,
         )  # fmt: skip
         if rounds < 0:
@@ -75,9 +82,9 @@ class WorkingSet:
 
     def _round_by_round(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
         """The answer where nothing is known, or the solver has to be asked."""
-        pushing: Mask = np.isin(key, self._pushing)
+        pushing: Mask = np.isin(key, self.pushing)
         chosen = (program.least > -NEAR) | pushing
-        lower, upper = self._lower, self._upper
+        lower, upper = (None, None) if self.held is None else self.held
         closed: list[str] = []
         iterations = 0
         for attempt in range(ROUNDS + 1):
@@ -100,5 +107,5 @@ class WorkingSet:
         return answer._replace(active=active, iterations=iterations, by=self.solver.count(closed))
 
     def _remember(self, active: ActiveSet, key: NDArray[np.intp]) -> None:
-        self._lower, self._upper = active.lower, active.upper
-        self._pushing = np.sort(key[active.elastic])
+        self.held = np.array([active.lower, active.upper])
+        self.pushing = np.sort(key[active.elastic])

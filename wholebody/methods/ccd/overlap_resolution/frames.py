@@ -16,9 +16,8 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.errors import InputError
-from wholebody.geometry.continuous.bisection import last_free
 from wholebody.geometry.continuous.moved_pairs import Placed
-from wholebody.geometry.continuous.passing_through import first_passed
+from wholebody.geometry.continuous.passing_through import first_passed, last_free
 from wholebody.methods.ccd.attraction import Attraction
 from wholebody.methods.ccd.overlap_resolution.chain import MARGIN
 from wholebody.methods.ccd.overlap_resolution.resolver import Counts, OverlapResolver

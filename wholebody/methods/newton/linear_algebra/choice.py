@@ -8,7 +8,7 @@ from wholebody.arrays import Indices
 from wholebody.checks import known
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra, Pattern
 from wholebody.methods.newton.linear_algebra.dense_columns import DenseColumns
-from wholebody.methods.newton.linear_algebra.normal import NormalEquations
+from wholebody.methods.newton.linear_algebra.normal_equations import NormalEquations
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.linear_algebra.reference import Dense, SingularValues
 

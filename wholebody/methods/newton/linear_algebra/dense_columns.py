@@ -6,7 +6,7 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern, SingularSystemError, by_normal_equations
-from wholebody.methods.newton.linear_algebra.gram import Gram
+from wholebody.methods.newton.linear_algebra.normal_equations import Gram
 
 
 class DenseColumns:

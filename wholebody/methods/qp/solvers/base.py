@@ -68,7 +68,7 @@ class QPSolver(ABC):
         A program is the hot start's where that was enough in every round, and semismooth Newton's where one round
         needed it.
         """
-        by = max(closed, key=lambda name: _NEED.get(name, 1))
+        by = closed[0] if len(closed) == 1 else max(closed, key=lambda name: _NEED.get(name, 1))
         self._programs[by] = self._programs.get(by, 0) + 1
         return by
 

@@ -1,0 +1,300 @@
+"""Bisection on clips whose collisions are made on purpose: every frame free, nothing changed outside of the groups."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.arrays import Array
+from wholebody.figures.figure import Figure
+from wholebody.figures.state import State
+from wholebody.motion.avoider import AvoidProgress, MethodResult
+from wholebody.motion.bisection.groups import runs
+from wholebody.motion.bisection.method import Bisection
+from wholebody.motion.clip import Clip
+from wholebody.motion.ready_equipment import equipment
+
+DEEP = 1e-4  # m
+
+
+@pytest.fixture(scope="module")
+def person() -> Figure:
+    return wb.load("human")
+
+
+@pytest.fixture(scope="module")
+def swing(person: Figure) -> Clip:
+    """Arms swing as in a walk, two periods of 40 frames."""
+    phase = 2.0 * np.pi * np.arange(61) / 40.0
+    q = [
+        person.with_joints(
+            person.neutral,
+            {
+                "left_shoulder_flexion": 0.5 * np.sin(t),
+                "right_shoulder_flexion": -0.5 * np.sin(t),
+                "left_elbow_flexion": 0.4 + 0.3 * np.sin(t),
+            },
+        )
+        for t in phase.tolist()
+    ]
+    return Clip(person, np.array(q), 1 / 30)
+
+
+def dressed(figure: Figure, name: str) -> wb.Scene:
+    scene = wb.Scene(figure)
+    for piece in equipment(name, figure):
+        piece.attach(scene)
+    return scene
+
+
+def depths(scene: wb.Scene, q: Array) -> Array:
+    """Deepest overlap at each posture by coal on all pairs, which the method does not use."""
+    model, geometry = scene.model, scene.geometry
+    data, results = model.createData(), pin.GeometryData(geometry)
+    found = []
+    for posture in q:
+        pin.updateGeometryPlacements(model, data, geometry, results, posture)
+        pin.computeDistances(geometry, results)
+        found.append(max(0.0, -min(result.min_distance for result in results.distanceResults)))
+    return np.array(found)
+
+
+def between(scene: wb.Scene, q: Array, parts: int = 12) -> float:
+    """Deepest overlap at postures between those of a clip."""
+    steps = [pin.interpolate(scene.model, a, b, k / parts) for a, b in pairwise(q) for k in range(parts)]
+    return float(depths(scene, np.array(steps)).max())
+
+
+def changed(clip: Clip, result: MethodResult) -> Array:
+    return np.flatnonzero((result.q != clip.q).any(axis=1))
+
+
+@pytest.mark.parametrize("kind", ["linear", "quadratic"])
+@pytest.mark.parametrize("gear", ["side_sphere", "pack"])
+def test_every_frame_is_free_and_frames_outside_of_the_groups_stay(swing: Clip, gear: str, kind: str) -> None:
+    scene = dressed(swing.figure, gear)
+    before = depths(scene, swing.q) > DEEP
+    assert 10 < before.sum() < len(swing)
+    buffer = 20.0
+    result = Bisection(buffer=buffer, least=1, interpolation=kind, evaluation=()).avoid(swing, scene, (), None)  # type: ignore[arg-type]
+    assert result.message == ""
+    assert depths(scene, result.q).max() <= DEEP
+    assert between(scene, result.q) <= DEEP
+    assert result.posture_solves < before.sum()
+    allowed = set()
+    for first, last in runs(before, 0, len(swing) - 1):
+        room = round((last - first + 1) * buffer / 100)
+        allowed |= set(range(first - room, last + room + 1))
+    assert set(changed(swing, result).tolist()) <= allowed
+    assert all(swing.figure.within_limits(q) for q in result.q)
+    assert np.array_equal(result.q[:, :7], swing.q[:, :7])  # the root stays
+
+
+def test_a_free_clip_stays_as_it_is(swing: Clip) -> None:
+    result = Bisection().avoid(swing, dressed(swing.figure, "vest_plate"), (), None)
+    assert np.array_equal(result.q, swing.q)
+    assert (result.posture_solves, result.programs, result.message) == (0, 0, "")
+
+
+def test_the_original_clip_and_the_answer_do_not_depend_on_earlier_runs(swing: Clip) -> None:
+    scene, kept = dressed(swing.figure, "side_sphere"), swing.q.copy()
+    first = Bisection().avoid(swing, scene, (), None)
+    second = Bisection().avoid(swing, scene, (), None)
+    assert np.array_equal(swing.q, kept)
+    assert np.array_equal(first.q, second.q)
+
+
+def test_evaluation_points_keep_what_interpolation_smooths_away(swing: Clip) -> None:
+    """With pouches every frame collides: without points the whole swing is interpolated, with them it is kept."""
+    scene = dressed(swing.figure, "pouches")
+    assert (depths(scene, swing.q) > DEEP).all()
+    away = {}
+    for name, points in (("none", ()), ("turns", (0, 10, 20, 30, 40, 50, 60)), ("chosen", None)):
+        result = Bisection(evaluation=points).avoid(swing, scene, (), None)
+        assert depths(scene, result.q).max() <= DEEP, name
+        away[name] = float(np.abs(result.q - swing.q).max())
+    assert away["turns"] < 0.5 * away["none"]
+    assert away["chosen"] < 0.5 * away["none"]
+
+
+def test_a_ring_as_it_stands_is_left_free_between_frames_too(swing: Clip) -> None:
+    """Frames inside of the hole and outside of it are free, and the way from one to the other is not."""
+    scene = dressed(swing.figure, "torus")
+    result = Bisection().avoid(swing, scene, (), None)
+    assert result.message == ""
+    assert depths(scene, result.q).max() <= DEEP
+    assert between(scene, result.q) <= DEEP
+
+
+def test_in_the_sphere_mode_no_spheres_of_two_groups_intersect(swing: Clip) -> None:
+    """Self-collision of the thesis: 39 spheres, and a pouch filled with spheres."""
+    figure = wb.load("human", detail="spheres")
+    clip, scene = Clip(figure, swing.q, swing.dt), wb.Scene(figure)
+    for piece in equipment("pouches", figure):
+        piece.filled(8, envelope=True).attach(scene)
+    assert (depths(scene, clip.q) > DEEP).any()
+    result = Bisection().avoid(clip, scene, (), None)
+    assert result.message == ""
+    assert depths(scene, result.q).max() <= DEEP
+
+
+def test_frozen_joints_are_the_original_ones_in_every_frame(swing: Clip) -> None:
+    scene = dressed(swing.figure, "side_sphere")
+    result = Bisection(frozen=("root", "lower_body", "spine")).avoid(swing, scene, (), None)
+    columns = [
+        swing.figure.model.joints[swing.figure.joint_id(name)].idx_q
+        for name in swing.figure.joint_names(["lower_body", "spine"])
+    ]
+    assert result.message == ""
+    assert np.array_equal(result.q[:, columns], swing.q[:, columns])
+    assert depths(scene, result.q).max() <= DEEP
+
+
+def test_a_constraint_freezes_as_the_setting_does(swing: Clip) -> None:
+    scene = dressed(swing.figure, "side_sphere")
+    column = swing.figure.model.joints[swing.figure.joint_id("left_elbow_flexion")].idx_q
+    result = Bisection().avoid(swing, scene, [wb.Freeze("left_elbow_flexion")], None)
+    assert np.array_equal(result.q[:, column], swing.q[:, column])
+    assert len(changed(swing, result))
+
+
+def test_the_second_hand_keeps_its_place_on_the_weapon_in_every_frame(person: Figure) -> None:
+    """Both hands hold one weapon; elbows swing into a ball at the side of the torso."""
+    scene = dressed(person, "side_sphere")
+    held = wb.Problem(
+        wb.Scene(person),
+        goals=[wb.Point("right_palm", (0.25, -0.12, 1.1)), wb.Point("left_palm", (0.42, 0.06, 1.12))],
+    )
+    base = wb.solve(held).q
+    ways = 0.1 * np.sin(2 * np.pi * np.arange(24) / 24)
+    q = [
+        wb.solve(
+            wb.Problem(
+                wb.Scene(person),
+                base,
+                goals=[
+                    wb.Point("right_palm", (0.22 + way, -0.14, 1.08)),
+                    wb.Relative("left_palm", "right_palm", orientation=False),
+                ],
+                constraints=[wb.Freeze("root", "lower_body", "spine")],
+            )
+        ).q
+        for way in ways.tolist()
+    ]
+    clip = Clip(person, np.array(q), 1 / 30)
+    assert (depths(scene, clip.q) > DEEP).any()
+    grip = wb.Hold("left_palm", relative_to="right_palm", orientation=False)
+    result = Bisection().avoid(clip, scene, [grip], None)
+    assert result.message == ""
+    assert depths(scene, result.q).max() <= DEEP
+    state = State(person.model)
+    for before, after in zip(clip.q, result.q, strict=True):
+        places = []
+        for posture in (before, after):
+            state.update(posture)
+            left, right = (state.frame(person.frame_id(f"{side}_palm")).copy() for side in ("left", "right"))
+            places.append((right.inverse() * left).translation)
+        assert np.linalg.norm(places[0] - places[1]) < 1e-3
+
+
+def test_the_ends_of_the_clip_are_freed(swing: Clip) -> None:
+    """Frames 0 to 4 and the last collide; the first and the last frame are predicted, not left out."""
+    scene = dressed(swing.figure, "side_sphere")
+    clip = swing[0:20]
+    assert (depths(scene, clip.q) > DEEP)[[0, -1]].all()
+    result = Bisection(evaluation=()).avoid(clip, scene, (), None)
+    assert depths(scene, result.q).max() <= DEEP
+    assert {0, 19} <= set(changed(clip, result).tolist())
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3])
+def test_short_clips_are_freed(swing: Clip, frames: int) -> None:
+    scene = dressed(swing.figure, "side_sphere")
+    clip = swing[:frames]
+    for kind in ("linear", "quadratic"):
+        result = Bisection(interpolation=kind).avoid(clip, scene, (), None)  # type: ignore[arg-type]
+        assert depths(scene, result.q).max() <= DEEP
+        assert np.isfinite(result.q).all()
+
+
+def test_a_middle_that_cannot_be_freed_ends_with_a_sentence(swing: Clip) -> None:
+    """Everything is frozen: the thesis' recursion would call itself without end."""
+    scene = dressed(swing.figure, "side_sphere")
+    names = ("root", "lower_body", "upper_body", "neck")
+    result = Bisection(frozen=names, evaluation=()).avoid(swing, scene, (), None)
+    assert "could not be freed" in result.message
+    assert "side_sphere" in result.message
+    assert "still overlap" in result.message
+    assert result.posture_solves < 4 * len(swing)
+    assert np.array_equal(result.q, swing.q)
+
+
+def test_the_caller_may_end_it(swing: Clip) -> None:
+    told: list[AvoidProgress] = []
+
+    def end(progress: AvoidProgress) -> bool:
+        told.append(progress)
+        return len(told) > 2
+
+    result = Bisection().avoid(swing, dressed(swing.figure, "side_sphere"), (), end)
+    assert "ended" in result.message
+    assert len(told) < 10
+    assert all(0.0 <= progress.share <= 1.0 for progress in told)
+
+
+def test_a_clip_beyond_its_limits_comes_back_within_them(swing: Clip) -> None:
+    figure = swing.figure
+    column = figure.model.joints[figure.joint_id("left_elbow_flexion")].idx_q
+    q = swing.q.copy()
+    q[10, column] = figure.model.upperPositionLimit[column] + 0.1
+    result = Bisection().avoid(swing.with_q(q), dressed(figure, "side_sphere"), (), None)
+    assert all(figure.within_limits(posture) for posture in result.q)
+
+
+def test_a_figure_without_root_and_elbows_is_freed(planar_arm: Callable[..., Figure]) -> None:
+    """An arm in the plane folds into itself and opens again."""
+    figure = planar_arm([0.3, 0.3, 0.3, 0.3])
+    fold = 2.2 * np.sin(np.pi * np.arange(31) / 30)
+    q = np.zeros((31, 4))
+    q[:, 1], q[:, 2] = fold, fold
+    clip, scene = Clip(figure, q, 0.05), wb.Scene(figure)
+    assert (depths(scene, clip.q) > DEEP).any()
+    result = Bisection(buffer=0.0).avoid(clip, scene, (), None)
+    assert result.message == ""
+    assert depths(scene, result.q).max() <= DEEP
+    assert between(scene, result.q) <= DEEP
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        ({"buffer": -1.0}, "buffer"),
+        ({"buffer": float("nan")}, "buffer"),
+        ({"least": 0}, "least"),
+        ({"interpolation": "cubic"}, "interpolation"),
+        ({"evaluation": [-1]}, "evaluation"),
+        ({"evaluation": 3}, "evaluation"),
+        ({"planes": [3]}, "planes"),
+        ({"frozen": "root"}, "frozen"),
+        ({"clearance": 5.0}, "clearance"),
+        ({"method": "qqp"}, "method"),
+    ],
+)
+def test_settings_out_of_range_are_refused(settings: dict[str, object], named: str) -> None:
+    with pytest.raises(wb.WholebodyError, match=named):
+        Bisection(**settings)  # type: ignore[arg-type]
+
+
+def test_names_and_frames_that_do_not_fit_are_refused(swing: Clip) -> None:
+    scene = wb.Scene(swing.figure)
+    with pytest.raises(wb.InputError, match="evaluation"):
+        Bisection(evaluation=(61,)).avoid(swing, scene, (), None)
+    with pytest.raises(wb.UnknownNameError, match="left_elbow"):
+        Bisection(planes=("left_elbov",)).avoid(swing, scene, (), None)
+    with pytest.raises(wb.UnknownNameError, match="spine"):
+        Bisection(frozen=("spin",)).avoid(swing, scene, (), None)

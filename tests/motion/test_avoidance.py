@@ -1,0 +1,222 @@
+"""Clips that collide are freed: small arms with known answers, people with arms in the trunk, and what cannot be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import wholebody as wb
+from wholebody.cli import main
+from wholebody.figures.figure import Figure
+from wholebody.motion.avoidance import METHODS
+from wholebody.motion.avoider import AvoidProgress
+
+DT = 1 / 30
+BALL, RADIUS, LINK, WIDTH = np.array([0.95, 0.0]), 0.1, 0.5, 0.02
+
+
+@pytest.fixture(scope="module")
+def human() -> Figure:
+    return wb.load("human")
+
+
+def swing(frames: int, bend: float = 0.5) -> np.ndarray:
+    """A bent arm of two links that turns past the ball."""
+    return np.stack([np.linspace(-1.2, 1.2, frames) - 0.5 * bend, np.full(frames, bend)], axis=1)
+
+
+def arm_and_ball(planar_arm: Callable[..., Figure], frames: int) -> tuple[wb.Clip, wb.Scene]:
+    figure = planar_arm((LINK, LINK), radius=WIDTH)
+    scene = wb.Scene(figure)
+    scene.add(wb.Sphere(RADIUS), name="ball", at=(*BALL, 0.0))
+    return wb.Clip(figure, swing(frames), DT, "swing"), scene
+
+
+def gap(q: np.ndarray) -> float:
+    """Distance of the ball from the arm, from the geometry of two segments; negative in it."""
+    elbow = LINK * np.array([np.cos(q[0]), np.sin(q[0])])
+    tip = elbow + LINK * np.array([np.cos(q[0] + q[1]), np.sin(q[0] + q[1])])
+    least = np.inf
+    for start, end in ((np.zeros(2), elbow), (elbow, tip)):
+        way = end - start
+        share = np.clip((BALL - start) @ way / (way @ way), 0.0, 1.0)
+        least = min(least, float(np.linalg.norm(start + share * way - BALL)))
+    return least - RADIUS - WIDTH
+
+
+def test_an_arm_that_swings_through_a_ball_goes_around_it(planar_arm: Callable[..., Figure]) -> None:
+    clip, scene = arm_and_ball(planar_arm, 90)
+    assert min(map(gap, clip.q)) < -0.05
+    found = wb.avoid(clip, scene, method=wb.Trajectory(margin=0.4))
+    assert found.report.solved, found.report.message
+    assert min(map(gap, found.clip.q)) > -2e-5
+    fine = found.clip.resampled(DT / 20)
+    assert min(map(gap, fine.q)) > -1e-4
+    inside = np.flatnonzero([gap(q) < 0.0 for q in clip.q])
+    kept = np.r_[0 : inside[0] - 12, inside[-1] + 13 : 90]
+    np.testing.assert_array_equal(found.clip.q[kept], clip.q[kept])
+    assert found.report.frames_changed <= 90 - len(kept)
+
+
+def test_the_trajectory_is_the_least_of_its_objective(planar_arm: Callable[..., Figure]) -> None:
+    """SLSQP on the same objective, with the distances of two segments from the ball, finds nothing better."""
+    clip, scene = arm_and_ball(planar_arm, 16)
+    method = wb.Trajectory(margin=10.0)
+    found = method.avoid(clip, scene, (), None).q
+
+    def objective(flat: np.ndarray) -> float:
+        x = flat.reshape(16, 2)
+        acceleration = np.diff(x, n=2, axis=0) * (method.time / DT) ** 2
+        return 0.5 * float((x**2).sum() + (acceleration**2).sum())
+
+    def gaps(flat: np.ndarray) -> np.ndarray:
+        return np.array([gap(q) for q in clip.q + flat.reshape(16, 2)])
+
+    begun = (found - clip.q).ravel()
+    assert gaps(begun).min() > -1e-5
+    best = minimize(
+        objective, begun, method="SLSQP", constraints={"type": "ineq", "fun": gaps}, options={"maxiter": 200}
+    )
+    assert objective(begun) <= 1.02 * best.fun + 1e-6
+    # the same from a start of its own: the way around the ball that the trajectory took is not far longer
+    own = minimize(
+        objective, 1.2 * begun, method="SLSQP", constraints={"type": "ineq", "fun": gaps}, options={"maxiter": 400}
+    )
+    assert objective(begun) <= 1.02 * own.fun + 1e-6
+
+
+def test_a_free_clip_stays_as_it_is(planar_arm: Callable[..., Figure]) -> None:
+    clip, scene = arm_and_ball(planar_arm, 40)
+    scene.move("ball", at=(3.0, 0.0, 0.0))
+    for method in ("trajectory", "frames", "fade"):
+        found = wb.avoid(clip, scene, method=method)
+        np.testing.assert_array_equal(found.clip.q, clip.q)
+        assert found.report.solved
+        assert (found.report.programs, found.report.frames_changed) == (0, 0)
+
+
+def test_a_thin_thing_between_two_frames_is_not_passed(planar_arm: Callable[..., Figure]) -> None:
+    """No frame touches the needle; the arm passes it between two of them."""
+    figure = planar_arm((LINK, LINK), radius=0.002)
+    scene = wb.Scene(figure)
+    scene.add(wb.Sphere(0.002), name="needle", at=(0.93, 0.0, 0.0))
+    clip = wb.Clip(figure, swing(40), DT)
+    found = wb.avoid(clip, scene)
+    assert found.report.before.colliding == 0
+    assert found.report.before.dips > 0
+    assert found.report.solved, found.report.message
+
+
+def test_what_cannot_be_freed_is_said(planar_arm: Callable[..., Figure]) -> None:
+    clip, scene = arm_and_ball(planar_arm, 30)
+    for method in ("trajectory", "frames", "fade"):
+        found = wb.avoid(clip, scene, method=method, constraints=[wb.Freeze("all")])
+        assert not found.report.solved
+        assert "collide" in found.report.message
+
+
+def test_joint_limits_hold_where_the_original_breaks_them(planar_arm: Callable[..., Figure]) -> None:
+    figure = planar_arm((LINK, LINK), limit=1.0)
+    wave = np.sin(np.linspace(0.0, np.pi, 60))
+    clip = wb.Clip(figure, np.stack([0.3 * wave, 1.2 * wave], axis=1), DT)
+    found = wb.avoid(clip)
+    assert found.report.solved, found.report.message
+    assert np.abs(found.clip.q).max() <= 1.0 + 1e-6
+
+
+def test_joints_become_no_faster_than_their_limit_or_the_original(planar_arm: Callable[..., Figure]) -> None:
+    clip, scene = arm_and_ball(planar_arm, 90)
+    limit = 2.0
+    found = wb.avoid(clip, scene, constraints=[wb.StepLimit(limit)])
+    free = wb.avoid(clip, scene)
+    assert found.report.solved, found.report.message
+    assert np.abs(np.diff(free.clip.q, axis=0)).max() > limit * DT
+    assert np.abs(np.diff(found.clip.q, axis=0)).max() <= limit * DT + 1e-6
+
+
+def test_progress_is_told_and_ends_it(planar_arm: Callable[..., Figure]) -> None:
+    clip, scene = arm_and_ball(planar_arm, 60)
+    told: list[AvoidProgress] = []
+
+    def stop(progress: AvoidProgress) -> bool:
+        told.append(progress)
+        return len(told) == 3
+
+    found = wb.avoid(clip, scene, progress=stop)
+    assert len(told) == 3
+    assert all(0.0 <= one.share <= 1.0 for one in told)
+    assert not found.report.solved
+    assert "the caller ended it" in found.report.message
+
+
+def arm_into_trunk(human: Figure, frames: int = 60) -> wb.Clip:
+    """The right forearm sinks into the trunk, 10 cm deep, and comes out again."""
+    q0 = human.posture("standing")
+    wave = np.sin(np.pi * np.arange(frames) / (frames - 1)) ** 2
+    turned = {"right_elbow_flexion": 1.2, "right_shoulder_rotation": 0.9, "right_shoulder_abduction": -0.1}
+    values = human.joint_values(q0)
+    q = [
+        human.clamp(human.with_joints(q0, {name: (1 - one) * values[name] + one * end for name, end in turned.items()}))
+        for one in wave
+    ]
+    return wb.Clip(human, np.array(q), DT, "forearm")
+
+
+@pytest.mark.parametrize("method", ["trajectory", "frames", "fade"])
+def test_a_forearm_in_the_trunk_comes_out(human: Figure, method: str) -> None:
+    clip = arm_into_trunk(human)
+    found = wb.avoid(clip, method=method)
+    assert found.report.before.deepest > 0.05
+    assert found.report.solved, found.report.message
+    legs = human.dofs(["left_leg", "right_leg", "left_arm"]) + 1
+    if method == "trajectory":
+        np.testing.assert_array_equal(found.clip.q[:, legs], clip.q[:, legs])
+
+
+def test_the_forearm_comes_out_of_a_worn_box(human: Figure) -> None:
+    q0 = human.posture("standing")
+    wave = np.sin(np.pi * np.arange(50) / 49) ** 2
+    q = [human.with_joints(q0, {"right_elbow_flexion": 0.26 + 1.3 * one}) for one in wave]
+    clip = wb.Clip(human, np.array(q), DT)
+    scene = wb.Scene(human)
+    scene.attach(wb.Box((0.12, 0.2, 0.12)), to="lower_thorax", name="pouch", at=(0.2, -0.2, -0.1))
+    found = wb.avoid(clip, scene)
+    assert found.report.before.deepest > 0.01
+    assert found.report.solved, found.report.message
+
+
+def test_a_two_handed_grip_is_kept(human: Figure) -> None:
+    clip = arm_into_trunk(human)
+    found = wb.avoid(clip, constraints=[wb.Hold("left_hand", relative_to="right_hand")])
+    assert found.report.solved, found.report.message
+    assert found.report.missed < 1e-4
+
+
+def test_both_solvers_give_the_same_clip(planar_arm: Callable[..., Figure]) -> None:
+    pytest.importorskip("piqp")
+    clip, scene = arm_and_ball(planar_arm, 40)
+    one, other = (wb.Trajectory(solver=name).avoid(clip, scene, (), None).q for name in ("piqp", "osqp"))
+    np.testing.assert_allclose(one, other, atol=2e-3)
+
+
+def test_names_of_methods(planar_arm: Callable[..., Figure]) -> None:
+    clip, scene = arm_and_ball(planar_arm, 5)
+    assert set(METHODS) >= {"trajectory", "frames", "fade"}
+    with pytest.raises(wb.UnknownNameError, match="trajectory"):
+        wb.avoid(clip, scene, method="trajectry")
+    with pytest.raises(wb.InputError, match="other joints"):
+        wb.avoid(clip, wb.Scene(wb.load("hand")))
+
+
+def test_the_command_frees_a_file(tmp_path: Path, human: Figure, capsys: pytest.CaptureFixture[str]) -> None:
+    arm_into_trunk(human, 40).write(tmp_path / "arm.npz")
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "fade"]) == 0
+    told = capsys.readouterr().out
+    assert "nothing collides" in told
+    free = wb.read_clip(tmp_path / "arm-free.npz", human)
+    assert wb.check(free).free
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "none"]) == 2

@@ -1,0 +1,128 @@
+"""What is measured of clips: against motions whose measures are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.motion.feet import foot_points, slid, sliding, standing
+from wholebody.motion.measures import deviation, foot_sliding, hand_error, jerk_ratio, share_deeper
+
+
+def test_deviation_of_an_arm(planar_arm: Callable[..., Any]) -> None:
+    """The second of two joints stands 0.5 m from the first: turning the first by 0.2 moves it along a chord."""
+    figure = planar_arm([0.5, 0.5])
+    before = wb.Clip(figure, np.zeros((4, 2)), 0.1)
+    after = before.with_q(np.array([[0.0, 0.0], [0.2, 0.0], [0.2, 0.0], [0.0, 0.0]]))
+    found = deviation(before, after)
+    assert found.angle == pytest.approx(np.sqrt(2 * 0.04 / 8))
+    assert found.greatest_angle == pytest.approx(0.2)
+    chord = 2 * 0.5 * np.sin(0.1)
+    assert found.greatest_distance == pytest.approx(chord)
+    assert found.distance == pytest.approx(np.sqrt(2 * chord**2 / 8))
+    assert found.frames_changed == 2
+
+
+def test_the_root_counts_in_places_only(free_bodies: Callable[..., Any]) -> None:
+    figure = wb.load("human")
+    q = np.tile(figure.posture("standing"), (3, 1))
+    moved = q.copy()
+    moved[:, 1] += 0.1
+    found = deviation(wb.Clip(figure, q, 0.1), wb.Clip(figure, moved, 0.1))
+    assert found.angle == 0.0
+    assert found.distance == pytest.approx(0.1)
+    assert found.frames_changed == 3
+
+
+def test_jerk_ratio(planar_arm: Callable[..., Any]) -> None:
+    times = 0.02 * np.arange(20)
+    clip = wb.Clip(planar_arm([0.5, 0.5]), np.column_stack([times**3, 0 * times]), 0.02)
+    assert jerk_ratio(clip, clip.with_q(1.5 * clip.q)) == pytest.approx(1.5)
+    still = clip.with_q(0.0 * clip.q)
+    assert jerk_ratio(still, still) == 1.0
+    assert jerk_ratio(still, clip) == np.inf
+
+
+def test_a_foot_stands_where_it_is_low_and_slow() -> None:
+    """It stands for a second, swings half a metre in half a second, and stands again."""
+    dt = 0.02
+    phase = np.clip((np.arange(125) * dt - 1.0) / 0.5, 0.0, 1.0)
+    path = np.column_stack([0.5 * phase, 0 * phase, 0.02 + 0.12 * np.sin(np.pi * phase)])
+    found = standing(path, dt)
+    assert found[:49].all()
+    assert found[77:].all()
+    assert not found[52:74].any()
+    assert standing(path + np.array([0.0, 0.0, 1.0]), dt).tolist() == found.tolist()  # the ground may be anywhere
+    assert slid(path, found)[0] < 0.02
+    path[60:, 0] += np.linspace(0.0, 0.03, 65)  # and then slides
+    assert slid(path, standing(path, dt))[0] == pytest.approx(0.03, abs=0.012)
+
+
+def test_turning_round_in_the_air_is_no_stance() -> None:
+    times = np.arange(0.0, 2.0, 0.01)
+    path = np.column_stack([np.sin(6.0 * times), 0 * times, 0.02 + 0 * times])
+    assert not standing(path, 0.01)[30:-30].any()
+
+
+def test_feet_of_a_person() -> None:
+    figure = wb.load("human")
+    assert set(foot_points(figure)) == {f"{side}_{point}" for side in ("left", "right") for point in POINTS}
+    assert foot_points(wb.load("hand")) == ()
+    q = np.tile(figure.posture("standing"), (40, 1))
+    q[:, 0] += np.linspace(0.0, 0.05, 40)  # glides
+    found = sliding(figure, q, 1 / 30)
+    assert all(each.distance == pytest.approx(0.05) and each.stands.all() and each.at == 39 for each in found)
+
+
+POINTS = ("heel", "ball", "toe_tip")
+
+
+def test_sliding_is_what_was_not_there_before() -> None:
+    figure = wb.load("human")
+    q = np.tile(figure.posture("standing"), (40, 1))
+    q[:, 0] += np.linspace(0.0, 0.05, 40)
+    before = wb.Clip(figure, q, 1 / 30)
+    aside, back = q.copy(), q.copy()
+    aside[:, 1] += 0.1  # another place, but no more sliding
+    assert foot_sliding(before, before.with_q(aside)) == pytest.approx(0.0, abs=1e-12)
+    back[20:, 1] += 0.02
+    assert foot_sliding(before, before.with_q(back)) == pytest.approx(0.02)
+
+
+def test_hands_on_a_weapon() -> None:
+    figure = wb.load("human")
+    q = figure.posture("arms_forward")
+    before = wb.Clip(figure, [q, q, q], 0.1)  # type: ignore[arg-type]
+    turned = pin.integrate(figure.model, q, np.array([0.1, 0.2, 0.0, 0.3, 0.0, 0.5, *np.zeros(figure.model.nv - 6)]))
+    opened = figure.with_joints(turned, {"left_elbow_flexion": figure.joint_values(q)["left_elbow_flexion"] + 0.1})
+    assert hand_error(before, before.with_q([q, turned, q]), "right_palm", "left_palm") == pytest.approx(0.0, abs=1e-12)
+    data, palms = figure.model.createData(), []
+    for posture in (q, opened):
+        pin.framesForwardKinematics(figure.model, data, posture)
+        left, right = (data.oMf[figure.frame_id(f"{side}_palm")].homogeneous for side in ("left", "right"))
+        palms.append((np.linalg.inv(right) @ left)[:3, 3])
+    error = hand_error(before, before.with_q([q, q, opened]), "right_palm", "left_palm")
+    assert error == pytest.approx(float(np.linalg.norm(palms[0] - palms[1])))
+    assert error > 0.01
+
+
+def test_share_deeper(free_bodies: Callable[..., Any]) -> None:
+    figure = free_bodies(wb.Sphere(0.1))
+    q = [[x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] for x in (0.0, 0.405, 0.42, 0.45)]
+    scene = wb.Scene(figure)
+    scene.add(wb.HalfSpace((-1.0, 0.0, 0.0)), name="wall", at=(0.5, 0.0, 0.0))
+    found = wb.check(wb.Clip(figure, q, 0.1), scene)  # type: ignore[arg-type]
+    assert share_deeper(found) == 0.5
+    assert share_deeper(found, 0.03) == 0.25
+
+
+def test_clips_of_different_lengths_are_refused(planar_arm: Callable[..., Any]) -> None:
+    clip = wb.Clip(planar_arm([0.5, 0.5]), np.zeros((4, 2)), 0.1, "wave")
+    for measure in (deviation, jerk_ratio, foot_sliding):
+        with pytest.raises(wb.InputError, match=r"wave has 3 frames .* wave 4 of .*; give two of the same"):
+            measure(clip, clip[:3])

@@ -1,0 +1,58 @@
+"""Feet that stand: a made-up walk whose steps are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.figures.state import State
+from wholebody.motion.stance import standing
+
+
+@pytest.fixture(scope="module")
+def human() -> wb.Figure:
+    return wb.load("human")
+
+
+def kicking(human: wb.Figure) -> np.ndarray:
+    """The left foot stands, swings in frames 10 to 19, and stands again; the right one stands all the time."""
+    q0 = human.posture("standing")
+    lift = np.sin(np.pi * np.clip((np.arange(30) - 9) / 11, 0.0, 1.0))
+    return np.array(
+        [human.with_joints(q0, {"left_hip_flexion": 0.8 * one, "left_knee_flexion": 1.0 * one}) for one in lift]
+    )
+
+
+def test_a_foot_that_swings_does_not_stand(human: wb.Figure) -> None:
+    found = standing(human, kicking(human), 1 / 30)
+    assert found["right_foot"].all()
+    assert found["left_foot"][:8].all()
+    assert found["left_foot"][22:].all()
+    assert not found["left_foot"][11:19].any()
+
+
+def test_standing_feet_stay_where_they_were(human: wb.Figure) -> None:
+    """A leg that passes through the other one is moved; the foot that stands is not."""
+    q0 = human.posture("standing")
+    wave = np.sin(np.pi * np.arange(30) / 29) ** 2
+    q = np.array(
+        [
+            human.clamp(human.with_joints(q0, {"left_hip_abduction": -0.35 * one, "left_hip_flexion": 0.3 * one}))
+            for one in wave
+        ]
+    )
+    clip = wb.Clip(human, q, 1 / 30)
+    avoided = wb.avoid(clip, constraints=[wb.StanceFeet(["right_foot"])])
+    assert avoided.report.before.colliding
+    assert avoided.report.solved, avoided.report.message
+    state = State(human.model)
+    foot = human.frame_id("right_foot")
+    for before, after in zip(clip.q, avoided.clip.q, strict=True):
+        places = [pin_frame.copy() for pin_frame in (state.update(one).frame(foot) for one in (before, after))]
+        assert np.linalg.norm(places[0].translation - places[1].translation) < 1e-4
+
+
+def test_a_figure_without_feet_says_so() -> None:
+    with pytest.raises(wb.InputError, match="name the feet"):
+        wb.StanceFeet().names(wb.load("hand"))

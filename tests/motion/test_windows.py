@@ -1,0 +1,32 @@
+"""Windows around marked frames."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.motion.windows import Window, outwards, runs, windows
+
+
+def marked(count: int, *frames: int) -> np.ndarray:
+    wrong = np.zeros(count, dtype=bool)
+    wrong[list(frames)] = True
+    return wrong
+
+
+def test_runs_are_maximal() -> None:
+    assert runs(marked(8, 0, 1, 4, 7)) == [Window(0, 2), Window(4, 5), Window(7, 8)]
+    assert runs(marked(5)) == []
+
+
+def test_windows_that_meet_are_one() -> None:
+    assert windows(marked(30, 5, 10, 25), 2) == [Window(3, 13), Window(23, 28)]
+    assert windows(marked(10, 0, 9), 3) == [Window(0, 4), Window(6, 10)]
+
+
+def test_outwards_visits_every_other_frame_once_from_its_neighbour() -> None:
+    visited = list(outwards(Window(2, 7), 4))
+    assert sorted(frame for frame, _ in visited) == [2, 3, 5, 6]
+    seen = {4}
+    for frame, neighbour in visited:
+        assert neighbour in seen
+        seen.add(frame)

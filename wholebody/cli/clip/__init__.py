@@ -1,0 +1,19 @@
+"""The command group `wholebody clip`, one file a command."""
+
+from __future__ import annotations
+
+import argparse
+
+from wholebody.cli.clip import avoid, check, info
+
+HELP = "describe, convert and play motions"
+DESCRIPTION = """\
+Clips are postures of a figure at a fixed time step, read from files of motion capture and of wholebody."""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command `clip` with its own commands."""
+    parser = commands.add_parser("clip", help=HELP, description=DESCRIPTION)
+    kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for command in (info, check, avoid):
+        command.add_to(kinds)

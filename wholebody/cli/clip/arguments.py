@@ -1,0 +1,47 @@
+"""Arguments that the commands of `wholebody clip` share."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from wholebody.figures import Figure
+    from wholebody.motion.clip import Clip
+
+
+def add_clip(parser: argparse.ArgumentParser) -> None:
+    """Add the file of a clip, and the figure that it moves."""
+    parser.add_argument("file", type=Path, metavar="FILE", help="the motion")
+    figure = parser.add_argument_group("figure")
+    figure.add_argument(
+        "--figure", default="human", metavar="FIGURE", help="human (default), avatar, hand, or the path of a URDF"
+    )
+    figure.add_argument("--sex", choices=("male", "female"), help="sex of a person (default: male)")
+    figure.add_argument("--stature", type=float, metavar="M", help="height of a person, m (default: median)")
+    figure.add_argument("--mass", type=float, metavar="KG", help="mass of a person, kg (default: from the stature)")
+    figure.add_argument("--detail", choices=("spheres", "capsules", "hulls"), help="geometry (default: capsules)")
+
+
+def figure_of(arguments: argparse.Namespace) -> Figure:
+    """Load the figure.
+
+    Raises:
+        WholebodyError: there is no such figure.
+    """
+    from wholebody.figures import load
+
+    given: dict[str, Any] = {name: getattr(arguments, name) for name in ("sex", "stature", "mass", "detail")}
+    return load(arguments.figure, **{name: value for name, value in given.items() if value is not None})
+
+
+def clip_of(arguments: argparse.Namespace) -> Clip:
+    """Read the clip of the figure.
+
+    Raises:
+        WholebodyError: the file cannot be read, or does not fit the figure.
+    """
+    from wholebody.motion.reading import read_clip
+
+    return read_clip(arguments.file, figure_of(arguments))

@@ -1,0 +1,99 @@
+"""`wholebody clip avoid`: free a motion of collisions."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wholebody.cli.clip.arguments import add_clip, clip_of
+
+if TYPE_CHECKING:
+    from wholebody.motion.avoidance import Avoided
+    from wholebody.motion.clip import Clip
+    from wholebody.scene import Scene
+
+DESCRIPTION = """\
+Free a motion of collisions of the body with itself and with what it wears. The answer is judged by all pairs in all
+frames and by sweeps between them, independently of the method; the exit code is 1 where something is left."""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = commands.add_parser("avoid", help="free a motion of collisions", description=DESCRIPTION)
+    add_clip(parser)
+    parser.add_argument("--method", default="trajectory", metavar="NAME", help="how (default: trajectory)")
+    parser.add_argument(
+        "--equipment", action="append", default=[], metavar="WHAT",
+        help="what the body wears: a ready name such as pack, or a mesh that is put on its back; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--feet", action="store_true", help="hold feet where they stand")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="default: <name>-free.npz, beside FILE")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Free the clip, write it, and say what was found."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from wholebody.motion.avoidance import as_avoider, avoid
+    from wholebody.motion.stance import StanceFeet
+
+    method, clip = as_avoider(arguments.method), clip_of(arguments)
+    scene = _scene(clip, arguments.equipment)
+    console = Console()
+    with Progress(TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), transient=True) as bar:
+        task = bar.add_task(clip.name, total=1.0)
+        avoided = avoid(
+            clip,
+            scene,
+            method=method,
+            constraints=[StanceFeet()] if arguments.feet else [],
+            progress=lambda told: bar.update(task, completed=told.share, description=told.note),
+        )
+    out = arguments.out or arguments.file.with_name(f"{arguments.file.stem}-free.npz")
+    written = avoided.clip.write(out)
+    _tell(console, avoided, written)
+    return 0 if avoided.report.solved else 1
+
+
+def _scene(clip: Clip, names: list[str]) -> Scene:
+    from wholebody.geometry.shapes import Mesh
+    from wholebody.motion.equipment import Equipment
+    from wholebody.motion.ready_equipment import READY, equipment
+    from wholebody.scene import Scene
+
+    scene = Scene(clip.figure)
+    for name in names:
+        if name in READY or not Path(name).suffix:
+            worn = equipment(name, clip.figure)
+        else:
+            worn = (Equipment.worn(Mesh(name), clip.figure, name=Path(name).stem),)
+        for one in worn:
+            one.attach(scene)
+    return scene
+
+
+def _tell(console: object, avoided: Avoided, written: Path) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+
+    from wholebody.cli.tables import table
+
+    assert isinstance(console, Console)
+    report, clip = avoided.report, avoided.clip
+    color = "green" if report.solved else "red"
+    rate = report.seconds / max(clip.duration, clip.dt)
+    console.print(f"[{color}]{escape(report.message)}[/]", highlight=False)
+    made = table("", "before", "after")
+    made.add_row("frames in collision", str(report.before.colliding), str(report.after.colliding))
+    made.add_row("deepest in a frame", f"{1e3 * report.before.deepest:.3g} mm", f"{1e3 * report.after.deepest:.3g} mm")
+    made.add_row("dips between frames", str(report.before.dips), str(report.after.dips))
+    console.print(made)
+    console.print(
+        f"{report.method}: {report.seconds:.2f} s, {rate:.2f} s a second of motion; {report.programs} programs, "
+        f"{report.posture_solves} postures; {report.frames_changed} of {len(clip)} frames changed",
+        highlight=False,
+    )
+    console.print(f"written: {escape(str(written))}", highlight=False)

@@ -1,0 +1,270 @@
+"""How deep pairs overlap at postures that follow each other, and at most in between.
+
+A pair is looked at only where it may overlap: its distance was once known, and each motion since can have made it
+smaller by a bounded length (`motion_bounds`). What is in doubt is asked of coal at both ends of a motion. Where bounds
+from the ends cannot tell how deep a pair gets in between, the motion is halved, for this pair, until they can.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array, Indices
+from wholebody.geometry.continuous.motion_bounds import MotionBounds
+from wholebody.geometry.guesses import Guesses
+from wholebody.geometry.memory_views import distance_view, placement_view, read_result
+from wholebody.geometry.proximity import AWAY, COAL_ACCURACY, PairTable
+
+FINEST = 2.0**-12
+"""Shortest part of a motion that is looked at; a hand moves 0.02 mm in it. What is still in doubt there gets the
+depth that it may have."""
+
+SHARP = 0.1
+"""Share of the tolerance that decides: a pair found to be less deep than the tolerance by this much is looked at until
+it is proved to be less deep than the tolerance. A smaller share makes more queries of coal."""
+
+COARSE = 0.02
+"""Share of a depth to which it is known between two postures: nobody needs an overlap of 5 cm to 0.01 mm."""
+
+ACCURACY = 2.0 * COAL_ACCURACY
+
+
+class Depths(NamedTuple):
+    """Pairs that overlap, and how deep.
+
+    Attributes:
+        number: (k,) places among the collision pairs of the geometry model, ascending.
+        depth: (k,) metres, positive.
+    """
+
+    number: Indices
+    depth: Array
+
+
+class SweptDepth:
+    """Depths along one sequence of postures at a time."""
+
+    def __init__(self, table: PairTable, geometry: pin.GeometryModel, tolerance: float) -> None:
+        """Read the pieces and pairs; they stand where `geometry` has them.
+
+        Args:
+            table: pieces and pairs of the geometry model.
+            geometry: with the present placements of the pieces; only read.
+            tolerance: depth that matters, metres.
+
+        Raises:
+            InputError: a joint whose motion cannot be bounded.
+        """
+        self._table, self._geometry, self._tolerance = table, geometry, tolerance
+        self._bounds = MotionBounds(table.model, table.joint, table.reach)
+        self._kernel = compiled_kernel()
+        self._shapes = _shapes(table)
+        self._before, self._now, self._middle = (_Postures(table, geometry) for _ in range(3))
+        count = len(table.pairs)
+        self._extent, self._index = np.zeros((geometry.ngeoms, 3)), np.zeros(count, dtype=np.intp)
+        self._q: Array | None = None
+        self.asked = 0
+
+    def start(self, q: Array) -> Depths:
+        """Look at the first posture (nq,) of a sequence; what was looked at before is forgotten."""
+        for place in (self._before, self._now, self._middle):
+            place.guesses.forget()
+        self._now.move(q)
+        self._q = q
+        return self._look(np.full(len(self._table.pairs), -np.inf), np.zeros(len(self._table.pairs)))[0]
+
+    def advance(self, q: Array) -> tuple[Depths, Depths]:
+        """Go on to the next posture (nq,), along ``pin.interpolate``.
+
+        Returns:
+            The pairs that overlap there, and the pairs that overlap on the way or at one of its ends. No pair gets
+            deeper on the way than the tolerance and the depth that is returned for it. A depth beyond the tolerance
+            may be too large by `SHARP` of the tolerance and `COARSE` of itself; others were found.
+        """
+        assert self._q is not None
+        self._before, self._now = self._now, self._before
+        before, now = self._before, self._now
+        velocity = np.asarray(pin.difference(self._table.model, self._q, q))
+        self._bounds.update(before.data, velocity, before.places[:, 3])
+        now.move(q)
+        pairs = self._table.pairs
+        speed = self._bounds.approach(pairs[:, 0], pairs[:, 1])
+        found, doubtful = self._look(before.least, speed)
+        unknown = doubtful[~before.exact[doubtful]]
+        if len(unknown):
+            self._ask(before, unknown)
+            still = before.least[doubtful] + now.least[doubtful] - speed[doubtful] < 0.0
+            doubtful = doubtful[still]
+        passing = self._between(doubtful, speed, velocity) if len(doubtful) else Depths(doubtful, np.zeros(0))
+        self._q = q
+        return found, passing
+
+    def _look(self, before: Array, speed: Array) -> tuple[Depths, Indices]:
+        """Overlaps at the present posture, and the pairs that may overlap on the way there."""
+        now, table = self._now, self._table
+        count = self._kernel.screen(
+            now.places, table.pairs, table.reach, table.half, speed, before, now.least, self._extent, self._index
+        )
+        doubtful = self._index[:count].copy()
+        now.exact[:] = False
+        self._ask(now, doubtful)
+        overlap = doubtful[now.rows[doubtful, 0] < 0.0]
+        with np.errstate(invalid="ignore"):  # before the first posture bounds are infinite
+            still = before[doubtful] + now.least[doubtful] - speed[doubtful] < 0.0
+        return Depths(overlap, -now.rows[overlap, 0]), doubtful[still]
+
+    def _ask(self, place: _Postures, numbers: Indices) -> None:
+        self.asked += len(numbers)
+        place.ask(numbers)
+
+    def _between(self, doubtful: Indices, speed: Array, velocity: Array) -> Depths:
+        """Depths on the way from the posture before to the present one.
+
+        Parts of the way are halved together, so that all parts are of one length at a time. Each row is a pair during a
+        part: `which` of the pairs, and the places before and after it in `stack`.
+        """
+        assert self._q is not None
+        table, stack = self._table, _Stack(self._before.places, self._now.places)
+        rows0, rows1 = self._before.rows[doubtful], self._now.rows[doubtful]
+        deepest = np.maximum(0.0, -np.minimum(rows0[:, 0], rows1[:, 0]))  # found
+        bound = np.zeros(len(doubtful))  # proved
+        which, share = np.arange(len(doubtful)), 1.0
+        first, last = np.zeros(len(doubtful), dtype=np.intp), np.ones(len(doubtful), dtype=np.intp)
+        while len(which):
+            allowed, least, numbers = self._allowed(deepest)[which], np.empty(len(which)), doubtful[which]
+            self._kernel.lower_bounds(
+                numbers, table.pairs, stack.places, first, last, rows0, rows1, speed[numbers], -allowed, share,
+                ACCURACY, table.joint, self._bounds.turn, self._bounds.speed, self._bounds.carries, table.reach,
+                *self._shapes, least,
+            )  # fmt: skip
+            kept = least >= -allowed if share > FINEST else np.ones(len(which), dtype=bool)
+            np.maximum.at(bound, which[kept], -least[kept])
+            going = np.flatnonzero(~kept)
+            if not len(going):
+                break
+            which, first, last, share = which[going], first[going], last[going], 0.5 * share
+            rows0, rows1 = rows0[going], rows1[going]
+            middle, rows = np.empty(len(which), dtype=np.intp), np.empty((len(which), 4))
+            for begin in np.unique(first).tolist():
+                here = np.flatnonzero(first == begin)
+                at = stack.times[begin] + share
+                self._middle.move(np.asarray(pin.integrate(table.model, self._q, at * velocity)))
+                self._ask(self._middle, doubtful[which[here]])
+                middle[here] = stack.add(at, self._middle.places)
+                rows[here] = self._middle.rows[doubtful[which[here]]]
+            np.maximum.at(deepest, which, -rows[:, 0])
+            which, first, last = np.tile(which, 2), np.concatenate([first, middle]), np.concatenate([middle, last])
+            rows0, rows1 = np.concatenate([rows0, rows]), np.concatenate([rows, rows1])
+        depth = np.where(bound > self._tolerance, np.maximum(bound, deepest), deepest)
+        deep = np.flatnonzero(depth > 0.0)
+        return Depths(doubtful[deep], depth[deep])
+
+    def _allowed(self, deepest: Array) -> Array:
+        """How deep pairs may at most be, (k,), that were found to be `deepest`, so that no more has to be known."""
+        sharp = SHARP * self._tolerance
+        beyond = deepest + np.maximum(sharp, COARSE * deepest)
+        return np.where(deepest <= self._tolerance - sharp, self._tolerance, beyond)
+
+
+class _Stack:
+    """Placements of the pieces at times of one motion.
+
+    Attributes:
+        times: of the placements, as shares of the motion.
+        places: (m, n, 4, 3) placements; only as many as there are times are filled.
+    """
+
+    def __init__(self, before: Array, after: Array) -> None:
+        self.times, self.places = [0.0, 1.0], np.empty((16, *before.shape))
+        self.places[0], self.places[1] = before, after
+
+    def add(self, time: float, places: Array) -> int:
+        """Copy placements; returns their number."""
+        if len(self.times) == len(self.places):
+            self.places = np.concatenate([self.places, np.empty_like(self.places)])
+        self.places[len(self.times)] = places
+        self.times.append(time)
+        return len(self.times) - 1
+
+
+class _Postures:
+    """One posture after the other: where pieces are, and the distances that were asked for there.
+
+    Attributes:
+        places: (n, 4, 3) placements of the pieces.
+        rows: (pairs, 4) distances and normals; only those that were asked for are of the present posture.
+        least: (pairs,) lower bounds of the distances.
+        exact: (pairs,) whether a pair was asked for.
+    """
+
+    def __init__(self, table: PairTable, geometry: pin.GeometryModel) -> None:
+        self._table, self._geometry = table, geometry
+        self.data, self._results = table.model.createData(), pin.GeometryData(geometry)
+        for k in range(geometry.ngeoms):  # anywhere apart: views are checked by results that were computed
+            self._results.oMg[k] = pin.SE3(np.eye(3), np.array([AWAY * k, 0.0, 0.0]))
+        for number in sorted({k * (len(table.pairs) - 1) // 6 for k in (0, 2, 3, 6)} if len(table.pairs) else ()):
+            pin.computeDistance(geometry, self._results, number)
+        self._view, self._placed = distance_view(self._results.distanceResults), placement_view(self._results.oMg)
+        self.guesses = Guesses(self._results)
+        count = len(table.pairs)
+        self.places = np.zeros((geometry.ngeoms, 4, 3))
+        self.rows, self.least, self.exact = np.zeros((count, 4)), np.zeros(count), np.zeros(count, dtype=bool)
+
+    def move(self, q: Array) -> None:
+        pin.forwardKinematics(self._table.model, self.data, q)
+        pin.updateGeometryPlacements(self._table.model, self.data, self._geometry, self._results)
+        if self._placed is not None:
+            self.places[:] = self._placed
+        else:
+            self.places[:] = np.array([[*M.rotation.T, M.translation] for M in self._results.oMg]).reshape(-1, 4, 3)
+
+    def ask(self, numbers: Indices) -> None:
+        geometry, results = self._geometry, self._results
+        for number in numbers.tolist():
+            pin.computeDistance(geometry, results, number)
+        if self._view is not None:
+            self.rows[numbers] = self._view[numbers, :4]
+        else:
+            for number in numbers.tolist():
+                self.rows[number] = read_result(results.distanceResults[number])[:4]
+        distance = self.rows[numbers, 0]
+        self.least[numbers] = distance - ACCURACY * (1.0 + np.abs(distance))
+        self.exact[numbers] = True
+
+
+def _shapes(table: PairTable) -> tuple[Array, Indices, Array, Array, Array, Indices]:
+    """Swept points, their first places, radii, radii of ellipsoids, faces and their first places, of all pieces."""
+    swept = table.swept
+    radii = np.zeros((len(swept), 3))
+    for k, piece in enumerate(table.geometry.geometryObjects):
+        if isinstance(piece.geometry, coal.Ellipsoid):
+            radii[k] = piece.geometry.radii
+    return (
+        np.ascontiguousarray(np.vstack([np.zeros((0, 3)), *(piece.points for piece in swept)])),
+        np.cumsum([0, *(len(piece.points) for piece in swept)], dtype=np.intp),
+        np.array([piece.radius for piece in swept], dtype=float),
+        radii,
+        np.ascontiguousarray(np.vstack([np.zeros((0, 4)), *(piece.faces for piece in swept)])),
+        np.cumsum([0, *(len(piece.faces) for piece in swept)], dtype=np.intp),
+    )
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back: not in the middle of a clip."""
+    from wholebody.geometry.continuous import swept_depth_kernel
+
+    places, none, index = np.zeros((0, 4, 3)), np.zeros(0), np.zeros(0, dtype=np.intp)
+    pairs, rows, one = np.zeros((0, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros(1, dtype=np.intp)
+    swept_depth_kernel.screen(places, pairs, none, np.zeros((0, 3)), none, none, none, np.zeros((0, 3)), index)
+    swept_depth_kernel.lower_bounds(
+        index, pairs, np.zeros((0, 0, 4, 3)), index, index, rows, rows, none, none, 1.0, 0.0, index, none,
+        np.zeros((0, 0)), np.zeros((0, 0), dtype=bool), none, np.zeros((0, 3)), one, none, np.zeros((0, 3)), rows,
+        one, none,
+    )  # fmt: skip
+    return swept_depth_kernel

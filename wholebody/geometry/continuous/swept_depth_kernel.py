@@ -1,0 +1,187 @@
+"""Lower bounds of distances at a posture and during a motion, as compiled loops: see `swept_depth`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.arrays import Array, Indices
+from wholebody.compiled import compiled
+
+
+@compiled()
+def screen(
+    place: Array, pairs: Indices, reach: Array, half: Array, speed: Array, before: Array, after: Array, extent: Array,
+    index: Indices,
+) -> int:  # fmt: skip
+    """Bound the distances after a motion from below, and list the pairs that may overlap at its end or on its way.
+
+    Args:
+        place: (n, 4, 3) where the pieces are after the motion; see `Contacts.placements`.
+        pairs: (p, 2) the pieces of each pair.
+        reach: (n,) radius of each piece about its origin; may be infinite.
+        half: (n, 3) half the size of a box about each piece's origin, along its own axes.
+        speed: (p,) by how much a pair can have come nearer during the motion, metres.
+        before: (p,) lower bounds of the distances before it.
+        after: (p,) room for those after it: from the motion, from spheres and from boxes along the world's axes.
+        extent: (n, 3) room for the sizes of the boxes.
+        index: (p,) room for the pairs of the answer.
+
+    Returns:
+        How many pairs there are.
+    """
+    for i in range(len(reach)):
+        for k in range(3):
+            total = 0.0
+            for j in range(3):
+                total += abs(place[i, j, k]) * half[i, j]
+            extent[i, k] = total
+    count = 0
+    for p in range(len(pairs)):
+        least = before[p] - speed[p]
+        if before[p] + least - speed[p] < 0.0:
+            a, b = pairs[p, 0], pairs[p, 1]
+            square, boxes = 0.0, -np.inf
+            for k in range(3):
+                apart = abs(place[a, 3, k] - place[b, 3, k])
+                square += apart * apart
+                boxes = max(boxes, apart - extent[a, k] - extent[b, k])
+            least = max(least, max(boxes, np.sqrt(square) - reach[a] - reach[b]))
+            if before[p] + least - speed[p] < 0.0:
+                index[count] = p
+                count += 1
+        after[p] = least
+    return count
+
+
+@compiled()
+def lower_bounds(
+    asked: Indices, pairs: Indices, places: Array, first_place: Indices, last_place: Indices, rows0: Array,
+    rows1: Array, speed: Array, wanted: Array, share: float, accuracy: float, joint: Indices, turn: Array,
+    speeds: Array, carries: NDArray[np.bool_], reach: Array, points: Array, first_point: Indices, radius: Array,
+    radii: Array, faces: Array, first_face: Indices, bound: Array,
+) -> None:  # fmt: skip
+    """Bound the distances of pairs from below, over a part of a motion.
+
+    A distance changes by at most `speed` over the whole motion. And it is at least the height of one piece above a
+    plane that moves with the other one and supports it. The height of a point, as a function of time, is above its
+    chord by at most its acceleration times the squared time over eight.
+
+    Args:
+        asked: (k,) places of the pairs.
+        pairs: (p, 2) the pieces of each pair.
+        places: (m, n, 4, 3) where the pieces are at some times.
+        first_place: (k,) the time, of `places`, at which the part begins.
+        last_place: (k,) the time at which it ends.
+        rows0: (k, 4) distance and normal, from the first piece to the second, at the beginning.
+        rows1: (k, 4) the same at the end.
+        speed: (k,) by how much a pair can come nearer during the whole motion.
+        wanted: (k,) a bound that is sufficient.
+        share: length of each part, of the whole motion.
+        accuracy: metres to which the distances are known.
+        joint: (n,) joint of each piece.
+        turn: (njoints,) see `MotionBounds`.
+        speeds: (n, njoints) see `MotionBounds.speed`.
+        carries: (njoints, njoints) see `MotionBounds`.
+        reach: (n,) radius of each piece about its origin.
+        points: (m, 3) swept points of all pieces, those of piece i from `first_point[i]`.
+        first_point: (n + 1,)
+        radius: (n,) about these points.
+        radii: (n, 3) of ellipsoids; 0 for other pieces.
+        faces: (f, 4) outward planes of all pieces, those of piece i from `first_face[i]`.
+        first_face: (n + 1,)
+        bound: (k,) room for the answer.
+    """
+    normal = np.empty(3)
+    for k in range(len(asked)):
+        first, second = pairs[asked[k], 0], pairs[asked[k], 1]
+        place0, place1 = places[first_place[k]], places[last_place[k]]
+        best = 0.5 * (rows0[k, 0] + rows1[k, 0] - speed[k] * share) - accuracy
+        for side in range(4):
+            if best >= wanted[k]:
+                break
+            carrier, other = (first, second) if side % 2 == 0 else (second, first)
+            if np.isinf(reach[other]):
+                continue
+            row, place = (rows0, place0) if side < 2 else (rows1, place1)
+            sign = 1.0 if side % 2 == 0 else -1.0
+            square = 0.0
+            for j in range(3):
+                normal[j] = 0.0
+                for i in range(3):
+                    normal[j] += sign * place[carrier, j, i] * row[k, 1 + i]
+                square += normal[j] ** 2
+            if not 0.98 < square < 1.02:
+                continue
+            sag = share * share / 8.0 * _curvature(
+                other, carrier, max(rows0[k, 0], rows1[k, 0]), joint, turn, speeds, carries, reach
+            )  # fmt: skip
+            if np.isfinite(reach[carrier]):
+                for j in range(3):
+                    normal[j] /= np.sqrt(square)
+                height = _support(carrier, normal, points, first_point, radius, radii)
+                at0 = _above(carrier, other, normal, height, place0, points, first_point, radius, radii)
+                at1 = _above(carrier, other, normal, height, place1, points, first_point, radius, radii)
+                best = max(best, min(at0, at1) - sag - accuracy)
+            face, most = -1, -np.inf
+            for f in range(first_face[carrier], first_face[carrier + 1]):
+                along = faces[f, 0] * normal[0] + faces[f, 1] * normal[1] + faces[f, 2] * normal[2]
+                if along > most:
+                    face, most = f, along
+            if face >= 0 and radius[carrier] == 0.0:
+                normal[:] = faces[face, :3]
+                at0 = _above(carrier, other, normal, faces[face, 3], place0, points, first_point, radius, radii)
+                at1 = _above(carrier, other, normal, faces[face, 3], place1, points, first_point, radius, radii)
+                best = max(best, min(at0, at1) - sag - accuracy)
+        bound[k] = best
+
+
+@compiled()
+def _curvature(
+    first: int, second: int, gap: float, joint: Indices, turn: Array, speeds: Array, carries: NDArray[np.bool_],
+    reach: Array,
+) -> float:  # fmt: skip
+    """Bound of the acceleration of the first piece's points relative to the second; `MotionBounds.curvature`."""
+    a, b = joint[first], joint[second]
+    turns, travel = 0.0, 0.0
+    for j in range(len(turn)):
+        if carries[a, j] != carries[b, j]:
+            turns += turn[j]
+            travel += speeds[first, j] if carries[a, j] else speeds[second, j]
+    across = max(gap, 0.0) + travel + 2.0 * reach[first]
+    total = 0.0
+    for j in range(len(turn)):
+        if carries[a, j] and not carries[b, j]:
+            total += speeds[first, j] * (2.0 * turns - turn[j])
+        elif carries[b, j] and not carries[a, j]:
+            total += (speeds[second, j] + turn[j] * across) * (2.0 * turns - turn[j])
+    return total
+
+
+@compiled()
+def _support(piece: int, normal: Array, points: Array, first_point: Indices, radius: Array, radii: Array) -> float:
+    """Height of a piece above its origin along a direction in its own axes."""
+    most = -np.inf
+    for k in range(first_point[piece], first_point[piece + 1]):
+        most = max(most, points[k, 0] * normal[0] + points[k, 1] * normal[1] + points[k, 2] * normal[2])
+    if most == -np.inf:
+        return float(np.sqrt(np.sum((radii[piece] * normal) ** 2)))
+    return float(most + radius[piece])
+
+
+@compiled()
+def _above(
+    carrier: int, other: int, normal: Array, height: float, place: Array, points: Array, first_point: Indices,
+    radius: Array, radii: Array,
+) -> float:  # fmt: skip
+    """Least height of a piece above a plane of another one: `normal` and `height` in the axes of the carrier."""
+    world, local = np.zeros(3), np.zeros(3)
+    between = 0.0
+    for i in range(3):
+        for j in range(3):
+            world[i] += place[carrier, j, i] * normal[j]
+        between += world[i] * (place[other, 3, i] - place[carrier, 3, i])
+    for j in range(3):
+        for i in range(3):
+            local[j] -= place[other, j, i] * world[i]
+    return between - height - _support(other, local, points, first_point, radius, radii)

@@ -1,0 +1,240 @@
+"""The program of a tracking step: built and solved by one compiled call, in arrays made once.
+
+What the compiled call does not settle, and what other solvers are to solve, goes to the working set as any program.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.linearisation import Passing
+from wholebody.methods.qp.quadratic_program import QuadraticProgram
+from wholebody.methods.qp.solvers.base import ACTIVE_SET
+from wholebody.methods.qp.subproblem import (
+    BOX,
+    ELASTIC_WEIGHT,
+    FORCE,
+    LEAST_CURVATURE,
+    LEVER,
+    MOST_ROWS,
+    PROXIMAL_SHARE,
+    PULL,
+    Rows,
+    Subproblem,
+)
+from wholebody.methods.qp.subproblem import compiled_kernel as compiled_subproblem
+from wholebody.methods.qp.working_set import LIMITS, WorkingSet
+from wholebody.problem import Problem
+from wholebody.workspace import Workspace
+
+RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
+DAMPING = 10.0  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at obstacles
+OUT_OF_REACH = 1 / 3  # share of a goal's error that a step leaves, from which on it is damped wholly
+SETTLING = 0.5  # s: measures lessen by 1/e in it: longer = slower to settle, shorter = joints swing about the optimum
+RESTING = 1e-5  # m, rad: a goal missed by less than this, and more than foreseen, rests; less left of one is reached
+LITTLE = 0.1  # damping that makes no difference to how a step looks
+WORSE = 2.0  # times the damping of a program that its answer may ask for before it is solved again with that
+
+
+class Answer(NamedTuple):
+    """Answer to the program of a step.
+
+    Attributes:
+        x: (n,) displacement; overwritten by the next program.
+        motion: longest way of any point of any piece, metres, to first order.
+        turn: largest turn of a piece, radians.
+        worst: largest violation of an elastic row at x = 0, metres.
+        spare: least distance beyond its clearance that a contact has after the displacement, metres, to first order;
+            negative infinite where it is not known.
+        exact: see `QPSolution`, like the next two.
+        iterations: of the solver.
+        by: what closed the program.
+    """
+
+    x: Array
+    motion: float
+    turn: float
+    worst: float
+    spare: float
+    exact: bool
+    iterations: int
+    by: str
+
+
+class StepProgram:
+    """Builds and solves the programs of one tracker.
+
+    Attributes:
+        goals: number of the goals' rows.
+    """
+
+    def __init__(self, problem: Problem, workspace: Workspace, working_set: WorkingSet, dt: float) -> None:
+        """Take the terms of a problem.
+
+        Args:
+            problem: what is asked.
+            workspace: of the run; its state is moved to the problem's start.
+            working_set: solves what the compiled call does not.
+            dt: seconds a step.
+        """
+        state, self._working_set = workspace.state, working_set
+        self._workspace, self._subproblem = workspace, Subproblem(problem, state)
+        self._kernel, self._motion = compiled_kernel(), compiled_subproblem().motion
+        self.goals = len(self._subproblem.goal_share)
+        self._soft = self.goals + int((self._subproblem.kind == 0).sum())
+        self._variables, self._columns, self._elastic = state.model.nv, len(state.column_joint), 0
+        self._settled = False
+        self._unknown = np.zeros((2, self._variables), dtype=bool)
+        places = np.arange(state.model.nv, dtype=float)
+        self._joints = np.concatenate(
+            [state.spread(places).astype(np.intp), state.column_joint, state.parents, workspace.table.joint]
+        )
+        # without goals the measures are the task
+        gain = min(1.0, dt / SETTLING) if self.goals else 1.0
+        self._numbers = numbers_of(self._subproblem.scale, gain)
+        self._before = np.zeros(state.model.nq + self._soft + 2)
+        """See `tracking_kernel.solve`."""
+        self._after = self._before.copy()
+        self._grow(64)
+
+    def solve(self, at: Passing, measures: bool) -> Answer:
+        """The answer of the step from where the workspace's state is, and its pieces' placements.
+
+        Args:
+            at: linearisation there.
+            measures: whether the measures count; without them the nearest posture to the goals is sought.
+        """
+        answer, damping, asked = self._once(at, measures, 0.0)
+        if asked > WORSE * max(damping, LITTLE):
+            answer, _, _ = self._once(at, measures, asked)
+        return answer
+
+    def ended(self, q: Array, displacement: Array, whole: bool) -> None:
+        """Remember a step.
+
+        Args:
+            q: (nq,) the posture where it ended.
+            displacement: (nv,).
+            whole: whether that is the last program's answer as it was.
+        """
+        after = self._after
+        if not (whole and self._settled):
+            gone = self._soft_rows @ displacement
+            left = gone[: self.goals] - self._target[: self.goals]
+            after[len(q) : -2] = self._soft_values[0] + gone
+            after[-2], after[-1] = sqrt(left @ left), 1.0
+        after[: len(q)] = q
+        self._before, self._after = after, self._before
+
+    def rows(self, at: Passing) -> Rows:
+        """The rows of the last program; overwritten by the next."""
+        n, k, ends = self._variables, self._elastic, self._ends()
+        labels = self._integers[: 2 * k].reshape(2, k)
+        return Rows(
+            self._soft_rows, self._soft_values[0], self._soft_values[1], self.goals,
+            self._floats[ends[6] : ends[7]].reshape(k, n), self._floats[ends[7] : ends[8]], labels[0],
+            self._subproblem.one_sided + len(at.contacts.distance), labels[1],
+        )  # fmt: skip
+
+    def program(self) -> QuadraticProgram:
+        """The last program; overwritten by the next."""
+        n, k, ends = self._variables, self._elastic, self._ends()
+        elastic, least, weight = (self._floats[ends[i - 1] : ends[i]] for i in (7, 9, 10))
+        return QuadraticProgram(
+            self._entries[0], self._entries[1], self._soft_rows, self._target, self._soft_values[1],
+            elastic.reshape(k, n), least, weight, self._entries[2], self._entries[3],
+        )  # fmt: skip
+
+    def motion(self, at: Passing, displacement: Array) -> tuple[float, float]:
+        """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,).
+
+        The workspace's state is where the linearisation is.
+        """
+        state, table = self._workspace.state, self._workspace.table
+        way, turn = self._motion(
+            state.spread(displacement), state.columns, state.column_joint, state.parents, table.joint,
+            at.contacts.placements, table.reach,
+        )  # fmt: skip
+        return way, turn
+
+    def _once(self, at: Passing, measures: bool, least_damping: float) -> tuple[Answer, float, float]:
+        """An answer, the damping of its program, and what it asks for.
+
+        Raises:
+            InputError: the terms have other numbers of rows than at the start.
+        """
+        own, working, workspace = self._subproblem, self._working_set, self._workspace
+        own.check_rows(at.goals, len(at.value) - at.goals)
+        k = self._elastic = own.one_sided + len(at.gap)
+        if 5 * k > len(self._integers):
+            self._grow(2 * k)
+        held = working.held if working.hot else self._unknown
+        solved, count, motion, turn, worst, spare, damping, asked = self._kernel.solve(
+            at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.contacts.number, at.measure, at.box, at.q,
+            self._before, self._after, own.kind, own.bound, own.goal_share, held, working.pushing,
+            workspace.state.columns, self._joints, at.contacts.placements, workspace.table.reach, self._floats,
+            self._integers, self._masks, self._numbers, measures, working.hot, least_damping,
+        )  # fmt: skip
+        self._settled = solved
+        if solved:
+            working.pushing = self._integers[2 * k : 2 * k + count].copy()
+            by = working.solver.count([ACTIVE_SET])
+            return Answer(self._x, motion, turn, worst, spare, True, 0, by), damping, asked
+        answer = working.solve(self.program(), self.rows(at).key)
+        motion, turn = self.motion(at, answer.x)
+        remains = self._soft_rows[: self.goals] @ answer.x - self._target[: self.goals]
+        left, error = sqrt(remains @ remains), sqrt(at.value[: self.goals] @ at.value[: self.goals])
+        asked = DAMPING * min(1.0, left / (OUT_OF_REACH * max(error, 1e-12))) if left > RESTING else 0.0
+        return Answer(answer.x, motion, turn, worst, spare, answer.exact, answer.iterations, answer.by), damping, asked
+
+    def _ends(self) -> Any:
+        """See `tracking_kernel.parts`."""
+        return self._kernel.parts(self._variables, self._soft, self._elastic, self._columns)
+
+    def _grow(self, elastic: int) -> None:
+        """Make room for so many elastic rows."""
+        n, m = self._variables, self._soft
+        ends = self._kernel.parts(n, m, elastic, self._columns)
+        self._floats = floats = np.zeros(ends[-1])
+        self._integers, self._masks = np.zeros(5 * elastic, dtype=np.intp), np.zeros(2 * (n + elastic), dtype=bool)
+        self._x, self._target = floats[:n], floats[ends[2] : ends[3]]
+        self._soft_values = floats[ends[3] : ends[4]].reshape(2, m)
+        self._entries = floats[ends[4] : ends[5]].reshape(4, n)
+        self._soft_rows = floats[ends[5] : ends[6]].reshape(m, n)
+
+
+def numbers_of(scale: float, gain: float) -> Array:
+    """What `tracking_kernel.solve` takes of the constants.
+
+    Args:
+        scale: of the measures.
+        gain: share of the way to the least measures that a step is to go.
+
+    Returns:
+        What `subproblem_kernel.program` takes (10), damping, what is left of a goal times this is damped wholly, what
+        counts as rest, weight of elastic rows, most rows of a contact, force of goals (4), limits of the working set.
+    """
+    program = (scale, LEAST_CURVATURE, PROXIMAL_SHARE, RADIUS, PULL * RADIUS, 0.0, LEVER, BOX * RADIUS, PULL * RADIUS)
+    own = (gain, DAMPING, 1.0 / OUT_OF_REACH, RESTING, ELASTIC_WEIGHT, MOST_ROWS)
+    return np.array([*program, *own, *FORCE, *LIMITS])
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody.methods.qp import tracking_kernel
+
+    none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
+    ends = tracking_kernel.parts(1, 0, 0, 1)
+    tracking_kernel.solve(
+        none, np.zeros((0, 1)), none, index, none, index, np.zeros((2, 2)), np.zeros((2, 1)), none, np.zeros(2),
+        np.zeros(2), index, np.zeros((2, 0)), none, np.zeros((2, 1), dtype=bool), index, np.zeros((1, 6)),
+        np.zeros(4, dtype=np.intp), np.zeros((1, 4, 3)), np.ones(1), np.zeros(ends[-1]), index,
+        np.zeros(2, dtype=bool), numbers_of(1.0, 1.0), True, False, 0.0,
+    )  # fmt: skip
+    return tracking_kernel

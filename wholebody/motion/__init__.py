@@ -1,0 +1,1 @@
+"""Motion: clips, their files, and what is done with whole clips."""

@@ -1,0 +1,172 @@
+"""`wb.avoid`: free a clip of collisions, by any method, judged independently of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from types import MappingProxyType
+
+from wholebody.checks import instance, listed, shown
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.motion.avoider import Avoider, MethodResult, Progress, check_input
+from wholebody.motion.checking import ClipCheck, check
+from wholebody.motion.clip import Clip
+from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
+from wholebody.motion_assessment import limit_violation
+from wholebody.scene import Scene
+
+COLLISION = 1e-4  # m: a frame, or the motion between two, that is deeper collides
+HELD = 1e-3  # m, rad: by which what is held may be missed in a solved clip
+ROUNDING = 1e-6  # rad, m: by which limits may be missed
+
+METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "trajectory": ("wholebody.motion.trajectory.method", "Trajectory"),
+        "frames": ("wholebody.motion.per_frame", "PerFrame"),
+        "bisection": ("wholebody.motion.bisection.method", "Bisection"),
+        "fade": ("wholebody.motion.fade", "Fade"),
+    }
+)
+"""Methods by name: module and class of the settings."""
+
+
+@dataclass(frozen=True)
+class AvoidanceReport:
+    """What a method did to a clip, and what it left.
+
+    Attributes:
+        solved: whether the clip is free, limits hold and what is held is missed by at most 1 mm or 1 mrad, by a check
+            that shares nothing with the methods.
+        message: one sentence that says what is left, or that all is free.
+        method: name of the method.
+        seconds: wall time of the method, without the judgement.
+        posture_solves: how many postures were solved for on their own.
+        programs: how many quadratic programs were solved.
+        frames_changed: how many frames are others than before.
+        missed: largest miss of a constraint in any frame, metres or radians.
+        before: the check of the clip as it was.
+        after: the check of the answer.
+    """
+
+    solved: bool
+    message: str
+    method: str
+    seconds: float
+    posture_solves: int
+    programs: int
+    frames_changed: int
+    missed: float
+    before: ClipCheck = field(repr=False)
+    after: ClipCheck = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Avoided:
+    """The answer of `avoid`.
+
+    Attributes:
+        clip: the clip that the method made.
+        report: what is known of it.
+    """
+
+    clip: Clip
+    report: AvoidanceReport
+
+
+def avoider_named(name: str) -> Avoider:
+    """A method with its default settings.
+
+    Raises:
+        UnknownNameError: there is no such method.
+    """
+    if name not in METHODS:
+        raise UnknownNameError("method of avoidance", name, METHODS)
+    module, kind = METHODS[name]
+    made: Avoider = getattr(import_module(module), kind)()
+    return made
+
+
+def as_avoider(given: object) -> Avoider:
+    """A method from its name, or a configured one as it is.
+
+    Raises:
+        UnknownNameError: there is no such method.
+        InputError: it is neither.
+    """
+    if isinstance(given, str):
+        return avoider_named(given)
+    if isinstance(given, type) or not callable(getattr(given, "avoid", None)) or not hasattr(given, "name"):
+        raise InputError(f"avoid: method is {shown(given)}; give a name such as 'trajectory', or wb.Trajectory()")
+    return given  # type: ignore[return-value]
+
+
+def avoid(
+    clip: Clip,
+    scene: Scene | None = None,
+    *,
+    method: str | Avoider = "trajectory",
+    constraints: Iterable[Given] = (),
+    progress: Progress | None = None,
+) -> Avoided:
+    """Free a clip of collisions of the figure with itself, with what it carries, and with what stands around.
+
+    Args:
+        clip: the original postures; they may collide and be beyond limits.
+        scene: its figure with carried things, and the things around; None for the figure alone.
+        method: "trajectory", "frames", "fade", "bisection", or configured, such as `wb.Trajectory(clearance=0.005)`.
+        constraints: what holds in every frame. What a term takes from the start it takes from the original posture of
+            its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has. See also
+            `wb.StanceFeet`.
+        progress: called with an `AvoidProgress` now and then; the method ends with what it has if it returns True.
+
+    Returns:
+        The new clip and a report. A clip that could not be freed is an answer too: `report.solved` is False, and
+        `report.message` says what is left.
+
+    Raises:
+        InputError: the scene's figure has other joints than the clip's, or a constraint does not fit.
+        UnknownNameError: there is no such method, or a constraint names what the figure does not have.
+    """
+    instance(clip, Clip, "avoid: clip", "read one with wb.read_clip(path, figure)")
+    scene = Scene(clip.figure) if scene is None else scene
+    check_input(clip, scene, progress)
+    chosen = as_avoider(method)
+    given: tuple[Given, ...] = tuple(listed(constraints, "avoid: constraints", "[wb.Freeze('root')]"))
+    terms = frame_terms(scene, clip.q, clip.dt, given)
+    began = time.perf_counter()
+    result = chosen.avoid(clip, scene, given, progress)
+    seconds = time.perf_counter() - began
+    found = Clip(clip.figure, result.q, clip.dt if result.dt is None else result.dt, clip.name)
+    return Avoided(found, _report(clip, found, terms, result, chosen.name, seconds))
+
+
+def _report(
+    before: Clip, after: Clip, terms: FrameTerms, result: MethodResult, method: str, seconds: float
+) -> AvoidanceReport:
+    scene = terms.scene
+    was, now = check(before, scene, depth=COLLISION), check(after, scene, depth=COLLISION)
+    changed, missed = len(after), 0.0
+    if len(before) == len(after):
+        changed = int((before.q != after.q).any(axis=1).sum())
+        if terms.holds:
+            state = scene.state(after.q[0])
+            missed = max(terms.missed(frame, state.update(q)) for frame, q in enumerate(after.q))
+    beyond = limit_violation(scene.figure, after.q)
+    left = [] if not result.message else [result.message]
+    if now.colliding:
+        left.append(f"{now.colliding} frames collide, {1e3 * now.deepest:.3g} mm deep at most")
+    if now.dips:
+        left.append(f"{now.dips} motions between frames dip, {1e3 * now.deepest_between:.3g} mm deep at most")
+    if beyond > ROUNDING:
+        left.append(f"a joint limit is missed by {beyond:.3g} rad or m")
+    if missed > HELD:
+        left.append(f"what is to hold is missed by {missed:.3g} m or rad")
+    solved = now.free and beyond <= ROUNDING and missed <= HELD
+    if not (solved or left):
+        left = ["something collides between two frames that collide"]
+    message = "; ".join(left) if left else "nothing collides, in the frames and between them, to 0.1 mm"
+    return AvoidanceReport(
+        solved, message, method, seconds, result.posture_solves, result.programs, changed, missed, was, now
+    )

@@ -1,0 +1,101 @@
+"""The protocol of methods that free a clip, and what they return."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple, Protocol
+
+from wholebody.arrays import Array
+from wholebody.checks import function, instance
+from wholebody.errors import InputError
+from wholebody.motion.clip import Clip
+from wholebody.motion.frame_terms import Given
+from wholebody.scene import Scene
+
+
+class AvoidProgress(NamedTuple):
+    """Told while a clip is freed.
+
+    Attributes:
+        share: done so far, from 0 to 1.
+        note: what is being done.
+    """
+
+    share: float
+    note: str
+
+
+Progress = Callable[[AvoidProgress], Any]
+"""Called now and then; if it returns True, the method ends with what it has."""
+
+
+class MethodResult(NamedTuple):
+    """What a method makes of a clip.
+
+    Attributes:
+        q: (n, nq) postures.
+        posture_solves: how many postures were solved for, each on its own.
+        programs: how many quadratic programs were solved.
+        message: what did not succeed, one sentence; empty where all did.
+        dt: seconds from frame to frame; None where it stays.
+    """
+
+    q: Array
+    posture_solves: int = 0
+    programs: int = 0
+    message: str = ""
+    dt: float | None = None
+
+
+class Avoider(Protocol):
+    """A method that frees clips: frozen settings."""
+
+    @property
+    def name(self) -> str:
+        """Name for tables, and by which `avoid` finds it."""
+
+    def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
+        """Free a clip.
+
+        Args:
+            clip: original postures; they stay as they are.
+            scene: its figure with equipment, and the things around.
+            constraints: what holds in every frame; see `wholebody.motion.frame_terms`.
+            progress: called with the share done; where it returns True, the method ends with what it has.
+        """
+
+
+def check_input(clip: object, scene: object, progress: object) -> None:
+    """Check what a method gets.
+
+    Raises:
+        InputError: no clip, no scene, a scene of a figure with other joints, or progress that cannot be called.
+    """
+    instance(clip, Clip, "avoid: clip", "read one with wb.read_clip(path, figure)")
+    instance(scene, Scene, "avoid: scene", "make one with wb.Scene(clip.figure)")
+    assert isinstance(clip, Clip)
+    assert isinstance(scene, Scene)
+    if list(scene.model.names) != list(clip.figure.model.names) or scene.model.nq != clip.figure.model.nq:
+        raise InputError(
+            f"avoid: the scene's figure {scene.figure.name} has other joints than the clip's {clip.figure.name}; make "
+            "the scene with wb.Scene(clip.figure)"
+        )
+    function(progress, "avoid: progress")
+
+
+class Watch:
+    """Tells the caller how far a method is, and remembers whether the caller ended it.
+
+    Attributes:
+        ended: whether the caller ended it.
+    """
+
+    def __init__(self, progress: Progress | None) -> None:
+        """Take what is called, or None."""
+        self._progress, self.ended = progress, False
+
+    def tell(self, share: float, note: str) -> bool:
+        """Report; whether to end now."""
+        if self._progress is not None and self._progress(AvoidProgress(min(max(share, 0.0), 1.0), note)) is True:
+            self.ended = True
+        return self.ended

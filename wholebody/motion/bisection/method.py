@@ -1,0 +1,176 @@
+"""The method "bisection": settings, and one run on a clip."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.checks import choice, listed, number, text, whole
+from wholebody.figures.figure import Figure
+from wholebody.methods.base import Method
+from wholebody.methods.solve import as_method, method_for_motions
+from wholebody.motion.avoider import MethodResult, Progress, Watch
+from wholebody.motion.bisection.gaps import Gaps, hold_between
+from wholebody.motion.bisection.interpolation import Kind
+from wholebody.motion.bisection.key_frames import key_frames
+from wholebody.motion.bisection.path_planes import ELBOWS
+from wholebody.motion.bisection.prediction import Predictor
+from wholebody.motion.bisection.recursion import Recursion, changed_frames
+from wholebody.motion.bisection.stays import Stays
+from wholebody.motion.clip import Clip
+from wholebody.motion.frame_terms import Given, frame_terms
+from wholebody.scene import Scene
+
+OVERLAP = 5e-5
+"""Depth up to which a frame is free, and by which a gap may be deeper, metres: together the 0.1 mm of `wb.check`."""
+
+CHARACTER = 0.2
+"""Radians and metres: what interpolation between evaluation points may miss of the original. Less follows the original
+more closely and predicts more postures."""
+
+MOST_FRAMES = 1_000_000
+MOST_BUFFER = 1000.0  # percent
+MOST_CLEARANCE = 0.1  # m
+NAMED = 6  # runs of frames that a message lists
+
+
+@dataclass(frozen=True)
+class Bisection:
+    """Keyframe interpolation by recursive bisection, with posture prediction (Degenhardt 2014).
+
+    Frames that overlap make groups. The middle frame of a group gets the posture of least effort from the original one
+    that is free; the others of the group are interpolated; then both halves are looked at again. What still dips
+    between two frames gets larger margins. The postures outside of the groups and their buffers stay as they are.
+
+    Attributes:
+        evaluation: frames that characterise the motion. They are corrected first and never interpolated; so are the
+            first and the last frame. None for the frames from which linear interpolation misses no original posture by
+            more than `CHARACTER`; () for none but both ends.
+        buffer: percentage of the frames of a group by which it is widened to each side before it is interpolated.
+        least: least number of frames in a group, where there is room.
+        interpolation: "linear" or "quadratic", between the frames beside the group and its middle.
+        planes: frames of the figure, such as "left_elbow" and "left_wrist", that leave their path only sideways where a
+            posture is predicted; None for the elbows, where the figure has them.
+        frozen: joints and groups that stay as they are; None for a free root. ("root", "lower_body") moves the upper
+            body alone.
+        clearance: least distance in predicted postures of what overlapped, metres.
+        method: predicts postures: a name or a method such as `wb.QP(solver="daqp")`.
+    """
+
+    evaluation: tuple[int, ...] | None = None
+    buffer: float = 50.0
+    least: int = 3
+    interpolation: Kind = "linear"
+    planes: tuple[str, ...] | None = None
+    frozen: tuple[str, ...] | None = None
+    clearance: float = 0.002
+    method: str | Method = "qp"
+
+    def __post_init__(self) -> None:
+        """Check the settings.
+
+        Raises:
+            InputError: a setting out of range.
+            UnknownNameError: no such method.
+        """
+        if self.evaluation is not None:
+            frames = listed(self.evaluation, "Bisection: evaluation", "[0, 12, 40]")
+            checked = tuple(whole(frame, "Bisection: evaluation", 0, MOST_FRAMES) for frame in frames)
+            object.__setattr__(self, "evaluation", checked)
+        number(self.buffer, "Bisection: buffer", 0.0, MOST_BUFFER, "percent")
+        whole(self.least, "Bisection: least", 1, MOST_FRAMES)
+        choice(self.interpolation, ("linear", "quadratic"), "Bisection: interpolation")
+        for name in ("planes", "frozen"):
+            given = getattr(self, name)
+            if given is not None:
+                names = listed(given, f"Bisection: {name}", "['left_elbow']")
+                object.__setattr__(self, name, tuple(text(entry, f"Bisection: {name}") for entry in names))
+        number(self.clearance, "Bisection: clearance", 0.0, MOST_CLEARANCE, "m")
+        method_for_motions(self.method) if isinstance(self.method, str) else as_method(self.method)
+
+    @property
+    def name(self) -> str:
+        """Name for tables."""
+        return "bisection"
+
+    def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
+        """Free a clip.
+
+        Args:
+            clip: original postures; they stay as they are.
+            scene: its figure with equipment, and the things around.
+            constraints: what holds in every frame; see `wholebody.motion.frame_terms`.
+            progress: called with the share done; where it returns True, the method ends with what it has.
+
+        Raises:
+            InputError: an evaluation point beyond the clip's frames, or a constraint that is none.
+            UnknownNameError: a plane, a frozen joint or a constraint names what the figure does not have.
+        """
+        figure, watch = scene.figure, Watch(progress)
+        for frame in self.evaluation or ():
+            whole(frame, f"Bisection: evaluation, {clip.name}", 0, len(clip) - 1)
+        original = np.array([figure.clamp(q) for q in clip.q])
+        terms = frame_terms(scene, original, clip.dt, constraints)
+        frozen = self.frozen if self.frozen is not None else ("root",) if figure.root == "free" else ()
+        usual = tuple(name for name in ELBOWS if name in figure.frames)
+        joints = usual if self.planes is None else self.planes
+        for joint in joints:
+            figure.frame_id(joint)
+        stays = Stays(scene, original, terms, frozen)
+        method = method_for_motions(self.method)
+        with scene.lend() as workspace:
+            predictor = Predictor(scene, original, terms, frozen, method, self.clearance, OVERLAP, workspace)
+            recursion = Recursion(
+                scene, predictor, stays, joints, self.buffer / 100.0, self.least, self.interpolation, watch
+            )
+            recursion.run(self._points(figure, original, frozen))
+            missed = hold_between(recursion, predictor, changed_frames(original, recursion.q), watch)
+            gaps = Gaps(scene, recursion, predictor, workspace, OVERLAP, watch)
+            gaps.close()
+        return MethodResult(
+            recursion.q, recursion.predictions, recursion.programs, _message(recursion, missed, gaps, watch)
+        )
+
+    def _points(self, figure: Figure, original: Array, frozen: tuple[str, ...]) -> tuple[int, ...]:
+        """The evaluation points of a clip."""
+        if self.evaluation is not None:
+            return self.evaluation
+        moving = np.ones(figure.model.nv, dtype=bool)
+        moving[figure.dofs(frozen)] = False
+        return key_frames(figure.model, original, moving, CHARACTER)
+
+
+def _message(recursion: Recursion, missed: list[int], gaps: Gaps, watch: Watch) -> str:
+    """What did not succeed, in one sentence; empty where all did."""
+    said = []
+    bad = np.flatnonzero(recursion.bad).tolist()
+    if recursion.stuck:
+        frame = min(recursion.stuck)
+        others = f" and {len(recursion.stuck) - 1} others" if len(recursion.stuck) > 1 else ""
+        said.append(f"frame {frame}{others} could not be freed ({recursion.stuck[frame]})")
+    if bad:
+        said.append(f"{_frames(bad)} still overlap{'s' if len(bad) == 1 else ''}")
+    if missed:
+        said.append(f"what is held does not hold in {_frames(missed)}")
+    dips = sorted(gap for gap in gaps.left if not recursion.bad[gap : gap + 2].any())
+    if dips:
+        said.append(f"{gaps.left[dips[0]]} overlap between frames {dips[0]} and {dips[0] + 1}")
+        if len(dips) > 1:
+            said[-1] += f", as do others in {len(dips) - 1} more gaps"
+    if watch.ended:
+        said.append("it was ended before it was done")
+    return "; ".join(said)
+
+
+def _frames(frames: list[int]) -> str:
+    """Frames in words: "frames 3 to 7, 12"."""
+    ends = (
+        [frame for frame in frames if frame - 1 not in frames],
+        [frame for frame in frames if frame + 1 not in frames],
+    )
+    parts = [f"{a}" if a == b else f"{a} to {b}" for a, b in zip(*ends, strict=True)]
+    more = f" and {len(parts) - NAMED} more runs" if len(parts) > NAMED else ""
+    return f"frame{'s' if len(frames) > 1 else ''} {', '.join(parts[:NAMED])}{more}"

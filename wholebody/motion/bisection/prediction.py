@@ -1,0 +1,147 @@
+"""Posture prediction for one frame of a clip: least effort from the original posture, without penetration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.figures.state import State
+from wholebody.methods.base import Method
+from wholebody.motion.frame_terms import FrameTerms
+from wholebody.problem import Problem
+from wholebody.scene import Scene
+from wholebody.tasks import Effort, Freeze, Hold, Plane
+from wholebody.tasks.base import Goal, Measure, Surroundings, filled
+from wholebody.tasks.distance import SquaredDistance
+from wholebody.workspace import Workspace
+
+HELD = 2e-4  # m, rad: by which what is held may be missed in a frame; a fifth of the millimetre that is visible
+ROOT_WEIGHT = 100.0  # of the root in the effort [1/m^2, 1/rad^2]: as the spine's, since moving it moves the whole body
+
+
+class RootEffort(Measure):
+    """Squared displacement of the root from the start, which `Effort` leaves out."""
+
+    distance: SquaredDistance
+
+    def resolve(self, scene: Surroundings, start: Array) -> RootEffort:
+        """Store the start."""
+        weights = np.zeros(scene.model.nv)
+        weights[:6] = ROOT_WEIGHT
+        return filled(self, distance=SquaredDistance.build(scene.model, start, weights))
+
+    def value(self, state: State) -> float:
+        """The squared displacement, weighted."""
+        return self.distance.value(state)
+
+    def gradient(self, state: State) -> Array:
+        """(nv,) its derivative."""
+        return self.distance.gradient(state)
+
+    def curvature(self, state: State) -> Array:
+        """(nv,) the diagonal of its second derivative."""
+        return self.distance.curvature
+
+
+class Prediction(NamedTuple):
+    """What posture prediction found for a frame.
+
+    Attributes:
+        q: (nq,) posture.
+        good: whether nothing overlaps in it and everything holds.
+        programs: quadratic programs that were solved.
+    """
+
+    q: Array
+    good: bool
+    programs: int
+
+
+class Predictor:
+    """Posture prediction in the frames of one clip.
+
+    Attributes:
+        scene: figure and things.
+        original: (n, nq) postures from which the effort is counted.
+        terms: what holds in each frame.
+        overlap: deepest overlap of a good posture, metres.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        original: Array,
+        terms: FrameTerms,
+        frozen: Sequence[str],
+        method: Method,
+        clearance: float,
+        overlap: float,
+        workspace: Workspace,
+    ) -> None:
+        """Take what stays the same from frame to frame; `workspace` is the run's."""
+        self.scene, self.original, self.terms, self.overlap = scene, original, terms, overlap
+        self._frozen = [Freeze(*frozen)] if frozen else []
+        self._method, self._clearance, self._workspace = method, clearance, workspace
+        moves = scene.figure.root == "free" and "root" not in scene.figure.joint_names(frozen)
+        self._measures = (Effort(), RootEffort()) if moves else (Effort(),)
+
+    def predict(
+        self,
+        frame: int,
+        start: Array,
+        planes: Sequence[Plane] = (),
+        *,
+        margins: dict[int, float] | None = None,
+        effort_from: Array | None = None,
+    ) -> Prediction:
+        """Predict the posture of a frame.
+
+        Args:
+            frame: which; holds and the effort refer to its original posture.
+            start: (nq,) where the search starts.
+            planes: further constraints.
+            margins: least distances of pairs, by their numbers, metres; the settings' for others.
+            effort_from: (nq,) posture from which the effort is counted instead.
+        """
+        feet = [Hold(foot) for foot in self.terms.stands[frame]]
+        original = self.original[frame]
+        goals = [term for term in self.terms.given if isinstance(term, Goal)]
+        others = [term for term in self.terms.given if not isinstance(term, Goal)]
+        problem = Problem(
+            self.scene,
+            original,
+            goals=goals,
+            constraints=[*others, *feet, *self._frozen, *planes],
+            measures=self._measures,
+            clearance=self._clearance,
+        )
+        if effort_from is not None:
+            problem.measures = tuple(measure.resolve(self.scene, effort_from) for measure in self._measures)
+        for pair, margin in (margins or {}).items():
+            problem.clearances[pair] = max(problem.clearances[pair], margin)
+        solution = self._method.solve(problem.with_start(start))
+        return Prediction(solution.q, self.good(frame, solution.q), sum(solution.programs.values()))
+
+    def good(self, frame: int, q: Array) -> bool:
+        """Whether nothing overlaps in a posture of a frame and everything that is held there holds."""
+        return self.free(q) and self.holds(frame, q)
+
+    def free(self, q: Array) -> bool:
+        """Whether no pair overlaps."""
+        return bool(self._workspace.near(q, 0.0).distance.min(initial=0.0) >= -self.overlap)
+
+    def holds(self, frame: int, q: Array) -> bool:
+        """Whether what is held in a frame holds."""
+        return not self.terms.holds or self.terms.missed(frame, self._workspace.state.update(q)) <= HELD
+
+    def deepest(self, q: Array) -> str:
+        """The pair that overlaps most, in words; empty if none does."""
+        near = self._workspace.near(q, 0.0)
+        if not len(near.distance):
+            return ""
+        worst = int(np.argmin(near.distance))
+        first, second = (self._workspace.owners[piece] for piece in near.pair[worst])
+        return f"{first} and {second} overlap by {-1e3 * near.distance[worst]:.1f} mm"

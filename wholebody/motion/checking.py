@@ -1,0 +1,269 @@
+"""The check of a clip: every pair in every frame and in between, joint limits and speeds, feet that slide, jerk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.checks import function, instance, number
+from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
+from wholebody.geometry.continuous.swept_depth import SweptDepth
+from wholebody.motion.clip import Clip
+from wholebody.motion.clip_contacts import Contact, ContactTable, contact_as_dict
+from wholebody.motion.feet import Sliding, sliding
+from wholebody.motion_assessment import root_mean_square, third_differences, velocities
+from wholebody.scene import Scene
+
+DEPTH = 1e-4
+"""Depth up to which an overlap is no contact, metres: that of sweeps, a tenth of a millimetre."""
+
+SMALLEST = 1e-5  # m: ten times coal's own accuracy
+LARGEST = 1.0  # m
+ROUNDING = 1e-9  # rad, m: by which a limit may be missed; share by which a speed may be
+EVERY = 16  # frames after which progress is told
+
+Progress = Callable[[int], object]
+"""Called with the number of frames that are done."""
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """A joint that is beyond its limit, or faster than its limit.
+
+    Attributes:
+        joint: name of the joint.
+        frames: number of frames in which it is beyond; of gaps for speeds.
+        frame: the worst one; for a speed the frame before.
+        value: there; radians or metres, a second for speeds.
+        limit: the one that is exceeded.
+    """
+
+    joint: str
+    frames: int
+    frame: int
+    value: float
+    limit: float
+
+
+@dataclass(frozen=True, eq=False)
+class ClipCheck:
+    """What `check` found in a clip.
+
+    Attributes:
+        clip: the clip.
+        tolerance: depth up to which an overlap is no contact, metres.
+        depth: (n,) deepest overlap of any pair in each frame, metres; 0 if there is none.
+        between: (n - 1,) deepest overlap of any pair from each frame to the next one, both included. No pair gets
+            deeper than this, or than the tolerance where this is less. What is beyond the tolerance may be too large by
+            a tenth of the tolerance and a fiftieth of itself.
+        contacts: pairs of segments and things that overlap by more than the tolerance, the deepest first.
+        limits: joints beyond their limits, the worst first.
+        speeds: joints faster than their velocity limits, the worst first.
+        sliding: how far each point of the feet slides while it stands.
+        jerk: (n - 3,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
+        queries: number of distances that coal was asked for.
+    """
+
+    clip: Clip = field(repr=False)
+    tolerance: float
+    depth: Array = field(repr=False)
+    between: Array = field(repr=False)
+    contacts: tuple[Contact, ...] = field(repr=False)
+    limits: tuple[Beyond, ...]
+    speeds: tuple[Beyond, ...]
+    sliding: tuple[Sliding, ...] = field(repr=False)
+    jerk: Array = field(repr=False)
+    queries: int
+
+    @property
+    def free(self) -> bool:
+        """Whether no pair overlaps by more than the tolerance, in any frame or in between."""
+        return not self.contacts
+
+    @property
+    def colliding(self) -> int:
+        """Number of frames in which some pair overlaps by more than the tolerance."""
+        return int((self.depth > self.tolerance).sum())
+
+    @property
+    def dips(self) -> int:
+        """Number of gaps in which some pair overlaps by more than the tolerance, though none does at either end."""
+        ends = np.maximum(self.depth[:-1], self.depth[1:])
+        return int(((self.between > self.tolerance) & (ends <= self.tolerance)).sum())
+
+    @property
+    def deepest(self) -> float:
+        """Deepest overlap of any pair in any frame, metres."""
+        return float(self.depth.max(initial=0.0))
+
+    @property
+    def deepest_between(self) -> float:
+        """Deepest overlap of any pair at any time; see `between`, metres."""
+        return float(self.between.max(initial=0.0))
+
+    @property
+    def slid(self) -> float:
+        """How far a point of a foot slides at most while it stands, metres."""
+        return max((each.distance for each in self.sliding), default=0.0)
+
+    @property
+    def mean_jerk(self) -> float:
+        """Root of the mean square of `jerk`, rad/s^3; 0 for fewer than four frames."""
+        return float(np.sqrt(np.mean(self.jerk**2))) if len(self.jerk) else 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything as JSON has it: metres, radians, seconds."""
+        dt = self.clip.dt
+        return {
+            "clip": self.clip.name,
+            "figure": self.clip.figure.name,
+            "frames": len(self.clip),
+            "dt": dt,
+            "tolerance": self.tolerance,
+            "free": self.free,
+            "frames_in_collision": self.colliding,
+            "dips_between_frames": self.dips,
+            "deepest": self.deepest,
+            "deepest_between": self.deepest_between,
+            "jerk": self.mean_jerk,
+            "contacts": [contact_as_dict(contact, dt) for contact in self.contacts],
+            "limits": [_beyond_as_dict(beyond, dt) for beyond in self.limits],
+            "speeds": [_beyond_as_dict(beyond, dt) for beyond in self.speeds],
+            "sliding": [
+                {
+                    "frame_name": each.frame, "distance": each.distance, "frame": each.at, "time": each.at * dt,
+                    "frames_standing": int(each.stands.sum()),
+                }
+                for each in self.sliding
+            ],
+            "depth": self.depth.tolist(),
+            "between": self.between.tolist(),
+        }  # fmt: skip
+
+
+def check(
+    clip: Clip, scene: Scene | None = None, *, depth: float = DEPTH, progress: Progress | None = None
+) -> ClipCheck:
+    """Check a clip: every pair of pieces, in every frame and in the motions between frames.
+
+    Between two frames the figure moves along ``pin.interpolate``, as `Clip.at` does. What gets deeper than `depth` in
+    between is always found, however short the time and however thin the piece. Pairs that the figure or the scene leave
+    out (`Figure.excluded_pairs`, `Scene.excluded_pairs`) are left out. Things stand where they are when the check
+    begins.
+
+    Args:
+        clip: the clip.
+        scene: things around the figure, and attached to it; the figure alone by default.
+        depth: up to which an overlap is no contact, metres.
+        progress: called with the number of frames that are done.
+
+    Raises:
+        InputError: no clip, a scene of a figure with other joints, a depth out of range, or a joint whose motion
+            between two postures cannot be bounded.
+    """
+    instance(clip, Clip, "check: clip", "read one with wb.read_clip(path, figure)")
+    scene = (
+        Scene(clip.figure) if scene is None else instance(scene, Scene, "check: scene", "make one: wb.Scene(figure)")
+    )
+    same_joints(clip, scene.figure, "check")
+    depth = number(depth, "check: depth", SMALLEST, LARGEST, "m")
+    tell: Progress | None = function(progress, "check: progress") if progress is not None else None
+    table = ContactTable(scene, len(clip))
+    with scene.lend() as workspace:
+        swept = SweptDepth(workspace.table, workspace.geometry, depth)
+        table.add(0, swept.start(clip.q[0]), between=False)
+        for frame in range(1, len(clip)):
+            found, passing = swept.advance(clip.q[frame])
+            table.add(frame, found, between=False)
+            table.add(frame - 1, passing, between=True)
+            if tell is not None and frame % EVERY == 0:
+                tell(frame)
+    if tell is not None:
+        tell(len(clip))
+    deep, between = table.deepest()
+    return ClipCheck(
+        clip=clip,
+        tolerance=depth,
+        depth=deep,
+        between=between,
+        contacts=table.contacts(depth),
+        limits=beyond_limits(clip),
+        speeds=too_fast(clip),
+        sliding=sliding(clip.figure, clip.q, clip.dt),
+        jerk=root_mean_square(joint_jerk(clip)),
+        queries=swept.asked,
+    )
+
+
+def joint_jerk(clip: Clip) -> Array:
+    """(n - 3, k) third difference of the k joint coordinates over time, without a free root; rad/s^3, m/s^3."""
+    found = third_differences(clip.figure.model, clip.q, clip.dt)
+    return found[:, 6 if clip.figure.root == "free" else 0 :]
+
+
+def same_joints(clip: Clip, figure: Figure, what: str) -> None:
+    """Check that a scene's figure takes the postures of a clip.
+
+    Raises:
+        InputError: it has other joints.
+    """
+    if figure.joints != clip.names or figure.model.nq != clip.q.shape[1]:
+        raise InputError(
+            f"{what}: the scene is of {figure.name}, which has other joints than {clip.figure.name} of {clip.name}; "
+            "make the scene with clip.figure"
+        )
+
+
+def beyond_limits(clip: Clip) -> tuple[Beyond, ...]:
+    """Joints beyond their limits, the worst first."""
+    limits, names = clip.figure.limits, _joint_of(clip.figure)
+    found = []
+    for idx_q, low, high in zip(limits.idx_q.tolist(), limits.lower, limits.upper, strict=True):
+        values = clip.q[:, idx_q]
+        excess = np.maximum(low - values, values - high)
+        worst = int(np.argmax(excess))
+        if excess[worst] > ROUNDING:
+            broken = low if values[worst] < low else high
+            count = int((excess > ROUNDING).sum())
+            found.append(
+                (excess[worst], Beyond(names[idx_q], count, worst, float(values[worst]), float(broken)))
+            )  # fmt: skip
+    return _worst_first(found)
+
+
+def too_fast(clip: Clip) -> tuple[Beyond, ...]:
+    """Joints that are faster than their velocity limits from a frame to the next one, the worst first."""
+    model, found = clip.figure.model, []
+    speed = np.abs(velocities(model, clip.q, clip.dt))
+    limit = np.array(model.velocityLimit)
+    for name in clip.names:
+        joint = model.joints[clip.figure.joint_id(name)]
+        for column in range(joint.idx_v, joint.idx_v + joint.nv):
+            excess = speed[:, column] - limit[column] * (1.0 + ROUNDING)
+            if not len(excess) or excess.max() <= 0.0 or limit[column] <= 0.0:  # 0 where a description gives none
+                continue
+            worst = int(np.argmax(excess))
+            told = Beyond(name, int((excess > 0.0).sum()), worst, float(speed[worst, column]), float(limit[column]))
+            found.append((float(excess[worst]), told))
+    return _worst_first(found)
+
+
+def _beyond_as_dict(beyond: Beyond, dt: float) -> dict[str, Any]:
+    return {
+        "joint": beyond.joint, "frames": beyond.frames, "frame": beyond.frame, "time": beyond.frame * dt,
+        "value": beyond.value, "limit": beyond.limit,
+    }  # fmt: skip
+
+
+def _worst_first(found: list[tuple[float, Beyond]]) -> tuple[Beyond, ...]:
+    return tuple(each for _, each in sorted(found, key=lambda item: -item[0]))
+
+
+def _joint_of(figure: Figure) -> dict[int, str]:
+    """Name of the joint at each place of a posture."""
+    return {figure.model.joints[figure.joint_id(name)].idx_q: name for name in reversed(figure.joints)}

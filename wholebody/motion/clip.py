@@ -1,0 +1,285 @@
+"""Clips: postures of a figure at a fixed time step, and their derivatives on the configuration manifold."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from wholebody.arrays import Array
+from wholebody.checks import array, instance, number, shown, text, time_step
+from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
+from wholebody.motion.mirroring import mirrored
+from wholebody.tracking.tracks import LARGEST, MOST_FRAMES, UNIT_TOLERANCE, Track, check_figure
+
+ROUNDING = 1e-9
+"""Share of a time step by which a time may be outside of a clip: the rounding of sums of steps."""
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """Postures of a figure at a fixed time step.
+
+    Postures may be in collision and beyond joint limits: `wb.check` reports both, and `wb.avoid` removes collisions.
+
+    Attributes:
+        figure: the figure of the postures.
+        q: (n, nq) one posture for each frame, read-only; quaternions are of unit length.
+        dt: seconds from frame to frame.
+        name: name of the clip in messages and files.
+
+    Raises:
+        InputError: no frame, another number of values than the figure has, a value that is not finite, a quaternion
+            that is not of unit length, or a time step that is not positive; the frame is named.
+    """
+
+    figure: Figure
+    q: Array = field(repr=False)
+    dt: float
+    name: str = "clip"
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        text(self.name, "the name of a clip")
+        check_figure(self.figure, self.name)
+        object.__setattr__(self, "dt", time_step(self.dt, f"{self.name}: dt"))
+        q = array(self.q, f"{self.name}: q", "postures, shape (frames, nq)").copy()
+        wanted = self.figure.model.nq
+        if q.ndim != 2 or not 0 < len(q) <= MOST_FRAMES or q.shape[1] != wanted:
+            raise InputError(
+                f"{self.name}: q has shape {q.shape}; give 1 to {MOST_FRAMES} frames of the {wanted} values of "
+                f"{self.figure.name}"
+            )
+        bad = np.argwhere(~(np.abs(q) <= LARGEST))
+        if len(bad):
+            frame, column = (int(k) for k in bad[0])
+            raise InputError(
+                f"{self.name}: frame {frame}, {column_name(self.figure, column)} is {q[frame, column]:g}; {len(bad)} "
+                f"values are not finite or beyond {LARGEST:g}; mend or cut those frames"
+            )
+        q = self._normalised(q)
+        q.setflags(write=False)
+        object.__setattr__(self, "q", q)
+
+    def _normalised(self, q: Array) -> Array:
+        """The postures with quaternions, and cosines and sines of unlimited joints, of unit length."""
+        model = self.figure.model
+        unit = np.array([pin.normalize(model, frame) for frame in q])
+        off = ~(np.abs(unit - q) <= UNIT_TOLERANCE)
+        off[[not pin.isNormalized(model, frame, UNIT_TOLERANCE) for frame in unit]] = True  # a quaternion of zeros
+        if off.any():
+            frame, column = (int(k) for k in np.argwhere(off)[0])
+            raise InputError(
+                f"{self.name}: frame {frame}, {column_name(self.figure, column)} belongs to a quaternion or a "
+                "direction that is not of unit length; normalise it"
+            )
+        return unit
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the joints in the order of q, without the free root."""
+        return self.figure.joints
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.q)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first frame to the last."""
+        return (len(self) - 1) * self.dt
+
+    @property
+    def times(self) -> Array:
+        """(n,) seconds of each frame; the first is at 0."""
+        return self.dt * np.arange(len(self), dtype=np.float64)
+
+    def __getitem__(self, frames: slice) -> Clip:
+        """Return the clip of some frames; a step of k keeps each k-th and makes the time step k times as long.
+
+        Raises:
+            InputError: not a slice of frames in ascending order, or no frame is in it.
+        """
+        if not isinstance(frames, slice):
+            raise InputError(
+                f"{self.name}[{shown(frames)}]: give a slice, such as clip[10:20]; clip.q[10] is a posture"
+            )
+        try:
+            first, last, step = frames.indices(len(self))
+        except (TypeError, ValueError):
+            raise InputError(f"{self.name}[{shown(frames)}]: give whole numbers, such as clip[10:20]") from None
+        if step < 1 or first >= last:
+            raise InputError(
+                f"{self.name}[{shown(frames)}]: no frame of {len(self)} in ascending order is in it; "
+                "give first < last and a positive step"
+            )
+        return Clip(self.figure, self.q[first:last:step], self.dt * step, self.name)
+
+    def with_q(self, q: ArrayLike, name: str | None = None) -> Clip:
+        """The clip with other postures, any number of them.
+
+        Args:
+            q: (n, nq).
+            name: a new name; the same one if left out.
+
+        Raises:
+            InputError: as for a new clip.
+        """
+        return Clip(self.figure, q, self.dt, self.name if name is None else name)  # type: ignore[arg-type]
+
+    def at(self, t: float) -> Array:
+        """Posture (nq,) at a time, interpolated between two frames on the configuration manifold.
+
+        Args:
+            t: seconds, from 0 to `duration`.
+
+        Raises:
+            InputError: a time outside of the clip.
+        """
+        slack = ROUNDING * self.dt * max(1, len(self))
+        t = number(t, f"{self.name}: t", -slack, self.duration + slack, "s")
+        return self._between(t / self.dt)
+
+    def _between(self, place: float) -> Array:
+        """Posture at a number of frames from the first one, which need not be whole."""
+        first = int(np.clip(np.floor(place), 0, max(0, len(self) - 2)))
+        share = float(np.clip(place - first, 0.0, 1.0))
+        if share <= ROUNDING or len(self) == 1:
+            return np.array(self.q[first])
+        if share >= 1.0 - ROUNDING:
+            return np.array(self.q[first + 1])
+        found: Array = pin.interpolate(self.figure.model, self.q[first], self.q[first + 1], share)
+        return found
+
+    def resampled(self, dt: float) -> Clip:
+        """The clip at another time step, interpolated on the configuration manifold.
+
+        The first frame is the same. The last one is at the last multiple of the new step within the clip.
+
+        Args:
+            dt: seconds from frame to frame.
+
+        Raises:
+            InputError: a time step that is not positive, or so short that there were more than a million frames.
+        """
+        dt = time_step(dt, f"{self.name}: dt")
+        frames = int(np.floor(self.duration / dt + ROUNDING * len(self))) + 1
+        if frames > MOST_FRAMES:
+            raise InputError(f"{self.name}: dt of {dt:g} s makes {frames} frames; give a longer one")
+        return Clip(self.figure, np.array([self._between(k * dt / self.dt) for k in range(frames)]), dt, self.name)
+
+    def mirrored(self) -> Clip:
+        """The clip with left and right exchanged, mirrored at the plane y = 0 of the world.
+
+        Raises:
+            InputError: the figure is not symmetric, or its joints do not name their sides.
+        """
+        return Clip(self.figure, mirrored(self.figure, self.q), self.dt, self.name)
+
+    def joined(self, other: Clip) -> Clip:
+        """This clip and then the other one. Nothing is blended: the first frame of the other follows the last of this.
+
+        Raises:
+            InputError: the other has other joints or another time step.
+        """
+        other = instance(other, Clip, f"{self.name}: joined", "a clip")
+        if other.names != self.names or other.q.shape[1] != self.q.shape[1]:
+            raise InputError(f"{self.name}: {other.name} has other joints; join clips of one figure")
+        if abs(other.dt - self.dt) > ROUNDING * self.dt:
+            raise InputError(
+                f"{self.name}: its time step is {self.dt:g} s, that of {other.name} {other.dt:g} s; resample one"
+            )
+        return Clip(self.figure, np.concatenate([self.q, other.q]), self.dt, self.name)
+
+    def velocities(self) -> Array:
+        """Velocities (n, nv), rad/s and m/s, by differences on the manifold: central, and one-sided at both ends.
+
+        They are exact for joints whose motion is a quadratic polynomial of time. Those of a free root are in its own
+        axes. They are zero for a clip of one frame.
+        """
+        forward, backward = self._differences()
+        v = np.zeros((len(self), self.figure.model.nv))
+        if len(self) == 2:
+            v[:] = forward[0], -backward[1]
+        elif len(self) > 2:
+            v[1:-1] = 0.5 * (forward[1:-1] - backward[1:-1])
+            model = self.figure.model
+            v[0] = 2.0 * forward[0] - 0.5 * pin.difference(model, self.q[0], self.q[2])
+            v[-1] = 0.5 * pin.difference(model, self.q[-1], self.q[-3]) - 2.0 * backward[-1]
+        v /= self.dt
+        return v
+
+    def accelerations(self) -> Array:
+        """Accelerations (n, nv), rad/s² and m/s², by second differences on the manifold, extrapolated at both ends.
+
+        They are exact for joints whose motion is a cubic polynomial of time, and zero for a clip of less than three
+        frames.
+        """
+        forward, backward = self._differences()
+        a = np.zeros_like(forward)
+        if len(self) > 2:
+            a[1:-1] = forward[1:-1] + backward[1:-1]
+            last = 1 if len(self) == 3 else 2
+            a[0] = 2.0 * a[1] - a[last]
+            a[-1] = 2.0 * a[-2] - a[-1 - last]
+        a /= self.dt**2
+        return a
+
+    def jerk(self) -> Array:
+        """Jerk (n, nv), rad/s³ and m/s³: differences of the accelerations, exact for cubic polynomials of time.
+
+        It is zero for a clip of less than four frames.
+        """
+        if len(self) < 4:
+            return np.zeros((len(self), self.figure.model.nv))
+        found: Array = np.gradient(self.accelerations(), self.dt, axis=0)
+        return found
+
+    def _differences(self) -> tuple[Array, Array]:
+        """Displacements (n, nv) from each frame to the next one and to the one before; zero where there is none."""
+        model = self.figure.model
+        forward, backward = (np.zeros((len(self), model.nv)) for _ in range(2))
+        for k in range(len(self) - 1):
+            forward[k] = pin.difference(model, self.q[k], self.q[k + 1])
+            backward[k + 1] = pin.difference(model, self.q[k + 1], self.q[k])
+        return forward, backward
+
+    @classmethod
+    def from_track(cls, track: Track, figure: Figure) -> Clip:
+        """The clip of a tracker's postures.
+
+        Raises:
+            UnknownNameError: the track has a joint that the figure does not have.
+            InputError: it lacks joints, or has them in another order.
+        """
+        instance(track, Track, "Clip.from_track: track", "make one with Track.of(figure, q, dt)").check(figure)
+        return cls(figure, track.q, track.dt, track.name)
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the clip to a file; the ending of its name chooses the format.
+
+        Returns:
+            The path.
+
+        Raises:
+            InputError: an ending that is not known, a figure that the format cannot hold, or a file that cannot be
+                written.
+        """
+        from wholebody.motion.files import write_motion
+
+        return write_motion(self, path)
+
+
+def column_name(figure: Figure, column: int) -> str:
+    """What a column of a clip's postures is, for messages."""
+    for name in ("root", *figure.joints) if figure.root == "free" else figure.joints:
+        joint = figure.model.joints[figure.joint_id(name)]
+        if joint.idx_q <= column < joint.idx_q + joint.nq:
+            what = "the root" if name == "root" else f"joint {name}"
+            return what if joint.nq == 1 else f"value {column - joint.idx_q} of {what}"
+    return f"value {column}"

@@ -1,0 +1,173 @@
+"""Contacts of a clip: which segments and things overlap, when, how deep and for how long."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.arrays import Array
+from wholebody.geometry.continuous.swept_depth import Depths
+from wholebody.scene import Scene
+
+Kind = Literal["self", "equipment", "thing"]
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Two segments or things that overlap somewhere in a clip.
+
+    A frame is in contact where the two overlap by more than the tolerance of the check; a gap, from a frame to the
+    next one, where they do so in between.
+
+    Attributes:
+        first: a segment or thing.
+        second: the other one.
+        kind: "self" for two segments of the figure, "equipment" if an attached thing takes part, otherwise "thing":
+            something that stands in the world.
+        frames: number of frames in contact.
+        gaps: number of gaps in contact.
+        start: the first frame in contact; where the contact begins in a gap, the frame before.
+        deepest: greatest depth, metres.
+        deepest_frame: the frame in which it is deepest; the one before, where it is deepest in a gap.
+        deepest_between: whether it is deepest in a gap.
+        longest: first and last frame of the longest contact; frames beside a gap in contact belong to it.
+        depth: (n,) depth in each frame, metres; 0 where the two do not overlap.
+        between: (n - 1,) depth in each gap, metres.
+    """
+
+    first: str
+    second: str
+    kind: Kind
+    frames: int
+    gaps: int
+    start: int
+    deepest: float
+    deepest_frame: int
+    deepest_between: bool
+    longest: tuple[int, int]
+    depth: Array = field(repr=False)
+    between: Array = field(repr=False)
+
+    @property
+    def names(self) -> str:
+        """Both names, for messages."""
+        return f"{self.first} and {self.second}"
+
+
+class ContactTable:
+    """Depths of all pairs of owners, filled frame by frame."""
+
+    def __init__(self, scene: Scene, frames: int) -> None:
+        """Number the pairs of owners of a scene.
+
+        Args:
+            scene: the scene.
+            frames: number of frames of the clip.
+        """
+        owners, numbers = scene.piece_owner, dict[tuple[str, str], int]()
+        pairs = scene.pair_table.pairs
+        named = [(owners[a], owners[b]) for a, b in pairs.tolist()]
+        self._of = np.array([numbers.setdefault(pair, len(numbers)) for pair in named], dtype=np.intp)
+        self._names, self._scene, self._frames = list(numbers), scene, frames
+        self._found: dict[int, tuple[Array, Array]] = {}
+
+    def add(self, place: int, depths: Depths, *, between: bool) -> None:
+        """Enter the overlaps of a frame, or of the gap after it."""
+        for number, depth in zip(self._of[depths.number].tolist(), depths.depth.tolist(), strict=True):
+            if number not in self._found:
+                self._found[number] = np.zeros(self._frames), np.zeros(max(0, self._frames - 1))
+            row = self._found[number][int(between)]
+            row[place] = max(row[place], depth)
+
+    def contacts(self, tolerance: float) -> tuple[Contact, ...]:
+        """The pairs that overlap by more than the tolerance, the deepest first."""
+        found = [
+            contact(*self._names[number], self._kind(*self._names[number]), depth, between, tolerance)
+            for number, (depth, between) in self._found.items()
+            if max(depth.max(), between.max(initial=0.0)) > tolerance
+        ]
+        return tuple(sorted(found, key=lambda contact: -contact.deepest))
+
+    def deepest(self) -> tuple[Array, Array]:
+        """Deepest overlap of any pair in each frame (n,), and in each gap (n - 1,)."""
+        depth, between = np.zeros(self._frames), np.zeros(max(0, self._frames - 1))
+        for in_frames, in_gaps in self._found.values():
+            np.maximum(depth, in_frames, out=depth)
+            np.maximum(between, in_gaps, out=between)
+        return depth, between
+
+    def _kind(self, first: str, second: str) -> Kind:
+        things = [self._scene.objects[name] for name in (first, second) if name in self._scene.objects]
+        if not things:
+            return "self"
+        return "equipment" if all(thing.segment is not None for thing in things) else "thing"
+
+
+def contact(first: str, second: str, kind: Kind, depth: Array, between: Array, tolerance: float) -> Contact:
+    """The contact of two owners from their depths, of which one is beyond the tolerance.
+
+    Args:
+        first: a segment or thing.
+        second: the other one.
+        kind: see `Contact`.
+        depth: (n,) in each frame, metres.
+        between: (n - 1,) in each gap, metres.
+        tolerance: metres.
+    """
+    # frames and gaps in the order of time: 2 k is frame k, 2 k + 1 the gap after it
+    times = np.zeros(2 * len(depth) - 1)
+    times[::2], times[1::2] = depth, between
+    touching = times > tolerance
+    starts, ends = runs(touching)
+    long = int(np.argmax(ends - starts))
+    deepest = int(np.argmax(times))
+    # a gap is never less deep than its ends: the frame is meant where it is as deep, to the accuracy of gaps
+    beside = [k for k in (deepest - 1, deepest + 1) if 0 <= k < len(times) and times[k] >= 0.97 * times[deepest]]
+    if deepest % 2 and beside:
+        deepest = max(beside, key=lambda k: times[k])
+    return Contact(
+        first=first,
+        second=second,
+        kind=kind,
+        frames=int(touching[::2].sum()),
+        gaps=int(touching[1::2].sum()),
+        start=int(starts[0]) // 2,
+        deepest=float(times[deepest]),
+        deepest_frame=deepest // 2,
+        deepest_between=bool(deepest % 2),
+        longest=(int(starts[long]) // 2, int(ends[long]) // 2),
+        depth=depth,
+        between=between,
+    )
+
+
+def contact_as_dict(contact: Contact, dt: float) -> dict[str, Any]:
+    """A contact as JSON has it; lengths in metres, times in seconds."""
+    return {
+        "first": contact.first,
+        "second": contact.second,
+        "kind": contact.kind,
+        "frames": contact.frames,
+        "gaps": contact.gaps,
+        "start": {"frame": contact.start, "time": contact.start * dt},
+        "deepest": {
+            "depth": contact.deepest,
+            "frame": contact.deepest_frame,
+            "time": contact.deepest_frame * dt,
+            "between": contact.deepest_between,
+        },
+        "longest": {
+            "first_frame": contact.longest[0],
+            "last_frame": contact.longest[1],
+            "seconds": (contact.longest[1] - contact.longest[0]) * dt,
+        },
+    }
+
+
+def runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First places of the runs of true values of a mask (n,), and the places after their last ones."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return edges[::2].astype(np.intp), edges[1::2].astype(np.intp)

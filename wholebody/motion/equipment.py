@@ -1,0 +1,193 @@
+"""Equipment: what a figure wears, on one of its segments; exact, or filled with spheres that join a collision group."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.checks import choice, color, instance, known, listed, number, text
+from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
+from wholebody.geometry.placement import PlacementLike, placement
+from wholebody.geometry.shapes import Shape
+from wholebody.geometry.swept_points import swept_points
+from wholebody.motion.sphere_filling import SphereFilling, fill_with_spheres
+from wholebody.scene import Scene
+
+Side = Literal["front", "back", "left", "right"]
+
+OUTWARD = {"front": (1.0, 0.0, 0.0), "back": (-1.0, 0.0, 0.0), "left": (0.0, 1.0, 0.0), "right": (0.0, -1.0, 0.0)}
+"""Direction from the body to what is worn on a side: x is forward and y left."""
+
+FARTHEST = 1.0  # m: greatest height of worn equipment above the origin of its segment
+
+
+@dataclass(frozen=True, eq=False)
+class Equipment:
+    """A solid on a segment of a figure.
+
+    `attach` puts it into a scene as it is: its exact shape moves with the segment and is tested against all others but
+    those it rests on and neighbours of the segment that it touches in the figure's first posture. `filled` gives what a
+    sphere-based test takes: spheres, which join the collision group of the segment and are tested across groups only.
+    So a pouch of spheres on the thorax is not tested against the pelvis, and an exact one is, unless it rests on it.
+
+    Attributes:
+        name: a name that nothing else in the scene has.
+        shape: the solid; a `Mesh` of several parts keeps its holes.
+        to: the segment that carries it.
+        at: its placement in the segment's frame; as for `Scene.add`.
+        rests_on: segments that it is not tested against.
+        color: red, green, blue and, if wanted, alpha, each from 0 to 1.
+        filling: the spheres that fill it, once `filled`.
+    """
+
+    name: str
+    shape: Shape
+    to: str
+    at: PlacementLike = (0.0, 0.0, 0.0)
+    rests_on: tuple[str, ...] = ()
+    color: tuple[float, float, float, float] | None = None
+    filling: SphereFilling | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            InputError: a value of the wrong kind or range.
+        """
+        where = f"Equipment {text(self.name, 'Equipment: name')!r}"
+        instance(self.shape, Shape, f"{where}: shape", "give wb.Mesh('pack.obj'), wb.Box or another")
+        text(self.to, f"{where}: to")
+        object.__setattr__(self, "at", placement(self.at, f"{where}: at"))
+        rests = tuple(
+            text(name, f"{where}: rests_on") for name in listed(self.rests_on, f"{where}: rests_on", "['thorax']")
+        )
+        object.__setattr__(self, "rests_on", rests)
+        if self.color is not None:
+            object.__setattr__(self, "color", color(self.color, f"{where}: color"))
+
+    @classmethod
+    def worn(
+        cls,
+        shape: Shape,
+        figure: Figure,
+        *,
+        name: str,
+        to: str = "thorax",
+        side: Side = "back",
+        height: float = 0.0,
+        sideways: float = 0.0,
+        color: tuple[float, float, float, float] | None = None,
+    ) -> Equipment:
+        """Equipment against the surface of a segment: the nearest point of its bounding box touches it.
+
+        It rests on all segments of the carrier's collision group, as straps hold a pack to the whole trunk.
+
+        Args:
+            shape: the solid, upright and facing forward in its own axes: x forward, y left, z up.
+            figure: the figure that wears it.
+            name: a name that nothing else in the scene has.
+            to: the segment that carries it.
+            side: of the segment in the figure's zero posture, in which x is forward and y left.
+            height: of the middle of the shape's bounding box above the segment's origin, metres.
+            sideways: of its middle to the left (on the left and right side: forward) of the segment's origin, metres.
+            color: red, green, blue and, if wanted, alpha, each from 0 to 1.
+
+        Raises:
+            UnknownNameError: the figure has no such segment, or there is no such side.
+            InputError: a value of the wrong kind or range, or the segment has no pieces.
+        """
+        where = f"Equipment {text(name, 'Equipment: name')!r}"
+        instance(figure, Figure, f"{where}: figure", "load one with wb.load('human')")
+        instance(shape, Shape, f"{where}: shape", "give wb.Mesh('pack.obj'), wb.Box or another")
+        known(to, figure.segments, "segment", f"{where}: to")
+        outward = np.array(OUTWARD[choice(side, tuple(OUTWARD), f"{where}: side")])
+        shift = number(sideways, f"{where}: sideways", -FARTHEST, FARTHEST, "m")
+        middle = np.array([0.0, shift, 0.0]) if side in ("front", "back") else np.array([shift, 0.0, 0.0])
+        middle[2] = number(height, f"{where}: height", -FARTHEST, FARTHEST, "m")
+        low, high = bounds(shape)
+        half = 0.5 * np.abs(outward) @ (high - low)
+        at = middle + outward * (_surface(figure, to, outward, where) + half) - 0.5 * (low + high)
+        return cls(name, shape, to, tuple(at.tolist()), group_of(figure, to), color)
+
+    def filled(self, count: int, *, envelope: bool = False) -> Equipment:
+        """A copy of `count` spheres that fill the shape as it stands, or its convex envelope; `filling` says how well.
+
+        Raises:
+            InputError: the shape cannot be filled; see `wholebody.motion.sphere_filling.fill_with_spheres`.
+        """
+        filling = fill_with_spheres(self.shape, count, envelope=envelope)
+        result = replace(self, shape=filling.shape)
+        object.__setattr__(result, "filling", filling)
+        return result
+
+    def attach(self, scene: Scene) -> Scene:
+        """Attach it to the figure of a scene.
+
+        What is filled is not tested against the segments of the carrier's collision group, and not against equipment
+        that the scene already has on those.
+
+        Returns:
+            The scene, so that calls can be chained.
+
+        Raises:
+            UnknownNameError: the figure has no such segment.
+            InputError: the scene already has something of that name.
+        """
+        instance(scene, Scene, f"Equipment {self.name!r}: scene", "make one with wb.Scene(figure)")
+        rests = self.rests_on
+        if self.filling is not None:
+            group = group_of(scene.figure, known(self.to, scene.figure.segments, "segment", f"Equipment {self.name!r}"))
+            others = [thing.name for thing in scene.objects.values() if thing.segment in group]
+            rests = tuple(dict.fromkeys((*rests, *group, *others)))
+        return scene.attach(self.shape, to=self.to, name=self.name, at=self.at, rests_on=rests, color=self.color)
+
+
+def group_of(figure: Figure, segment: str) -> tuple[str, ...]:
+    """The segments of a segment's collision group; the segment alone where the figure has no groups."""
+    groups = figure.collision_groups
+    group = groups.get(segment)
+    return (segment,) if group is None else tuple(name for name in figure.segments if groups.get(name) == group)
+
+
+def bounds(shape: Shape) -> tuple[Array, Array]:
+    """Least and greatest corner (3,) of a shape's bounding box, metres.
+
+    Raises:
+        InputError: it has none, as a half-space.
+    """
+    extents = [
+        _along(piece.geometry, piece.placement, axis)
+        for axis in np.vstack([np.eye(3), -np.eye(3)])
+        for piece in shape.pieces()
+    ]
+    most = np.array(extents).reshape(6, -1).max(axis=1)
+    if not np.isfinite(most).all():
+        raise InputError(f"a {type(shape).__name__} has no bounds; equipment is a solid of finite size")
+    return -most[3:], most[:3]
+
+
+def _surface(figure: Figure, segment: str, outward: Array, where: str) -> float:
+    """How far the pieces of a segment reach from its origin in a direction of its frame, metres."""
+    frame = figure.model.frames[figure.frame_id(segment)]
+    back = frame.placement.inverse()
+    found = [
+        _along(piece.geometry, back * piece.placement, outward)
+        for piece in figure.geometry.geometryObjects
+        if figure.model.frames[piece.parentFrame].name == segment
+    ]
+    if not found:
+        raise InputError(f"{where}: {segment!r} has no pieces to wear something on; choose another segment")
+    return max(found)
+
+
+def _along(geometry: object, at: pin.SE3, direction: Array) -> float:
+    """How far a piece reaches along a unit direction, metres."""
+    swept = swept_points(geometry)
+    local = at.rotation.T @ direction
+    reach = float((swept.points @ local).max()) + swept.radius if len(swept.points) else swept.reach
+    return float(at.translation @ direction) + reach

@@ -1,0 +1,49 @@
+"""Files of clips: the ending of a file's name chooses the format; one module a format."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection
+from pathlib import Path
+
+from wholebody.checks import path as checked_path
+from wholebody.errors import FileFormatError, one_line
+from wholebody.figures.figure import Figure
+from wholebody.motion.files import archive
+from wholebody.motion.files.base import Frames, Motion
+
+WRITERS: dict[str, Callable[[Motion, Path], Path]] = {".npz": archive.write}
+"""Ending of a name to the function that writes the format."""
+
+READERS: dict[str, Callable[[Path, Figure], Frames]] = {".npz": archive.read}
+"""Ending of a name to the function that reads postures of a figure."""
+
+
+def write_motion(motion: Motion, path: str | os.PathLike[str]) -> Path:
+    """Write a clip in the format that the ending of the file's name says.
+
+    Raises:
+        InputError: as for `Clip.write`.
+    """
+    path = checked_path(path, "path")
+    return WRITERS[_ending(path, WRITERS, "written")](motion, path)
+
+
+def read_frames(path: str | os.PathLike[str], figure: Figure) -> Frames:
+    """Read postures of a figure from a file in the format that the ending of its name says.
+
+    Raises:
+        FileFormatError: as for `wb.read_clip`.
+    """
+    path = checked_path(path, "path")
+    return READERS[_ending(path, READERS, "read")](path, figure)
+
+
+def _ending(path: Path, known: Collection[str], done: str) -> str:
+    ending = path.suffix.lower()
+    if ending not in known:
+        raise FileFormatError(
+            f"{one_line(path.name)}: a clip cannot be {done} as {one_line(ending) or 'a file without ending'}; "
+            f"give one of {', '.join(sorted(known))}"
+        )
+    return ending

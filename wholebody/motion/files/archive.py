@@ -1,0 +1,116 @@
+"""Clips as npz, without loss: arrays of postures, time step, names of joints."""
+
+from __future__ import annotations
+
+import io
+import tokenize
+import zipfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.errors import FileFormatError, UnknownNameError, one_line
+from wholebody.figures.figure import Figure
+from wholebody.files import LARGEST, read_bytes
+from wholebody.files import write as write_file
+from wholebody.motion.files.base import Frames, Motion
+
+VERSION = 1
+"""Of the layout of the arrays."""
+
+BROKEN = (
+    *(zipfile.BadZipFile, zlib.error, tokenize.TokenError, ValueError, OSError, EOFError, KeyError, SyntaxError),
+    *(NotImplementedError, RuntimeError, MemoryError, OverflowError, TypeError),
+)
+"""What numpy and zipfile raise for a damaged archive."""
+
+
+def write(motion: Motion, path: Path) -> Path:
+    """Write a clip as npz: `wholebody_clip` (version), `q`, `dt`, `name`, `joints`, `figure`.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    data = io.BytesIO()
+    np.savez_compressed(
+        data,
+        wholebody_clip=np.array(VERSION),
+        q=motion.q,
+        dt=np.array(motion.dt),
+        name=np.array(motion.name),
+        joints=np.array(motion.figure.joints, dtype=np.str_),
+        figure=np.array(motion.figure.name),
+    )
+    return write_file(path, data.getvalue())
+
+
+def read(path: Path, figure: Figure) -> Frames:
+    """Read a clip that `write` wrote.
+
+    Raises:
+        FileFormatError: it is no such archive, it is damaged, or its joints are in another order than the figure's.
+        UnknownNameError: it has a joint that the figure does not have.
+    """
+    arrays = read_arrays(path)
+    if "wholebody_clip" not in arrays:
+        raise FileFormatError(f"{path.name}: is no clip of wholebody; its arrays are {_listed(arrays)}")
+    missing = [name for name in ("q", "dt", "name", "joints") if name not in arrays]
+    if missing:
+        raise FileFormatError(f"{path.name}: the arrays lack {', '.join(missing)}; write the clip anew")
+    q, dt, joints = arrays["q"], arrays["dt"], [str(joint) for joint in np.atleast_1d(arrays["joints"])]
+    if q.dtype.kind not in "fiu" or q.ndim != 2 or dt.dtype.kind not in "fiu" or dt.shape != ():
+        raise FileFormatError(f"{path.name}: q of shape {q.shape} and dt of shape {dt.shape} are no clip")
+    check_joints(path, joints, figure)
+    if q.shape[1] != figure.model.nq:
+        raise FileFormatError(
+            f"{path.name}: {q.shape[1]} values a frame, and {figure.name} has {figure.model.nq}; load the figure that "
+            "the clip was made with"
+        )
+    name = str(arrays["name"])
+    return Frames(q.astype(np.float64), float(dt), name if name.strip() and name.isprintable() else path.stem)
+
+
+def check_joints(path: Path, joints: list[str], figure: Figure) -> None:
+    """Check that the joints of a file are those of a figure, in the same order.
+
+    Raises:
+        UnknownNameError: a joint that the figure does not have.
+        FileFormatError: joints are missing or in another order.
+    """
+    for joint in joints:
+        if joint not in figure.joints:
+            raise UnknownNameError("joint", joint, figure.joints, path.name)
+    if tuple(joints) != figure.joints:
+        missing = [joint for joint in figure.joints if joint not in joints]
+        what = f"it lacks the joints {', '.join(missing[:4])}" if missing else "its joints are in another order"
+        raise FileFormatError(f"{path.name}: {what}; load the figure that the clip was made with")
+
+
+def read_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
+    """All arrays of an npz file, without those of Python objects.
+
+    Raises:
+        FileFormatError: it is no npz file, it is damaged, or it is too large when unpacked.
+    """
+    data = read_bytes(path, "clip")
+    arrays: dict[str, NDArray[np.generic]] = {}
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > LARGEST:
+                raise FileFormatError(f"{path.name}: is larger than {LARGEST / 1e6:g} MB when unpacked")
+            for entry in archive.infolist():
+                content = np.load(io.BytesIO(archive.read(entry)), allow_pickle=False)
+                if isinstance(content, np.ndarray):
+                    arrays[entry.filename.removesuffix(".npy")] = content
+    except FileFormatError as error:
+        raise FileFormatError(f"{error}") from None
+    except BROKEN as error:
+        why = one_line(f"{type(error).__name__}: {error}")
+        raise FileFormatError(f"{path.name}: is no npz file, or it is cut off or damaged ({why})") from None
+    return arrays
+
+
+def _listed(arrays: dict[str, NDArray[np.generic]]) -> str:
+    return ", ".join(one_line(name, 30) for name in list(arrays)[:6]) or "none"

@@ -1,0 +1,137 @@
+"""What holds in every frame of a clip: constraints resolved at each original posture, and bounds on the deviations.
+
+A term that refers to the start ("as at the start") refers to the original posture of its own frame. So
+`Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has, `Hold("left_foot")` keeps the foot
+where it was in that frame, and `Freeze("root")` keeps the root's motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.checks import a, listed
+from wholebody.errors import InputError
+from wholebody.figures.state import State
+from wholebody.motion.stance import StanceFeet, standing
+from wholebody.scene import Scene
+from wholebody.tasks import Hold
+from wholebody.tasks.base import Bound, Constraint, Goal
+from wholebody.tasks.checks import check_rows
+
+HeldTerm = Constraint | Goal
+Given = Constraint | Goal | Bound | StanceFeet
+
+
+@dataclass(frozen=True, eq=False)
+class FrameTerms:
+    """What holds in the frames of one clip.
+
+    Attributes:
+        scene: figure and things.
+        q: (n, nq) original postures.
+        dt: seconds from frame to frame.
+        given: the terms as they were given, without `StanceFeet`.
+        stands: for each frame, names of the feet that stand there and are held.
+    """
+
+    scene: Scene
+    q: Array
+    dt: float
+    given: tuple[Constraint | Goal | Bound, ...]
+    stands: tuple[tuple[str, ...], ...]
+
+    def held(self, frame: int) -> tuple[HeldTerm, ...]:
+        """Constraints and goals of a frame, resolved at its original posture."""
+        terms = [term for term in self.given if not isinstance(term, Bound)]
+        feet = [Hold(foot) for foot in self.stands[frame]]
+        return tuple(term.resolve(self.scene, self.q[frame]) for term in (*terms, *feet))
+
+    def bounds(self, frame: int, state: State) -> tuple[Array, Array, Array, Array]:
+        """Bounds of a frame.
+
+        Args:
+            frame: which.
+            state: of the run; it is moved to the original posture.
+
+        Returns:
+            Least and greatest deviation, and least and greatest change of the posture in one frame, each (nv,).
+        """
+        nv = self.scene.model.nv
+        low, high, slow, fast = (np.full(nv, value) for value in (-np.inf, np.inf, -np.inf, np.inf))
+        bounds = [term.resolve(self.scene, self.q[frame]) for term in self.given if isinstance(term, Bound)]
+        if bounds:
+            state.update(self.q[frame])
+        for bound in bounds:
+            least, most = bound.bounds(state, None)
+            low, high = np.maximum(low, least), np.minimum(high, most)
+            slower, faster = bound.bounds(state, self.dt)
+            slow = np.maximum(slow, np.where(np.isfinite(least), -np.inf, slower))
+            fast = np.minimum(fast, np.where(np.isfinite(most), np.inf, faster))
+        return low, high, slow, fast
+
+    def missed(self, frame: int, state: State) -> float:
+        """By how much the state, of the posture of a frame, misses what is held there, metres and radians."""
+        worst = 0.0
+        for term in self.held(frame):
+            if isinstance(term, Goal):
+                worst = max(worst, float(np.abs(term.error(state)).max(initial=0.0)))
+            else:
+                value = np.atleast_1d(term.value(state))
+                worst = max(worst, float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0)))
+        return worst
+
+    @property
+    def holds(self) -> bool:
+        """Whether something is held."""
+        return any(not isinstance(term, Bound) for term in self.given) or any(map(bool, self.stands))
+
+
+def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given]) -> FrameTerms:
+    """Check what is to hold, and find the feet that stand.
+
+    Args:
+        scene: figure and things.
+        q: (n, nq) original postures.
+        dt: seconds from frame to frame.
+        constraints: terms.
+
+    Raises:
+        InputError: something else than a constraint, a goal, a bound or `StanceFeet`.
+        UnknownNameError: a term names something that the figure does not have.
+    """
+    given: list[Any] = listed(constraints, "avoid: constraints", "[wb.Freeze('root')]")
+    feet: list[list[str]] = [[] for _ in q]
+    for number, term in enumerate(given):
+        if isinstance(term, StanceFeet):
+            for foot, stand in standing(scene.figure, q, dt, term).items():
+                for frame in np.flatnonzero(stand):
+                    feet[frame].append(foot)
+        elif isinstance(term, (Constraint, Goal)):
+            _try(term, scene, q[0], f"avoid: constraints[{number}]")
+        elif isinstance(term, Bound):
+            term.resolve(scene, q[0])
+        else:
+            raise InputError(
+                f"avoid: constraints[{number}] is {a(type(term))}, not a constraint; see wholebody.tasks, or give "
+                "wb.StanceFeet()"
+            )
+    plain = tuple(term for term in given if not isinstance(term, StanceFeet))
+    return FrameTerms(scene, q, dt, plain, tuple(map(tuple, feet)))
+
+
+def _try(term: HeldTerm, scene: Scene, q: Array, where: str) -> None:
+    state = State(scene.model).update(q)
+    resolved = term.resolve(scene, q)
+    value = resolved.error(state) if isinstance(resolved, Goal) else resolved.value(state)
+    check_rows(where, resolved, value, resolved.jacobian(state), state)
+
+
+def speed_limits(scene: Scene, dt: float) -> Array:
+    """(nv,) largest change of each degree of freedom in one frame; infinite for what has no limit."""
+    limit = np.array(scene.model.velocityLimit, dtype=float).reshape(-1)
+    return np.where(limit > 0.0, np.minimum(limit, 1e9) * dt, np.inf)

@@ -1,0 +1,168 @@
+"""Method "frames": every frame by tracking the original posture, with the frame before as its start.
+
+A forward pass follows the original motion as contacts let it. It is late where contact begins, so a backward pass
+follows it from the last frame to the first, and both are blended. What overlaps after that is put right by steps of the
+tracker.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody import checks
+from wholebody.arrays import Array
+from wholebody.methods.qp.method import QP
+from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
+from wholebody.motion.clip import Clip
+from wholebody.motion.dips import dips
+from wholebody.motion.faults import DEPTH, depth, faults
+from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
+from wholebody.motion.windows import Window, windows
+from wholebody.problem import Problem
+from wholebody.scene import Scene
+from wholebody.tasks import Posture
+from wholebody.tasks.base import Constraint, Goal
+from wholebody.workspace import Workspace
+
+MARGIN = 0.3  # s, before and after a collision: in which the pass begins and ends at the original posture
+BACK = 1e-4  # rad, m: a posture this near to the original one is the original one
+MOST = 6  # steps of one frame
+ROOM = 5e-4  # m: more room that the frames beside a dip are first asked for; it doubles from round to round
+LIFTS = 6  # rounds of asking for more
+STEP = 1e-4  # rad, m: a step no longer than this ends a frame
+
+
+class Follower:
+    """Follows the original motion frame by frame.
+
+    Attributes:
+        programs: how many quadratic programs were solved.
+    """
+
+    def __init__(self, terms: FrameTerms, clearance: float) -> None:
+        """Set up on a scene.
+
+        Args:
+            terms: original postures, and what is held.
+            clearance: least distance of every pair, metres.
+        """
+        self._terms, self._clearance, self.programs = terms, clearance, 0
+        q = terms.scene.figure.clamp(terms.q[0])
+        self._problem = Problem(terms.scene, q, goals=[Posture(terms.q[0])], measures=(), clearance=0.0)
+        self._tracker = QP(restarts=0).tracker(self._problem, terms.dt)
+
+    def frame(self, number: int, q: Array, more: float = 0.0) -> Array:
+        """The posture of a frame, begun at a posture (nq,): steps until they are short.
+
+        Args:
+            number: of the frame.
+            q: (nq,) where the steps begin.
+            more: metres that are asked of every pair beyond the clearance.
+        """
+        terms, problem = self._terms, self._problem
+        problem.clearances = np.full_like(problem.clearances, self._clearance + more)
+        goal = Posture(terms.q[number]).resolve(terms.scene, problem.start)
+        held = terms.held(number)
+        problem.goals = (goal, *(term for term in held if isinstance(term, Goal)))
+        if held:
+            problem.constraints = tuple(term for term in held if isinstance(term, Constraint))
+        for _ in range(MOST):
+            step = self._tracker.step(q)
+            self.programs += 1
+            q = step.q
+            if np.abs(step.displacement).max(initial=0.0) <= STEP:
+                break
+        return q
+
+
+@dataclass(frozen=True)
+class PerFrame:
+    """Every frame by tracking, forward and backward.
+
+    Attributes:
+        clearance: least distance of every pair, metres.
+        backward: whether a backward pass is blended with the forward pass; twice the time, no lag.
+
+    Raises:
+        InputError: a value out of range.
+    """
+
+    clearance: float = 0.0
+    backward: bool = True
+
+    def __post_init__(self) -> None:
+        """Check the settings."""
+        checks.number(self.clearance, "PerFrame: clearance", 0.0, 0.5, "m")
+        checks.flag(self.backward, "PerFrame: backward")
+
+    @property
+    def name(self) -> str:
+        """Name for tables."""
+        return "frames"
+
+    def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
+        """Free a clip; see `wholebody.motion.avoider.Avoider`."""
+        check_input(clip, scene, progress)
+        terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
+        q = np.array(clip.q)
+        with scene.lend() as workspace:
+            _, wrong, gaps = faults(workspace, terms, q, self.clearance)
+            wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
+            found = windows(wrong, max(2, round(MARGIN / clip.dt)))
+            total = sum(map(len, found))
+            follower, done = Follower(terms, self.clearance) if found else None, 0
+            for window in found:
+                if follower is None or watch.tell(done / total, "frames"):
+                    break
+                self._free(window, q, terms, follower, workspace)
+                _lift(window, q, follower, workspace)
+                done += len(window)
+        ended = "the caller ended it" if watch.ended else ""
+        return MethodResult(q, 0, 0 if follower is None else follower.programs, ended)
+
+    def _free(self, window: Window, q: Array, terms: FrameTerms, follower: Follower, workspace: Workspace) -> None:
+        forward = _passed(follower, terms, range(window.first, window.end))
+        if not self.backward or len(window) < 2:
+            q[window.first : window.end] = forward
+            return
+        backward = _passed(follower, terms, range(window.end - 1, window.first - 1, -1))[::-1]
+        model = workspace.model
+        for place, share in enumerate(np.linspace(0.0, 1.0, len(window)).tolist()):
+            # the forward pass is late at the beginning of contacts, the backward pass at their ends
+            blended = np.asarray(pin.interpolate(model, backward[place], forward[place], _smooth(share)))
+            if depth(workspace, blended, self.clearance) > DEPTH:
+                blended = follower.frame(window.first + place, blended)
+            q[window.first + place] = blended
+
+
+def _passed(follower: Follower, terms: FrameTerms, frames: range) -> Array:
+    """(n, nq) postures of frames, each begun at the one before."""
+    found, here = [], terms.scene.figure.clamp(terms.q[frames[0]])
+    for frame in frames:
+        here = follower.frame(frame, here)
+        found.append(here)
+    return np.array(found)
+
+
+def _lift(window: Window, q: Array, follower: Follower, workspace: Workspace) -> None:
+    """Ask for more room in the frames on both sides of motions that dip, until none does."""
+    more = np.zeros(len(q))
+    gaps = list(range(max(0, window.first - 1), min(len(q) - 1, window.end)))
+    for _ in range(LIFTS):
+        dipping = list(dips(workspace, q, gaps))
+        if not dipping:
+            return
+        frames = sorted({frame + end for frame in dipping for end in (0, 1)})
+        for frame in frames:
+            more[frame] = 2.0 * more[frame] + ROOM
+            q[frame] = follower.frame(frame, q[frame], float(more[frame]))
+        gaps = sorted({gap for frame in frames for gap in (frame - 1, frame) if 0 <= gap < len(q) - 1})
+
+
+def _smooth(share: float) -> float:
+    """From 0 to 1 with no rate at both ends."""
+    return share * share * (3.0 - 2.0 * share)

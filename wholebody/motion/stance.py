@@ -1,0 +1,105 @@
+"""Feet that stand: found in a clip by their speed and height."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wholebody import checks
+from wholebody.arrays import Array, Mask
+from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
+from wholebody.figures.state import State
+
+FEET = ("left_foot", "right_foot")
+LOWEST_SHARE = 0.02  # of the frames: how many may be lower than what counts as the ground, because they are errors
+
+
+@dataclass(frozen=True)
+class StanceFeet:
+    """Hold every foot that stands where it was: a constraint for `wb.avoid`.
+
+    A foot stands where it is slow and near its lowest height in the clip.
+
+    Attributes:
+        feet: frames of the feet; None for the figure's "left_foot" and "right_foot".
+        speed: largest speed of a standing foot, m/s.
+        height: largest height of a standing foot above its lowest, metres.
+        least: shortest stand, seconds; shorter ones are moments of a swing.
+
+    Raises:
+        InputError: a value out of range.
+    """
+
+    feet: Sequence[str] | None = None
+    speed: float = 0.15
+    height: float = 0.05
+    least: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if self.feet is not None:
+            object.__setattr__(self, "feet", tuple(checks.listed(self.feet, "StanceFeet: feet", "['left_foot']")))
+        for name, most in (("speed", 100.0), ("height", 10.0), ("least", 100.0)):
+            checks.number(getattr(self, name), f"StanceFeet: {name}", 0.0, most)
+
+    def names(self, figure: Figure) -> tuple[str, ...]:
+        """Frames of the feet of a figure.
+
+        Raises:
+            UnknownNameError: the figure has no such frame.
+            InputError: no feet are named, and the figure has none of the usual names.
+        """
+        checks.instance(figure, Figure, "StanceFeet: figure", "load one with wb.load('human')")
+        if self.feet is not None:
+            for name in self.feet:
+                figure.frame_id(name)
+            return tuple(self.feet)
+        found = tuple(name for name in FEET if name in (*figure.frames, *figure.segments))
+        if not found:
+            raise InputError(f"StanceFeet: {figure.name} has no frames {' or '.join(FEET)}; name the feet")
+        return found
+
+
+def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None) -> Mapping[str, Mask]:
+    """For each foot in which frames of (n, nq), `dt` seconds apart, it stands: name -> (n,).
+
+    Raises:
+        UnknownNameError: the figure has no such frame.
+        InputError: the figure has no feet of the usual names, and none are named.
+    """
+    settings = StanceFeet() if feet is None else feet
+    names = settings.names(figure)
+    state = State(figure.model)
+    places = np.empty((len(q), len(names), 3))
+    for frame, posture in enumerate(q):
+        state.update(posture)
+        places[frame] = [state.frame(figure.frame_id(name)).translation for name in names]
+    speeds = _speeds(places, dt)
+    shortest = max(1, round(settings.least / dt))
+    found = {}
+    for number, name in enumerate(names):
+        height = places[:, number, 2]
+        lowest = np.quantile(height, LOWEST_SHARE)
+        stand = (speeds[:, number] <= settings.speed) & (height <= lowest + settings.height)
+        found[name] = _long(stand, shortest)
+    return found
+
+
+def _speeds(places: Array, dt: float) -> Array:
+    """(n, feet) speeds of places (n, feet, 3), central inside."""
+    if len(places) < 2:
+        return np.zeros(places.shape[:2])
+    return np.asarray(np.linalg.norm(np.gradient(places, dt, axis=0), axis=2))
+
+
+def _long(stand: Mask, shortest: int) -> Mask:
+    """Marks of runs that are long enough."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], stand, [False]]).astype(np.int8)))
+    kept = np.zeros(len(stand), dtype=bool)
+    for first, end in edges.reshape(-1, 2):
+        if end - first >= shortest:
+            kept[first:end] = True
+    return kept

@@ -1,0 +1,131 @@
+"""Sparse quadratic programs with one block a frame and bands between, and the solvers that take them.
+
+    minimise    1/2 z' P z + c' z
+    subject to  lower <= G z <= upper,   least <= z <= most
+
+PIQP's multistage backend finds the blocks by itself and factorises from block to block, so its time is linear in the
+frames. OSQP takes the same program by its general sparse factorisation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.checks import shown
+from wholebody.errors import InputError, MissingPackageError, UnknownNameError
+
+PIQP_ACCURACY = 1e-5  # of the optimality conditions: a tenth of what a step is judged by; smaller costs an iteration
+OSQP_ACCURACY = 1e-6
+OSQP_ITERATIONS = 8000
+POLISH = 5  # steps of refinement of OSQP's polishing
+
+
+class BandedQP(NamedTuple):
+    """A program; matrices are scipy.sparse.csc_array or csc_matrix.
+
+    Attributes:
+        P: (n, n) symmetric, both triangles.
+        c: (n,).
+        G: (m, n).
+        lower: (m,).
+        upper: (m,).
+        least: (n,).
+        most: (n,).
+    """
+
+    P: Any
+    c: Array
+    G: Any
+    lower: Array
+    upper: Array
+    least: Array
+    most: Array
+
+
+class Answer(NamedTuple):
+    """Of a program.
+
+    Attributes:
+        z: (n,) the minimiser; not finite numbers never occur.
+        solved: whether the solver met its own conditions.
+        iterations: of the solver.
+    """
+
+    z: Array
+    solved: bool
+    iterations: int
+
+
+def solve_by_piqp(program: BandedQP) -> Answer:
+    """Solve by PIQP's interior-point method with its multistage backend."""
+    import piqp
+    import scipy.sparse as sp
+
+    solver = piqp.SparseSolver()
+    settings = solver.settings
+    settings.kkt_solver = piqp.KKTSolver.sparse_multistage
+    settings.eps_abs, settings.eps_rel, settings.verbose = PIQP_ACCURACY, PIQP_ACCURACY, False
+    n = len(program.c)
+    none = sp.csc_matrix((0, n))
+    solver.setup(
+        sp.csc_matrix(program.P), program.c, none, np.zeros(0), sp.csc_matrix(program.G), program.lower, program.upper,
+        program.least, program.most,
+    )  # fmt: skip
+    status = solver.solve()
+    return _answer(solver.result.x, status == piqp.PIQP_SOLVED, int(solver.result.info.iter), program)
+
+
+def solve_by_osqp(program: BandedQP) -> Answer:
+    """Solve by OSQP, polished."""
+    import osqp
+    import scipy.sparse as sp
+
+    n = len(program.c)
+    rows = sp.csc_matrix(sp.vstack([program.G, sp.eye(n)]))
+    solver = osqp.OSQP()
+    solver.setup(
+        sp.csc_matrix(sp.triu(program.P)), program.c, rows, np.concatenate([program.lower, program.least]),
+        np.concatenate([program.upper, program.most]), verbose=False, eps_abs=OSQP_ACCURACY, eps_rel=OSQP_ACCURACY,
+        max_iter=OSQP_ITERATIONS, polishing=True, polish_refine_iter=POLISH,
+    )  # fmt: skip
+    found = solver.solve(raise_error=False)
+    return _answer(found.x, found.info.status == "solved", int(found.info.iter), program)
+
+
+SOLVERS: Mapping[str, tuple[str, Callable[[BandedQP], Answer]]] = MappingProxyType(
+    {"piqp": ("piqp", solve_by_piqp), "osqp": ("osqp", solve_by_osqp)}
+)
+"""Name of a solver -> the module that it needs, and the function that asks it."""
+
+
+def banded_solver(name: str | None) -> tuple[str, Callable[[BandedQP], Answer]]:
+    """A solver by name, and its name; for None piqp where it is installed, else osqp.
+
+    Raises:
+        InputError: not a text.
+        UnknownNameError: there is no such solver.
+        MissingPackageError: its package is not installed.
+    """
+    if name is None:
+        name = next(known for known, (module, _) in SOLVERS.items() if find_spec(module) is not None)
+    if not isinstance(name, str):
+        raise InputError(f"solver is {shown(name)}; give 'piqp' or 'osqp'")
+    if name not in SOLVERS:
+        raise UnknownNameError("solver of trajectories", name, SOLVERS)
+    module, solve = SOLVERS[name]
+    if find_spec(module) is None:
+        raise MissingPackageError(f"the solver {name} is not installed; install it with: pip install {module}")
+    return name, solve
+
+
+def _answer(z: Any, solved: bool, iterations: int, program: BandedQP) -> Answer:
+    found = np.asarray(z, dtype=float)
+    if found.shape != program.c.shape or not np.isfinite(found).all():
+        return Answer(np.clip(0.0, program.least, program.most), False, iterations)
+    return Answer(np.clip(found, program.least, program.most), solved, iterations)

@@ -1,0 +1,93 @@
+"""Postures of a clip as deviations from the original postures, and rows carried over to these deviations.
+
+The posture of frame t is ``q_t = integrate(r_t, x_t)`` with the original posture r_t and the deviation x_t (nv,).
+For a joint of one degree of freedom x_t is a difference of angles. For a free root it is the logarithm of the motion
+from the original placement. So deviations and their differences over time are linear in the unknowns.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array, Indices
+
+
+class Chart:
+    """The original postures of some frames, and the deviations from them.
+
+    Attributes:
+        model: Pinocchio's model.
+        original: (n, nq) the original postures.
+        curved: indices in the tangent of the joints whose postures are no vectors, such as a free root.
+        straight: the other indices.
+    """
+
+    def __init__(self, model: pin.Model, original: Array) -> None:
+        """Read which joints are curved."""
+        self.model, self.original = model, original
+        dofs = [range(joint.idx_v, joint.idx_v + joint.nv) for joint in list(model.joints)[1:] if joint.nq != joint.nv]
+        self.curved: Indices = np.array([index for part in dofs for index in part], dtype=np.intp)
+        self.straight: Indices = np.setdiff1d(np.arange(model.nv), self.curved).astype(np.intp)
+
+    def __len__(self) -> int:
+        return len(self.original)
+
+    @cached_property
+    def steps(self) -> Array:
+        """(n - 1, nv) from each original posture to the next."""
+        pairs = zip(self.original[:-1], self.original[1:], strict=True)
+        return np.array([pin.difference(self.model, *pair) for pair in pairs]).reshape(-1, self.model.nv)
+
+    def posture(self, frame: int, x: Array) -> Array:
+        """(nq,) the posture of a frame with the deviation x (nv,)."""
+        return np.asarray(pin.integrate(self.model, self.original[frame], x))
+
+    def postures(self, x: Array) -> Array:
+        """(n, nq) the postures of all frames with the deviations x (n, nv)."""
+        return np.array([self.posture(frame, one) for frame, one in enumerate(x)])
+
+    def deviation(self, frame: int, q: Array) -> Array:
+        """(nv,) of a posture (nq,) from the original one of a frame."""
+        return np.asarray(pin.difference(self.model, self.original[frame], q))
+
+    def carried(self, frame: int, x: Array, rows: Array) -> Array:
+        """Derivatives (r, nv) with respect to x, of derivatives (r, nv) with respect to the posture's tangent.
+
+        Args:
+            frame: whose posture it is.
+            x: (nv,) its deviation.
+            rows: (r, nv).
+        """
+        curved = self.curved
+        if not len(curved) or not x[curved].any():
+            return rows
+        turned = np.asarray(pin.dIntegrate(self.model, self.original[frame], x, pin.ARG1))
+        return self._times(rows, turned)
+
+    def between(self, before: Array, after: Array, share: float) -> tuple[Array, Array, Array]:
+        """The posture between two postures (nq,), and its derivatives with respect to both.
+
+        Returns:
+            (nq,) the posture at this share of the way, and two arrays (nv, nv) from the tangents of both postures to
+            its own tangent. They are diagonal but for curved joints.
+        """
+        model = self.model
+        way = np.asarray(pin.difference(model, before, after))
+        q = np.asarray(pin.integrate(model, before, share * way))
+        nv = model.nv
+        if not len(self.curved):
+            return q, (1.0 - share) * np.eye(nv), share * np.eye(nv)
+        from_way = share * np.asarray(pin.dIntegrate(model, before, share * way, pin.ARG1))
+        from_before = np.asarray(pin.dIntegrate(model, before, share * way, pin.ARG0))
+        first = from_before + from_way @ np.asarray(pin.dDifference(model, before, after, pin.ARG0))
+        second = from_way @ np.asarray(pin.dDifference(model, before, after, pin.ARG1))
+        return q, first, second
+
+    def _times(self, rows: Array, matrix: Array) -> Array:
+        """A product with a matrix (nv, nv) that is the identity but for its curved joints."""
+        curved, result = self.curved, np.array(rows)
+        result[:, curved] = rows[:, curved] @ matrix[np.ix_(curved, curved)]
+        return result

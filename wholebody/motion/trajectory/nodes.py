@@ -1,0 +1,129 @@
+"""Where a trajectory is looked at, and the rows that hold there: at every frame, and between frames where it dips.
+
+A node is a frame, or a share of the way from a frame to the next. Its rows come from exact shapes: distances of all
+near pairs, and `wholebody.geometry.contact_rows`. Inequality constraints give rows like those of contacts. Equality
+constraints are kept apart, because they are met by a penalty with multipliers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array, Indices
+from wholebody.figures.state import State, Wrench
+from wholebody.motion.trajectory.chart import Chart
+from wholebody.tasks.base import Constraint, Goal
+from wholebody.workspace import Workspace
+
+Terms = Sequence[Constraint | Goal]
+
+
+class Node(NamedTuple):
+    """A frame of the window, or a share (0 to 1) of the way from it to the next."""
+
+    frame: int
+    share: float = 0.0
+
+
+class Rows(NamedTuple):
+    """What holds at a node, to first order in the deviations of its frame and of the next.
+
+    Attributes:
+        node: where.
+        gap: (r,) by how much a row is met, metres and radians; to be at least zero.
+        first: (r, nv) derivative with respect to the deviation of the node's frame.
+        second: (r, nv) with respect to that of the next frame; None at a frame.
+        group: (r,) rows of one contact share a number; the worst of them counts.
+        equal: (e,) values of the equalities; to be zero.
+        equal_rows: (e, nv) their derivatives.
+    """
+
+    node: Node
+    gap: Array
+    first: Array
+    second: Array | None
+    group: Indices
+    equal: Array
+    equal_rows: Array
+
+    @property
+    def shortfalls(self) -> Array:
+        """(groups,) by how much the worst row of each group is missed; 0 where it is met."""
+        short = np.zeros(int(self.group.max(initial=-1)) + 1)
+        np.maximum.at(short, self.group, -self.gap)
+        return short
+
+
+class Looking:
+    """Looks at nodes of one window, in the room of one run.
+
+    Attributes:
+        chart: the window's frames.
+        clearance: least distance asked of every pair, metres.
+    """
+
+    def __init__(self, workspace: Workspace, chart: Chart, terms: Sequence[Terms], clearance: float) -> None:
+        """Take what is needed.
+
+        Args:
+            workspace: of this run alone.
+            chart: the window's frames.
+            terms: for each frame, its resolved constraints.
+            clearance: metres.
+        """
+        self.workspace, self.chart, self.clearance, self._terms = workspace, chart, clearance, terms
+
+    def at(self, node: Node, x: Array, within: float) -> Rows:
+        """The rows of a node.
+
+        Args:
+            node: where.
+            x: (n, nv) deviations of the window's frames.
+            within: metres beyond the clearance; pairs farther apart have no rows.
+        """
+        if node.share:
+            return self._between(node, x, within)
+        frame = node.frame
+        gap, rows, group = self._contacts(self.chart.posture(frame, x[frame]), within)
+        equal, equal_rows = np.zeros(0), np.zeros((0, rows.shape[1]))
+        if self._terms[frame]:
+            state = self.workspace.state
+            parts = [_split(term, state) for term in self._terms[frame]]
+            equal = np.concatenate([part[0] for part in parts])
+            equal_rows = self.chart.carried(frame, x[frame], np.vstack([part[1] for part in parts]))
+            more = np.concatenate([part[2] for part in parts])
+            group = np.concatenate([group, group.max(initial=-1) + 1 + np.arange(len(more), dtype=np.intp)])
+            gap, rows = np.concatenate([gap, more]), np.vstack([rows, *(part[3] for part in parts)])
+        return Rows(node, gap, self.chart.carried(frame, x[frame], rows), None, group, equal, equal_rows)
+
+    def _between(self, node: Node, x: Array, within: float) -> Rows:
+        chart, now, then = self.chart, node.frame, node.frame + 1
+        q, first, second = chart.between(chart.posture(now, x[now]), chart.posture(then, x[then]), node.share)
+        gap, rows, group = self._contacts(q, within)
+        before, after = chart.carried(now, x[now], rows @ first), chart.carried(then, x[then], rows @ second)
+        return Rows(node, gap, before, after, group, np.zeros(0), np.zeros((0, rows.shape[1])))
+
+    def _contacts(self, q: Array, within: float) -> tuple[Array, Array, Indices]:
+        workspace = self.workspace
+        contacts = workspace.near(q, within + self.clearance)
+        found = workspace.rows.rows(contacts, self.clearance)
+        rows = workspace.state.rows(found.wrench, found.second, found.first)
+        return found.gap - self.clearance, rows, found.contact
+
+
+def _split(term: Constraint | Goal, state: State) -> tuple[Array, Array, Array, Array]:
+    """Values and rows of a term's equalities, and of its inequalities as gaps."""
+    if isinstance(term, Goal):
+        value, low_value, high_value = np.atleast_1d(term.error(state)), np.zeros(()), np.zeros(())
+    else:
+        value, low_value, high_value = np.atleast_1d(term.value(state)), term.lower, term.upper
+    derivative = term.jacobian(state)
+    rows = state.wrench_jacobian(derivative) if isinstance(derivative, Wrench) else np.atleast_2d(derivative)
+    lower, upper = np.broadcast_to(low_value, value.shape), np.broadcast_to(high_value, value.shape)
+    equal = lower == upper
+    low, high = ~equal & np.isfinite(lower), ~equal & np.isfinite(upper)
+    gaps = np.concatenate([value[low] - lower[low], upper[high] - value[high]])
+    return value[equal] - lower[equal], rows[equal], gaps, np.vstack([rows[low], -rows[high]])

@@ -1,0 +1,229 @@
+"""The program of one step of a trajectory: the objective, rows of all nodes, limits, speeds, a trust region.
+
+Unknowns, frame by frame: the deviations of the degrees of freedom that count, then the slacks of the frame's nodes. A
+missed contact has a slack of its own. The others of a node share one. So a program always has an answer: where contacts
+contradict each other, the sum of what is missed is least.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.motion.trajectory.banded_qp import BandedQP
+from wholebody.motion.trajectory.nodes import Rows
+from wholebody.motion.trajectory.objective import Objective
+
+SLACK_CURVATURE = 1e-2  # 1/m^2, of a share of the penalty: keeps equal splits of a shortfall unique
+ONE_STEP = 0.03  # m, rad: of a deeper shortfall one step asks for this much; the normals are looked at again on the way
+NEAR_SPEED = 0.5  # share of a bound on speed from which a change has a row; what passes unseen has one in the next step
+TIGHT = 1e-6  # m, rad: a row nearer than this to being missed at a program's answer is active
+
+
+class Limits(NamedTuple):
+    """What every deviation keeps to.
+
+    Attributes:
+        lower, upper: (n, nv) limits of joints, and of frozen ones; infinite where there is none.
+        slowest, fastest: (n - 1, nv) bounds on the change of the deviation from a frame to the next.
+    """
+
+    lower: Array
+    upper: Array
+    slowest: Array
+    fastest: Array
+
+    def passed(self, x: Array) -> Array:
+        """(n, nv) by how much deviations (n, nv) pass their limits, or their changes the bounds on speed."""
+        past: Array = np.maximum(np.maximum(self.lower - x, x - self.upper), 0.0)
+        change = np.diff(x, axis=0)
+        past[1:] = np.maximum(past[1:], np.maximum(self.slowest - change, change - self.fastest))
+        return past
+
+
+class Layout(NamedTuple):
+    """A program, and where its unknowns are.
+
+    Attributes:
+        program: the program.
+        place: (n, a) index of the deviation of each frame and degree of freedom that counts.
+        dofs: (a,) these degrees of freedom.
+    """
+
+    program: BandedQP
+    place: Indices
+    dofs: Indices
+
+    def deviations(self, z: Array, x: Array) -> Array:
+        """(n, nv) deviations that the unknowns z say, with those of x elsewhere."""
+        found: Array = x.copy()
+        found[:, self.dofs] = z[self.place]
+        return found
+
+
+def lay_out(
+    objective: Objective, rows: Sequence[Rows], x: Array, dofs: Indices, limits: Limits, radius: float, penalty: float,
+    multipliers: Sequence[Array], stiffness: float,
+) -> Layout:  # fmt: skip
+    """The program of a step from the deviations x (n, nv).
+
+    Args:
+        objective: of the window.
+        rows: of all nodes at x, in the order of their frames.
+        x: (n, nv) deviations.
+        dofs: (a,) degrees of freedom that may change, ascending.
+        limits: of the deviations.
+        radius: largest change of any deviation, radians and metres.
+        penalty: of a metre or radian of shortfall.
+        multipliers: of the equalities of each node.
+        stiffness: quadratic penalty of equalities.
+    """
+    frames, count = len(x), len(dofs)
+    kept = [_kept(one, dofs, radius) for one in rows]
+    slacks = [_slacks(one, keep) for one, keep in zip(rows, kept, strict=True)]
+    per_frame = np.zeros(frames, dtype=np.intp)
+    for one, (_, number) in zip(rows, slacks, strict=True):
+        per_frame[one.node.frame] += number
+    start = np.concatenate([[0], np.cumsum(count + per_frame)]).astype(np.intp)
+    size = int(start[-1])
+    place = start[:-1, None] + np.arange(count)[None]
+    is_slack = np.ones(size, dtype=bool)
+    is_slack[place.ravel()] = False
+    P, c = _cost(objective, rows, x, dofs, place, is_slack, penalty, multipliers, stiffness)
+    G, lower = _contact_part(rows, kept, slacks, x, dofs, place, start, count, size)
+    D, slowest, fastest = _speed_part(x, dofs, place, limits, size, radius)
+    least, most = np.zeros(size), np.full(size, np.inf)
+    least[place], most[place] = box(x, limits, radius, dofs)
+    program = BandedQP(
+        P, c, sp.csc_matrix(sp.vstack([G, D])), np.concatenate([lower, slowest]),
+        np.concatenate([np.full(len(lower), np.inf), fastest]), least, most,
+    )  # fmt: skip
+    return Layout(program, place, dofs)
+
+
+def box(x: Array, limits: Limits, radius: float, dofs: Indices) -> tuple[Array, Array]:
+    """(n, a) bounds of the deviations: the limits, and the trust region; where they are apart, the way there."""
+    now = x[:, dofs]
+    low, high = limits.lower[:, dofs], limits.upper[:, dofs]
+    least, most = np.maximum(low, now - radius), np.minimum(high, now + radius)
+    return np.minimum(least, now + radius), np.maximum(most, now - radius)
+
+
+def touched(rows: Sequence[Rows], which: Sequence[Mask]) -> Mask:
+    """(nv,) the degrees of freedom that move some of the rows."""
+    found = np.zeros(rows[0].first.shape[1], dtype=bool)
+    for one, mask in zip(rows, which, strict=True):
+        if mask.any():
+            found |= (one.first[mask] != 0.0).any(axis=0)
+            if one.second is not None:
+                found |= (one.second[mask] != 0.0).any(axis=0)
+    return found
+
+
+def foreseen(one: Rows, step: Array) -> Array:
+    """(r,) gaps of a node's rows after a step (n, nv), to first order."""
+    frame = one.node.frame
+    after: Array = one.gap + one.first @ step[frame]
+    return after if one.second is None else after + one.second @ step[frame + 1]
+
+
+def active(rows: Sequence[Rows], step: Array) -> list[Mask]:
+    """For each node which rows are tight or missed after a step (n, nv)."""
+    return [foreseen(one, step) <= TIGHT for one in rows]
+
+
+def _kept(one: Rows, dofs: Indices, radius: float) -> Mask:
+    """Rows that a step within the radius could miss."""
+    reach = np.abs(one.first[:, dofs]).sum(axis=1)
+    if one.second is not None:
+        reach = reach + np.abs(one.second[:, dofs]).sum(axis=1)
+    kept: Mask = (one.gap < radius * reach) & (reach > 0.0)
+    return kept
+
+
+def _slacks(one: Rows, kept: Mask) -> tuple[Indices, int]:
+    """The slack of each kept row, from 0, and how many there are."""
+    group = one.group[kept]
+    missed = one.shortfalls[group] > 0.0 if len(group) else np.zeros(0, dtype=bool)
+    own, place = np.unique(group[missed], return_inverse=True)
+    slack = np.full(len(group), len(own), dtype=np.intp)  # what is not missed shares the last one
+    slack[missed] = place
+    return slack, len(own) + int((~missed).any())
+
+
+def _cost(
+    objective: Objective, rows: Sequence[Rows], x: Array, dofs: Indices, place: Indices, is_slack: Mask,
+    penalty: float, multipliers: Sequence[Array], stiffness: float,
+) -> tuple[sp.csc_matrix, Array]:  # fmt: skip
+    size, count = len(is_slack), len(dofs)
+    c = np.where(is_slack, penalty, 0.0)
+    first, second = np.nonzero(objective.bands)
+    values = [np.outer(objective.bands[first, second], objective.weights[dofs]).ravel()]
+    at, to = [place[first].ravel()], [place[second].ravel()]
+    slack = np.flatnonzero(is_slack)
+    values.append(np.full(len(slack), SLACK_CURVATURE * penalty))
+    at.append(slack)
+    to.append(slack)
+    for one, multiplier in zip(rows, multipliers, strict=True):
+        if len(one.equal):
+            part, here = one.equal_rows[:, dofs], place[one.node.frame]
+            wanted = one.equal_rows[:, dofs] @ x[one.node.frame, dofs] - one.equal - multiplier
+            values.append((stiffness * part.T @ part).ravel())
+            at.append(np.repeat(here, count))
+            to.append(np.tile(here, count))
+            c[here] -= stiffness * part.T @ wanted
+    triplets = (np.concatenate(values), (np.concatenate(at), np.concatenate(to)))
+    return sp.csc_matrix(triplets, shape=(size, size)), c
+
+
+def _contact_part(
+    rows: Sequence[Rows], kept: Sequence[Mask], slacks: Sequence[tuple[Indices, int]], x: Array, dofs: Indices,
+    place: Indices, start: Indices, count: int, size: int,
+) -> tuple[sp.csc_matrix, Array]:  # fmt: skip
+    """Rows ``gap + J (y - x) + slack >= 0``."""
+    values, at, to, lower = [np.zeros(0)], [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
+    number, used = 0, np.zeros(len(x), dtype=np.intp)
+    for one, keep, (slack, slack_count) in zip(rows, kept, slacks, strict=True):
+        frame, many = one.node.frame, int(keep.sum())
+        if not many:
+            continue
+        index = np.arange(number, number + many)
+        bound = np.minimum(-one.gap[keep], ONE_STEP)
+        for offset, part in enumerate((one.first, one.second)):
+            if part is not None:
+                own = part[np.ix_(keep, dofs)]
+                values.append(own.ravel())
+                at.append(np.repeat(index, count))
+                to.append(np.tile(place[frame + offset], many))
+                bound = bound + own @ x[frame + offset, dofs]
+        values.append(np.ones(many))
+        at.append(index)
+        to.append(start[frame] + count + used[frame] + slack)
+        used[frame] += slack_count
+        lower.append(bound)
+        number += many
+    triplets = (np.concatenate(values), (np.concatenate(at), np.concatenate(to)))
+    return sp.csc_matrix(triplets, shape=(number, size)), np.concatenate(lower)
+
+
+def _speed_part(
+    x: Array, dofs: Indices, place: Indices, limits: Limits, size: int, radius: float
+) -> tuple[sp.csc_matrix, Array, Array]:
+    """Rows that bound the change of a deviation from a frame to the next, where it is near the bound."""
+    change = np.diff(x[:, dofs], axis=0)
+    slowest, fastest = limits.slowest[:, dofs], limits.fastest[:, dofs]
+    frame, dof = np.nonzero((change > NEAR_SPEED * fastest) | (change < NEAR_SPEED * slowest))
+    now = change[frame, dof]
+    # what is passed already is to be passed by less: by a share that the trust region allows
+    share = min(0.5, radius / max(float(np.abs(x).max(initial=0.0)), 1e-9))
+    low, high = slowest[frame, dof], fastest[frame, dof]
+    low = np.where(now < low, now + share * (low - now), low)
+    high = np.where(now > high, now + share * (high - now), high)
+    index = np.arange(len(frame))
+    values = np.concatenate([np.ones(len(index)), -np.ones(len(index))])
+    columns = np.concatenate([place[frame + 1, dof], place[frame, dof]])
+    return sp.csc_matrix((values, (np.tile(index, 2), columns)), shape=(len(index), size)), low, high

@@ -1,0 +1,194 @@
+"""Sequential quadratic programming over one window: a filter, a trust region, and only the joints that count.
+
+The objective is quadratic in the deviations, so all that a program gets wrong is the bending of contacts. A step is
+accepted if the pair of objective and shortfall is not worse in both than one that was there before (Fletcher and
+Leyffer 2002, "Nonlinear programming without a penalty function"). Steps along a bent surface are accepted so, which a
+merit function refuses.
+
+A degree of freedom joins the programs when it moves a row that is missed or active. The others cannot help: where no
+active row has an entry, the deviation that minimises the objective is zero. So this leaves out nothing, and most
+programs of a person have ten degrees of freedom a frame instead of 55.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
+from wholebody.motion.trajectory.nodes import Looking, Node, Rows
+from wholebody.motion.trajectory.objective import Objective
+from wholebody.motion.trajectory.program import Limits, active, lay_out, touched
+
+RADIUS = 0.25  # rad, m: first trust region; larger = fewer programs on clear ways, more that are refused
+LARGEST, SMALLEST = 0.5, 1e-4
+WITHIN = 0.1  # m: pairs nearer than this have rows; it is what a radius moves the end of a limb by
+MET = 1e-5  # m, rad: a row missed by no more is met
+STILL = 2e-3  # rad, m: a step no larger ends the iterations where everything is met; larger = rougher optima, faster
+GAIN = 5e-3  # share of the objective: a step that brings no more ends them too
+PENALTY, HIGHEST = 1e3, 1e6  # 1/m, of a shortfall: first, and most
+RAISE = 10.0
+HALVED = 0.5  # of a shortfall: a step that leaves more of it than this raises the penalty
+STIFFNESS = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
+MARGIN = 1e-2  # of a shortfall: by how much a step must be better than the filter
+Cancel = Callable[[int, float], bool]
+"""Told the number of programs and the worst shortfall; true ends the iterations."""
+
+
+class Found(NamedTuple):
+    """Deviations that the iterations ended with.
+
+    Attributes:
+        x: (n, nv) deviations.
+        worst: largest shortfall of any row, metres or radians.
+        met: whether it is at most `MET`.
+        programs: how many programs were solved.
+        cancelled: whether the caller ended it.
+    """
+
+    x: Array
+    worst: float
+    met: bool
+    programs: int
+    cancelled: bool
+
+
+class _At(NamedTuple):
+    """A point of the iterations."""
+
+    x: Array
+    rows: list[Rows]
+    objective: float
+    total: float
+    worst: float
+
+
+class WindowProgram:
+    """One window: what is minimised, what holds, and the iterations.
+
+    Attributes:
+        nodes: where rows hold: every frame, and places between frames; more may be added before another `run`.
+    """
+
+    def __init__(
+        self,
+        looking: Looking,
+        objective: Objective,
+        limits: Limits,
+        solve: Callable[[BandedQP], Answer],
+        iterations: int,
+    ) -> None:
+        """Take what is needed.
+
+        Args:
+            looking: looks at nodes.
+            objective: of the window.
+            limits: of its deviations.
+            solve: solves one program.
+            iterations: most programs of one run.
+        """
+        self._looking, self._objective, self._limits = looking, objective, limits
+        self._solve, self._iterations = solve, iterations
+        self.nodes = [Node(frame) for frame in range(len(looking.chart))]
+        self._free = (limits.lower < limits.upper).any(axis=0)
+
+    def add(self, nodes: Sequence[Node]) -> None:
+        """More places to look at."""
+        self.nodes = sorted({*self.nodes, *nodes})
+
+    def run(self, x: Array, cancel: Cancel, radius: float = RADIUS) -> Found:
+        """Iterate from deviations x (n, nv), with a first trust region of this radius."""
+        here = self._at(x)
+        penalty = PENALTY
+        multipliers = [np.zeros(len(one.equal)) for one in here.rows]
+        entries: list[tuple[float, float]] = []
+        counts = self._counts(here)
+        programs = 0
+        while programs < self._iterations:
+            if cancel(programs, here.worst):
+                return Found(here.x, here.worst, here.worst <= MET, programs, True)
+            if not counts.any():
+                break
+            dofs: Indices = np.flatnonzero(counts).astype(np.intp)
+            layout = lay_out(
+                self._objective, here.rows, here.x, dofs, self._limits, radius, penalty, multipliers, STIFFNESS
+            )
+            answer = self._solve(layout.program)
+            programs += 1
+            there_x = layout.deviations(answer.z, here.x)
+            step = there_x - here.x
+            longest = float(np.abs(step).max(initial=0.0))
+            more = self._joined(here, step, counts)
+            there = self._at(there_x)
+            gained = here.objective - there.objective
+            small = longest <= STILL or (abs(gained) <= GAIN * max(here.objective, 1e-9))
+            if self._accepted(there, here, entries, gained):
+                entries.append(((1.0 - MARGIN) * here.total, here.objective))
+                multipliers = [self._shifted(old, one) for old, one in zip(multipliers, there.rows, strict=True)]
+                if there.worst > MET and there.total > HALVED * here.total and longest < 0.9 * radius:
+                    penalty = min(RAISE * penalty, HIGHEST)
+                radius = min(2.0 * radius, LARGEST) if longest > 0.9 * radius else radius
+                here = there
+                counts = counts | more | self._counts(here)
+                if here.worst <= MET and small and not (more & ~counts).any():
+                    break
+            else:
+                radius = 0.5 * min(radius, longest)
+                if radius < SMALLEST:
+                    if here.worst <= MET or penalty >= HIGHEST:
+                        break
+                    penalty, radius = min(RAISE * penalty, HIGHEST), 0.1 * RADIUS
+                    entries.clear()
+        return Found(here.x, here.worst, here.worst <= MET, programs, False)
+
+    def _at(self, x: Array) -> _At:
+        rows = [self._looking.at(node, x, WITHIN) for node in self.nodes]
+        shortfalls = [np.concatenate([one.shortfalls, np.abs(one.equal)]) for one in rows]
+        past = self._limits.passed(x)
+        total = float(sum(one.sum() for one in shortfalls) + past.sum())
+        worst = max(max((float(one.max(initial=0.0)) for one in shortfalls), default=0.0), float(past.max(initial=0.0)))
+        return _At(x, rows, self._objective.value(x), total, worst)
+
+    def _accepted(self, there: _At, here: _At, entries: Sequence[tuple[float, float]], gained: float) -> bool:
+        """Whether the filter takes a point."""
+        free = MET * 0.1 * len(self.nodes)
+        known = [*entries, ((1.0 - MARGIN) * here.total, here.objective)]
+        if there.total <= free:
+            return here.total > free or gained >= -1e-12 * max(1.0, here.objective)
+        return all(
+            there.total < total or there.objective < objective - MARGIN * there.total for total, objective in known
+        )
+
+    def _counts(self, here: _At) -> Mask:
+        """(nv,) degrees of freedom that move what is missed, or are away from zero."""
+        missed = [one.gap < 0.0 for one in here.rows]
+        found = touched(here.rows, missed) | (here.x != 0.0).any(axis=0)
+        found |= (self._limits.passed(here.x) > 0.0).any(axis=0)
+        return self._with_equalities(here.rows, found & self._free)
+
+    def _joined(self, here: _At, step: Array, counts: Mask) -> Mask:
+        """(nv,) degrees of freedom that move what a step makes active by those that count already."""
+        tight = [
+            mask & (np.abs(one.first[:, counts]).sum(axis=1) > 0.0)
+            for one, mask in zip(here.rows, active(here.rows, step), strict=True)
+        ]
+        return self._with_equalities(here.rows, touched(here.rows, tight) & self._free)
+
+    def _with_equalities(self, rows: Sequence[Rows], found: Mask) -> Mask:
+        """The same with the degrees of freedom of equalities that some of them move."""
+        while True:
+            more = found.copy()
+            for one in rows:
+                if len(one.equal):
+                    moved = (one.equal_rows[:, found] != 0.0).any(axis=1) | (np.abs(one.equal) > MET)
+                    more |= (one.equal_rows[moved] != 0.0).any(axis=0) & self._free
+            if (more == found).all():
+                return found
+            found = more
+
+    def _shifted(self, old: Array, one: Rows) -> Array:
+        """Multipliers of equalities, divided by the stiffness."""
+        return np.clip(old + one.equal, -0.05, 0.05)

@@ -1,0 +1,60 @@
+"""Where the iterations of a window begin when the original postures are too deep for their own normals.
+
+A limb that passes through the trunk is pushed out on one side before the middle and on the other after it. Then rows
+contradict each other from frame to frame. So the deepest posture is freed on its own, and from there the limb follows
+the original motion frame by frame, outwards in both directions, in contact with what is in its way. It stays on one
+side. The iterations begin with what that gives.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.motion.fade import freed_posture
+from wholebody.motion.frame_terms import FrameTerms
+from wholebody.motion.per_frame import BACK, Follower
+from wholebody.motion.windows import Window, outwards
+
+PATIENCE = 0.25  # s: a run of frames at the original posture this long ends the following
+
+
+class Carried:
+    """Starts of windows of one clip.
+
+    Attributes:
+        posture_solves: how many postures were solved for on their own.
+        programs: how many quadratic programs the following took.
+    """
+
+    def __init__(self, terms: FrameTerms, clearance: float) -> None:
+        """Take what is needed; nothing is computed yet."""
+        self._terms, self._clearance = terms, clearance
+        self._follower: Follower | None = None
+        self.posture_solves = 0
+
+    @property
+    def programs(self) -> int:
+        """How many quadratic programs the following took."""
+        return 0 if self._follower is None else self._follower.programs
+
+    def outwards(self, window: Window, middle: int) -> Array:
+        """(n, nq) postures of a window, followed from the freed posture of a frame in the middle."""
+        terms = self._terms
+        if self._follower is None:
+            self._follower = Follower(terms, self._clearance)
+        q = np.array(terms.q[window.first : window.end])
+        freed, _ = freed_posture(terms, middle, terms.q[middle], self._clearance)
+        self.posture_solves += 1
+        q[middle - window.first] = freed
+        patience, calm, side = max(2, round(PATIENCE / terms.dt)), 0, 1
+        for frame, neighbour in outwards(window, middle):
+            if frame - neighbour != side:
+                calm, side = 0, frame - neighbour
+            if calm >= patience:
+                continue
+            here = self._follower.frame(frame, q[neighbour - window.first])
+            q[frame - window.first] = here
+            near = np.abs(here - terms.q[frame]).max() <= BACK
+            calm = calm + 1 if near else 0
+        return q

@@ -1,0 +1,188 @@
+"""One window of a clip from the original postures to free ones, looked at between frames too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.motion.dips import dips, sampled_dips
+from wholebody.motion.frame_terms import FrameTerms, speed_limits
+from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
+from wholebody.motion.trajectory.chart import Chart
+from wholebody.motion.trajectory.nodes import Looking, Node
+from wholebody.motion.trajectory.objective import Objective
+from wholebody.motion.trajectory.program import Limits
+from wholebody.motion.trajectory.sqp import MET, RADIUS, WindowProgram
+from wholebody.motion.trajectory.starts import Carried
+from wholebody.motion.windows import Window
+from wholebody.workspace import Workspace
+
+ROUNDS = 12  # of sweeping and adding places between frames
+NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few rows are near enough to count then
+NOTHING = 1e-9  # rad, m: a deviation no larger is none
+
+
+class Settings(Protocol):
+    """What is read of the method's settings."""
+
+    @property
+    def clearance(self) -> float:
+        """Least distance of every pair, metres."""
+
+    @property
+    def time(self) -> float:
+        """Seconds that a push spreads over."""
+
+    @property
+    def iterations(self) -> int:
+        """Most programs of one attempt."""
+
+
+class Freed(NamedTuple):
+    """Postures of a window.
+
+    Attributes:
+        q: (n, nq) postures.
+        missed: what did not succeed; empty where all did.
+    """
+
+    q: Array
+    missed: str
+
+
+class _Attempt(NamedTuple):
+    """Deviations that one attempt ended with."""
+
+    x: Array
+    worst: float
+    dipping: int
+    objective: float
+
+    @property
+    def rank(self) -> tuple[bool, bool, float]:
+        """The best attempt has the least."""
+        return self.worst > MET, self.dipping > 0, self.objective if self.worst <= MET else self.worst
+
+
+class ClipRun:
+    """Frees windows of one clip.
+
+    Attributes:
+        programs: how many quadratic programs were solved.
+    """
+
+    def __init__(
+        self, settings: Settings, terms: FrameTerms, workspace: Workspace, solve: Callable[[BandedQP], Answer]
+    ) -> None:
+        """Take what is needed.
+
+        Args:
+            settings: of the method.
+            terms: original postures, and what is held.
+            workspace: of this run alone.
+            solve: solves one program.
+        """
+        self._settings, self._terms, self._workspace, self._solve = settings, terms, workspace, solve
+        self._carried = Carried(terms, settings.clearance)
+        self._programs = 0
+        self._weights = np.ones(workspace.model.nv)
+
+    @property
+    def programs(self) -> int:
+        """How many quadratic programs were solved."""
+        return self._programs + self._carried.programs
+
+    @property
+    def posture_solves(self) -> int:
+        """How many postures were solved for on their own."""
+        return self._carried.posture_solves
+
+    def window(self, window: Window, depths: Array, cancel: Callable[[float], bool]) -> Freed:
+        """Free one window.
+
+        Args:
+            window: which frames.
+            depths: (frames of the clip,) how deep each original posture is.
+            cancel: told the share done; true ends the attempt, and the window stays as it was.
+        """
+        terms = self._terms
+        chart = Chart(self._workspace.model, np.array(terms.q[window.first : window.end]))
+        seams = window.first > 0, window.end < len(terms.q)
+        objective = Objective(len(window), self._weights, self._settings.time, terms.dt, seams)
+        limits = self._limits(window, chart, seams)
+        held = [terms.held(frame) for frame in range(window.first, window.end)]
+        looking = Looking(self._workspace, chart, held, self._settings.clearance)
+        best: _Attempt | None = None
+        for start in self._starts(window, chart, limits, depths):
+            attempt = self._attempt(start, chart, looking, objective, limits, cancel)
+            if attempt is None:
+                return Freed(chart.original, "")
+            best = attempt if best is None or attempt.rank < best.rank else best
+            if best.worst <= MET:
+                break
+        assert best is not None
+        missed = ""
+        if best.worst > MET or best.dipping:
+            dipping = f", and {best.dipping} motions between frames dip" if best.dipping else ""
+            missed = f"{1e3 * best.worst:.3g} mm or mrad are missed{dipping}"
+        changed = np.abs(best.x).max(axis=1) > NOTHING
+        q = chart.original.copy()
+        q[changed] = chart.postures(best.x)[changed]
+        return Freed(q, missed)
+
+    def _starts(self, window: Window, chart: Chart, limits: Limits, depths: Array) -> Iterable[Array]:
+        """Deviations (n, nv) to begin with: none; then what following gives, from the deepest frame and both ends."""
+        yield np.zeros((len(window), self._workspace.model.nv))
+        deepest = window.first + int(np.argmax(depths[window.first : window.end]))
+        for middle in dict.fromkeys((deepest, window.first, window.end - 1)):
+            q = self._carried.outwards(window, middle)
+            x = np.array([chart.deviation(frame, posture) for frame, posture in enumerate(q)])
+            yield np.clip(x, limits.lower, limits.upper)
+
+    def _attempt(
+        self, x: Array, chart: Chart, looking: Looking, objective: Objective, limits: Limits,
+        cancel: Callable[[float], bool],
+    ) -> _Attempt | None:  # fmt: skip
+        program = WindowProgram(looking, objective, limits, self._solve, self._settings.iterations)
+        found, radius = None, RADIUS
+        for _ in range(ROUNDS):
+            found = program.run(x, lambda count, worst: cancel(count / self._settings.iterations), radius)
+            radius = NEARLY
+            self._programs += found.programs
+            if found.cancelled:
+                return None
+            x = found.x
+            q = chart.postures(x)
+            gaps = [gap for gap in range(len(x) - 1) if x[gap : gap + 2].any()]
+            dipping = sampled_dips(self._workspace, q, gaps) if found.met else []
+            if not dipping:
+                dipping = list(dips(self._workspace, q, gaps).items())
+            if not dipping or not found.met:
+                return _Attempt(x, found.worst, len(dipping), objective.value(x))
+            program.add([Node(gap, share) for gap, share in dipping])
+        assert found is not None
+        return _Attempt(x, found.worst, len(dipping), objective.value(x))
+
+    def _limits(self, window: Window, chart: Chart, seams: tuple[bool, bool]) -> Limits:
+        """Bounds on deviations and on their changes; at a seam nothing moves."""
+        count, nv = len(chart), chart.model.nv
+        lower, upper = np.full((count, nv), -np.inf), np.full((count, nv), np.inf)
+        limits = self._terms.scene.figure.limits
+        lower[:, limits.idx_v] = limits.lower - chart.original[:, limits.idx_q]
+        upper[:, limits.idx_v] = limits.upper - chart.original[:, limits.idx_q]
+        steps, fastest = chart.steps, np.tile(speed_limits(self._terms.scene, self._terms.dt), (count - 1, 1))
+        slowest = -fastest
+        for frame in range(count):
+            bounds = self._terms.bounds(window.first + frame, self._workspace.state)
+            lower[frame], upper[frame] = np.maximum(lower[frame], bounds[0]), np.minimum(upper[frame], bounds[1])
+            if frame < count - 1:
+                slowest[frame] = np.maximum(slowest[frame], bounds[2])
+                fastest[frame] = np.minimum(fastest[frame], bounds[3])
+        for seam, frame in zip(seams, (0, -1), strict=True):
+            if seam:
+                lower[frame], upper[frame] = 0.0, 0.0
+        # where the original is faster than a limit, it may stay as fast
+        return Limits(lower, upper, np.minimum(slowest, steps) - steps, np.maximum(fastest, steps) - steps)

@@ -1,0 +1,52 @@
+"""Windows of a clip: the frames around what is wrong, in which a method may change postures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Mask
+
+
+class Window(NamedTuple):
+    """Frames from `first` up to but without `end`."""
+
+    first: int
+    end: int
+
+    def __len__(self) -> int:
+        return self.end - self.first
+
+
+def runs(wrong: Mask) -> list[Window]:
+    """The longest windows in which all frames are marked.
+
+    Args:
+        wrong: (n,) marked frames.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], wrong, [False]]).astype(np.int8)))
+    return [Window(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
+
+
+def windows(wrong: Mask, margin: int) -> list[Window]:
+    """Windows around marked frames; those that meet are one.
+
+    Args:
+        wrong: (n,) marked frames.
+        margin: frames before and after.
+    """
+    count = len(wrong)
+    near = np.zeros(count, dtype=bool)
+    for run in runs(wrong):
+        near[max(0, run.first - margin) : min(count, run.end + margin)] = True
+    return runs(near)
+
+
+def outwards(window: Window, middle: int) -> Iterator[tuple[int, int]]:
+    """Frames of a window from a middle one to both ends, each with its neighbour towards the middle."""
+    for frame in range(middle + 1, window.end):
+        yield frame, frame - 1
+    for frame in range(middle - 1, window.first - 1, -1):
+        yield frame, frame + 1

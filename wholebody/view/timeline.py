@@ -1,0 +1,98 @@
+"""The timeline of a checked clip: one HTML page with the pairs by frames, and the figure at the frame clicked on."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import math
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wholebody.checks import instance
+from wholebody.errors import InputError
+from wholebody.files import Scratch
+from wholebody.motion.checking import ClipCheck
+from wholebody.motion.clip_contacts import Contact
+from wholebody.scene import Scene
+from wholebody.view.viewer import Viewer
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+MOST_POSTURES = 1200
+"""Postures of the animation: of a longer clip each k-th frame is shown. More make the page larger, 3 kB each."""
+
+DIGITS = 4  # of depths in the page, after the point of millimetres
+
+
+def timeline(found: ClipCheck, scene: Scene | None = None) -> str:
+    """HTML of a checked clip, which makes no network requests.
+
+    Args:
+        found: what `wholebody.check` found.
+        scene: the scene that the clip was checked in; the figure alone by default.
+
+    Raises:
+        InputError: no check, or a scene of another figure.
+    """
+    instance(found, ClipCheck, "timeline: found", "give the answer of wb.check(clip)")
+    clip = found.clip
+    scene = Scene(clip.figure) if scene is None else instance(scene, Scene, "timeline: scene", "give a scene")
+    if scene.model.nq != clip.q.shape[1]:
+        raise InputError("timeline: the scene is of another figure than the clip; give the one that was checked")
+    every = math.ceil(len(clip) / MOST_POSTURES)
+    with Viewer(scene, title=clip.name) as viewer, Scratch() as folder:
+        viewer.play(clip.q[::every], clip.dt * every)
+        page = viewer.save(folder / "clip.html").read_bytes()
+    return (
+        _environment()
+        .get_template("timeline.html.jinja")
+        .render(
+            check=found,
+            clip=clip,
+            contacts=found.contacts,
+            data=_json(_data(found)),
+            picture=base64.b64encode(gzip.compress(page, mtime=0)).decode("ascii"),
+        )
+    )
+
+
+def _data(found: ClipCheck) -> dict[str, Any]:
+    """What the page draws: depths in millimetres, those that are not zero, frames and gaps in the order of time."""
+    return {
+        "frames": len(found.clip),
+        "dt": found.clip.dt,
+        "tolerance": 1e3 * found.tolerance,
+        "rows": [
+            {"name": contact.names, "kind": contact.kind, **_cells(contact)} for contact in found.contacts
+        ],
+    }  # fmt: skip
+
+
+def _cells(contact: Contact) -> dict[str, Any]:
+    times = np.zeros(2 * len(contact.depth) - 1)
+    times[::2], times[1::2] = contact.depth, contact.between
+    at = np.flatnonzero(times)
+    return {"at": at.tolist(), "depth": np.round(1e3 * times[at], DIGITS).tolist()}
+
+
+def _json(value: Any) -> str:
+    """JSON that may stand in a script of a page."""
+    return json.dumps(value, separators=(",", ":")).replace("<", "\\u003c")
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
+
+    return Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=select_autoescape(["html.jinja"]),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
