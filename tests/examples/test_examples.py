@@ -24,7 +24,7 @@ Example = Callable[[str], ModuleType]
 SINGLE = ("shelf", "carry_box_past_table", "behind_the_back", "look_and_touch_overhead", "robot_arm_among_obstacles")
 OTHERS = (
     *("chair", "console_two_people", "hand_on_table", "avatar_two_arms"),
-    *("sit_on_chair", "four_bar", "assemble_shelf"),
+    *("sit_on_chair", "four_bar", "assemble_shelf", "free_a_clip"),
 )
 REST_ON = {("pelvis", "pouch"), ("lower_lumbar", "pouch")}  # what the figure wears lies on it
 
