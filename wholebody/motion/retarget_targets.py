@@ -151,8 +151,9 @@ def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, steps: Footfal
     else:
         scale = _leg(own) / max(_leg(source), SMALL) if _leg(own) and _leg(source) else 1.0
         hips = scale * source.places["hips"]
-        if "left_ankle" in steps.heights and own.has("left_ankle"):
-            hips[:, 2] += own.places["left_ankle"][2] - lowest - scale * steps.heights["left_ankle"]
+        foot = next((part for part in ("left_ankle", "left_toe") if part in steps.heights and own.has(part)), None)
+        if foot is not None:
+            hips[:, 2] += own.places[foot][2] - lowest - scale * steps.heights[foot]
         else:
             hips[:, 2] -= scale * float(np.percentile(motion.positions[:, :, 2].min(axis=1), 2))
     points = _points(own, source, hips, figure.root == "fixed")
