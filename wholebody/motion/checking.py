@@ -60,7 +60,7 @@ class ClipCheck:
         depth: (n,) deepest overlap of any pair in each frame, metres; 0 if there is none.
         between: (n - 1,) deepest overlap of any pair from each frame to the next one, both included. No pair gets
             deeper than this, or than the tolerance where this is less. What is beyond the tolerance may be too large by
-            a tenth of the tolerance and a fiftieth of itself.
+            a tenth of the tolerance and a twentieth of itself.
         contacts: pairs of segments and things that overlap by more than the tolerance, the deepest first.
         limits: joints beyond their limits, the worst first.
         speeds: joints faster than their velocity limits, the worst first.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
@@ -10,12 +10,13 @@ from types import MappingProxyType
 import numpy as np
 import pinocchio as pin
 
+from wholebody import checks
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.geometry.shapes import Box, Mesh, Sphere
 from wholebody.motion.clip import Clip
 from wholebody.motion.reading import read_clip
+from wholebody.motion.ready_equipment import READY, equipment
 from wholebody.scene import Scene
 
 RATE = 30.0  # Hz: of all clips
@@ -113,47 +114,15 @@ def recordings(folder: Path | None) -> tuple[Path, ...]:
     return tuple(found)
 
 
-def _sphere(scene: Scene) -> None:
-    scene.attach(Sphere(0.075), to="lower_thorax", name="sphere", at=(0.0, 0.17, -0.05))
-
-
-def _pouches(scene: Scene) -> None:
-    for side, y in (("left", 0.19), ("right", -0.19)):
-        scene.attach(Box((0.17, 0.05, 0.2)), to="pelvis", name=f"{side}_pouch", at=(0.08, y, 0.08))
-
-
-def _vest_plate(scene: Scene) -> None:
-    scene.attach(Box((0.025, 0.24, 0.32)), to="thorax", name="vest_plate", at=(0.16, 0.0, 0.0))
-
-
-def _pack(scene: Scene) -> None:
-    scene.attach(Box((0.2, 0.32, 0.5)), to="thorax", name="pack", at=(-0.24, 0.0, -0.08))
-
-
-def _torus(scene: Scene) -> None:
-    import trimesh
-
-    ring = trimesh.creation.torus(0.13, 0.03, major_sections=16, minor_sections=8)
-    scene.attach(Mesh((ring.vertices, ring.faces)), to="lower_thorax", name="torus", at=(0.0, 0.3, -0.1))
-
-
-EQUIPMENT: Mapping[str, Callable[[Scene], None]] = MappingProxyType(
-    {
-        "nothing": lambda scene: None,
-        "sphere": _sphere,
-        "pouches": _pouches,
-        "vest plate": _vest_plate,
-        "pack": _pack,
-        "torus": _torus,
-    }
-)
+EQUIPMENT = ("nothing", *READY)
 """What a person wears."""
 
 
-def dressed(figure: Figure, equipment: str) -> Scene:
+def dressed(figure: Figure, worn: str) -> Scene:
     """The scene of a person that wears something of `EQUIPMENT`."""
     scene = Scene(figure)
-    EQUIPMENT[equipment](scene)
+    for piece in equipment(worn, figure) if worn != "nothing" else ():
+        piece.attach(scene)
     return scene
 
 
@@ -163,6 +132,4 @@ def chosen(wanted: Sequence[str] | None, known: Sequence[str], option: str) -> t
     Raises:
         UnknownNameError: one is not known.
     """
-    from wholebody.checks import known as checked
-
-    return tuple(known) if wanted is None else tuple(checked(name, known, "name", option) for name in wanted)
+    return tuple(known) if wanted is None else tuple(checks.known(name, known, "name", option) for name in wanted)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from wholebody.bench.motion.cases import SYNTHETIC, WEAPON, dressed, recorded, synthetic
 from wholebody.bench.tables import read_rows, write_rows
@@ -24,7 +25,7 @@ CHECKED = "check"  # in place of a method: the clip as it is
 MAKING = 600.0  # s: to read a clip and bring it onto the figure
 START = 120.0  # s of the deadline of a case that its clip's length does not count for: imports, compilation
 SLOWEST = 60.0  # s for a second of motion, after which a method is ended
-MIDDLE = 7  # frames with which everything is compiled or read back first
+MIDDLE = 7  # frames, around a collision, with which everything is compiled or read back first
 
 LIMIT = 1e-6  # rad, m: by which a limit may be missed
 
@@ -97,15 +98,6 @@ class MotionRow:
         return self.outcome in ("free", "left")
 
 
-def methods() -> tuple[str, ...]:
-    """Names of the methods that free a clip."""
-    if find_spec("wholebody.motion.avoidance") is None:
-        return ()
-    from wholebody.motion.avoidance import METHODS
-
-    return tuple(METHODS)
-
-
 def made(name: str, recording: str, path: str) -> tuple[int, float]:
     """Make a clip and write it; a job of a process of its own. Returns its frames and its duration.
 
@@ -167,7 +159,7 @@ def _freed(row: MotionRow, clip: Clip, found: ClipCheck, scene: Any) -> MotionRo
     if row.clip in WEAPON:
         hand, other = WEAPON[row.clip]
         constraints.append(Hold(other, relative_to=hand))
-    avoid(clip[:MIDDLE], scene, method=row.method, constraints=constraints)
+    avoid(_colliding(clip, found), scene, method=row.method, constraints=constraints)  # compiles what is needed
     began = time.process_time()
     try:
         freed = avoid(clip, scene, method=row.method, constraints=constraints)
@@ -181,6 +173,12 @@ def _freed(row: MotionRow, clip: Clip, found: ClipCheck, scene: Any) -> MotionRo
     found = check(freed.clip, scene)
     row = replace(row, check_ms=1e3 * (time.process_time() - began) / len(clip))
     return _judged(row, clip, freed.clip, found)
+
+
+def _colliding(clip: Clip, found: ClipCheck) -> Clip:
+    """A few frames around the first collision; the first ones where there is none."""
+    first = max(0, int(np.argmax(found.depth > found.tolerance)) - MIDDLE // 2)
+    return clip[first : first + MIDDLE]
 
 
 def _judged(row: MotionRow, before: Clip, after: Clip, found: ClipCheck) -> MotionRow:

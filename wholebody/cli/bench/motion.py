@@ -37,13 +37,14 @@ def run(arguments: argparse.Namespace) -> int:
     """Measure, or go on; --quick takes two clips with two pieces of equipment."""
     from wholebody.bench.machine import machine
     from wholebody.bench.motion import cases, measuring, report
+    from wholebody.motion.avoidance import METHODS
 
     check_count(arguments.jobs, "--jobs")
     recordings = {path.stem: path for path in cases.recordings(arguments.clips)}
     known: dict[str, Path | None] = {**dict.fromkeys(cases.SYNTHETIC), **recordings}
     names = cases.chosen(arguments.only, tuple(known), "--only")
-    worn = cases.chosen(arguments.equipment, tuple(cases.EQUIPMENT), "--equipment")
-    ways = cases.chosen(arguments.methods, (measuring.CHECKED, *measuring.methods()), "--methods")
+    worn = cases.chosen(arguments.equipment, cases.EQUIPMENT, "--equipment")
+    ways = cases.chosen(arguments.methods, (measuring.CHECKED, *METHODS), "--methods")
     if arguments.quick:
         names, worn = names[:2], worn[:2]
     facts = machine()
