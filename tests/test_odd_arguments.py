@@ -475,7 +475,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Strength.limits", Call(wb.Strength().limits, {"figure": arm})
     found = wb.torques(clip)
     yield "Torques.largest", Call(found.largest, {})
-    yield "torques", Call(wb.torques, {"clip": clip, "friction": 0.5, "cutoff": 6.0, "strength": wb.Strength()})
+    yield (
+        "torques",
+        Call(wb.torques, {"clip": clip, "friction": 0.5, "cutoff": 6.0, "strength": wb.Strength(), "feet": ["link1"]}),
+    )
     yield "Clip(frames)", Call(lambda frames: clip[frames], {"frames": slice(0, 1)})
     clip.write(path / "walk.npz")
     (path / "walk.bvh").write_text(BVH)

@@ -10,7 +10,6 @@ import pytest
 
 import wholebody as wb
 from wholebody.motion.ground_forces import ground_forces
-from wholebody.motion.stance import StanceFeet
 from wholebody.motion.strength import FEMALE, MALE, Strength
 from wholebody.motion.torques import smoothed, torques
 
@@ -103,13 +102,11 @@ def test_nothing_pushes_somebody_who_flies(human: wb.Figure) -> None:
 
 
 def test_what_the_ground_cannot_give_is_said(human: wb.Figure) -> None:
-    t = np.arange(20) / 100.0
-    q = np.tile(human.posture("standing"), (20, 1))
-    q[:, 2] += 1.0 + 0.0 * t
-    q[10:, 2] += 0.3  # hovers: no foot stands for long enough at its lowest height when the time asked is long
-    found = torques(wb.Clip(human, q, 0.01), feet=StanceFeet(least=10.0), cutoff=None)
-    mass = pin.computeTotalMass(human.model)
-    assert found.missing[3, 2] == pytest.approx(GRAVITY * mass, rel=1e-6)
+    q = np.tile(human.posture("standing"), (60, 1))
+    q[20:40, 2] += 0.3  # hovers
+    found = torques(wb.Clip(human, q, 0.01), cutoff=None)
+    assert found.supported[[5, 30, 55]].tolist() == [True, False, True]
+    assert found.missing[30, 2] == pytest.approx(GRAVITY * pin.computeTotalMass(human.model), rel=1e-6)
     assert "the ground cannot give" in str(found)
 
 
@@ -204,6 +201,7 @@ def test_a_deep_squat_needs_more_of_the_knees_than_standing(human: wb.Figure) ->
         ({"cutoff": -1.0}, "cutoff"),
         ({"strength": 50}, "strength"),
         ({"feet": "left_foot"}, "feet"),
+        ({"feet": []}, "feet"),
     ],
 )
 def test_wrong_settings_are_refused(human: wb.Figure, options: dict[str, object], message: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,12 +15,13 @@ from wholebody.arrays import Array, Mask
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
+from wholebody.motion.feet import foot_points, paths, standing
 from wholebody.motion.ground_forces import ground_forces
-from wholebody.motion.stance import StanceFeet, standing
 from wholebody.motion.strength import Strength
 from wholebody.tasks.support import low_points
 
 ROOT_SIZE = 6
+FEET = ("left_foot", "right_foot")
 CUTOFF = 6.0
 """Hz: noise of recordings lies above, most of walking below (D. A. Winter, "Biomechanics and motor control of human
 movement", chapter 2.2.4: 4 to 6 Hz for walking)."""
@@ -113,7 +115,7 @@ class Torques:
 def torques(
     clip: Clip,
     *,
-    feet: StanceFeet | None = None,
+    feet: Sequence[str] = FEET,
     strength: Strength | None = None,
     friction: float = 0.8,
     cutoff: float | None = CUTOFF,
@@ -126,7 +128,8 @@ def torques(
 
     Args:
         clip: the motion.
-        feet: which feet stand when; found by speed and height of "left_foot" and "right_foot" if left out.
+        feet: segments that may stand; the figure's own of these. A foot stands while its heel, ball or tip of the toes
+            is low and slow; without frames of such names, while its own frame is.
         strength: of the person, for `lower`, `upper` and `share`; a man of median strength if left out.
         friction: coefficient of friction of the ground.
         cutoff: Hz of the low-pass filter (Butterworth, zero lag) that takes the noise of recordings out before
@@ -145,15 +148,18 @@ def torques(
         if strength is None
         else checks.instance(strength, Strength, "torques: strength", "give wb.Strength(percentile=50, sex='female')")
     )
-    if feet is not None:
-        checks.instance(feet, StanceFeet, "torques: feet", "give wb.StanceFeet(...)")
     figure = clip.figure
+    if feet is FEET:
+        feet = [name for name in FEET if name in figure.segments]
+    feet = checks.listed(feet, "torques: feet", "['left_foot', 'right_foot']")
+    for name in feet:
+        figure.frame_id(name)
     if not sum(inertia.mass for inertia in figure.model.inertias[1:]) > 0.0:
         raise InputError(f"torques: {figure.name} has no mass; give its segments masses")
     moved = smoothed(clip, cutoff)
     v, a = moved.velocities(), moved.accelerations()
     free = figure.root == "free"
-    stands = standing(figure, clip.q, clip.dt, feet) if free else {}
+    stands = _stands(clip, feet) if free else {}
     soles = _Soles(figure, tuple(stands))
     count, nv = len(clip), figure.model.nv
     torque, missing = np.zeros((count, nv)), np.zeros((count, ROOT_SIZE))
@@ -227,6 +233,24 @@ def _pressure(forces: Array, points: Array) -> Array:
     if load <= 0.0:
         return np.zeros(3)
     found: Array = forces[:, 2] @ points / load
+    return found
+
+
+def _stands(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:
+    """In which frames (n,) each foot stands."""
+    figure = clip.figure
+    found: dict[str, Mask] = {}
+    for name in feet:
+        joint = figure.model.frames[figure.frame_id(name)].parentJoint
+        points = tuple(
+            point
+            for point in foot_points(figure)
+            if joint in figure.model.supports[figure.model.frames[figure.frame_id(point)].parentJoint]
+        )
+        places = paths(figure, clip.q, points or (name,))
+        found[name] = np.any([standing(path, clip.dt) for path in places.transpose(1, 0, 2)], axis=0)
+    if not found:
+        raise InputError(f"torques: {figure.name} has no segments {' or '.join(FEET)}; name its feet with feet=[...]")
     return found
 
 
