@@ -64,29 +64,31 @@ def test_an_arm_that_swings_through_a_ball_goes_around_it(planar_arm: Callable[.
 
 def test_the_trajectory_is_the_least_of_its_objective(planar_arm: Callable[..., Figure]) -> None:
     """SLSQP on the same objective, with the distances of two segments from the ball, finds nothing better."""
-    clip, scene = arm_and_ball(planar_arm, 16)
-    method = wb.Trajectory(margin=10.0)
-    found = method.avoid(clip, scene, (), None).q
+    figure = planar_arm((LINK, LINK), radius=WIDTH)
+    scene = wb.Scene(figure)
+    scene.add(wb.Sphere(RADIUS), name="ball", at=(*BALL, 0.0))
+    frames = 20
+    wave = np.sin(np.pi * np.arange(frames) / (frames - 1))
+    q = np.stack([-1.0 + 0.56 * wave, np.full(frames, 0.7)], axis=1)  # into the ball from the side, and back
+    clip, method = wb.Clip(figure, q, DT), wb.Trajectory(margin=10.0)
+    assert min(map(gap, q)) < -0.02
 
     def objective(flat: np.ndarray) -> float:
-        x = flat.reshape(16, 2)
+        x = flat.reshape(frames, 2)
         acceleration = np.diff(x, n=2, axis=0) * (method.time / DT) ** 2
         return 0.5 * float((x**2).sum() + (acceleration**2).sum())
 
     def gaps(flat: np.ndarray) -> np.ndarray:
-        return np.array([gap(q) for q in clip.q + flat.reshape(16, 2)])
+        return np.array([gap(posture) for posture in q + flat.reshape(frames, 2)])
 
-    begun = (found - clip.q).ravel()
-    assert gaps(begun).min() > -1e-5
-    best = minimize(
-        objective, begun, method="SLSQP", constraints={"type": "ineq", "fun": gaps}, options={"maxiter": 200}
-    )
-    assert objective(begun) <= 1.02 * best.fun + 1e-6
-    # the same from a start of its own: the way around the ball that the trajectory took is not far longer
-    own = minimize(
-        objective, 1.2 * begun, method="SLSQP", constraints={"type": "ineq", "fun": gaps}, options={"maxiter": 400}
-    )
-    assert objective(begun) <= 1.02 * own.fun + 1e-6
+    found = (method.avoid(clip, scene, (), None).q - q).ravel()
+    assert gaps(found).min() > -1e-5
+    for start in (found, np.zeros_like(found)):
+        best = minimize(
+            objective, start, method="SLSQP", constraints={"type": "ineq", "fun": gaps}, options={"maxiter": 300}
+        )
+        assert gaps(best.x).min() > -1e-6
+        assert objective(found) <= 1.01 * best.fun
 
 
 def test_a_free_clip_stays_as_it_is(planar_arm: Callable[..., Figure]) -> None:
@@ -100,10 +102,10 @@ def test_a_free_clip_stays_as_it_is(planar_arm: Callable[..., Figure]) -> None:
 
 
 def test_a_thin_thing_between_two_frames_is_not_passed(planar_arm: Callable[..., Figure]) -> None:
-    """No frame touches the needle; the arm passes it between two of them."""
+    """No frame touches the needle; the tip of the arm scrapes over it between two of them."""
     figure = planar_arm((LINK, LINK), radius=0.002)
     scene = wb.Scene(figure)
-    scene.add(wb.Sphere(0.002), name="needle", at=(0.93, 0.0, 0.0))
+    scene.add(wb.Sphere(0.002), name="needle", at=(0.971, 0.0, 0.0))
     clip = wb.Clip(figure, swing(40), DT)
     found = wb.avoid(clip, scene)
     assert found.report.before.colliding == 0
@@ -117,6 +119,7 @@ def test_what_cannot_be_freed_is_said(planar_arm: Callable[..., Figure]) -> None
         found = wb.avoid(clip, scene, method=method, constraints=[wb.Freeze("all")])
         assert not found.report.solved
         assert "collide" in found.report.message
+        np.testing.assert_allclose(found.clip.q, clip.q, atol=1e-9)
 
 
 def test_joint_limits_hold_where_the_original_breaks_them(planar_arm: Callable[..., Figure]) -> None:
@@ -130,11 +133,10 @@ def test_joint_limits_hold_where_the_original_breaks_them(planar_arm: Callable[.
 
 def test_joints_become_no_faster_than_their_limit_or_the_original(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 90)
-    limit = 2.0
-    found = wb.avoid(clip, scene, constraints=[wb.StepLimit(limit)])
     free = wb.avoid(clip, scene)
+    limit = 0.85 * float(np.abs(np.diff(free.clip.q, axis=0)).max()) / DT
+    found = wb.avoid(clip, scene, constraints=[wb.StepLimit(limit)])
     assert found.report.solved, found.report.message
-    assert np.abs(np.diff(free.clip.q, axis=0)).max() > limit * DT
     assert np.abs(np.diff(found.clip.q, axis=0)).max() <= limit * DT + 1e-6
 
 
@@ -198,7 +200,7 @@ def test_a_two_handed_grip_is_kept(human: Figure) -> None:
 
 def test_both_solvers_give_the_same_clip(planar_arm: Callable[..., Figure]) -> None:
     pytest.importorskip("piqp")
-    clip, scene = arm_and_ball(planar_arm, 40)
+    clip, scene = arm_and_ball(planar_arm, 90)
     one, other = (wb.Trajectory(solver=name).avoid(clip, scene, (), None).q for name in ("piqp", "osqp"))
     np.testing.assert_allclose(one, other, atol=2e-3)
 

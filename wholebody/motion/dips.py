@@ -1,4 +1,4 @@
-"""Motions between frames: which of them dip into something, and where to look there."""
+"""Motions between frames: which of them dip into something, and where they are deepest."""
 
 from __future__ import annotations
 
@@ -8,14 +8,19 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.geometry.continuous.swept_depth import SweptDepth
 from wholebody.workspace import Workspace
 
-DIP = 8e-5  # m: sweeps find dips deeper than this; frames themselves are met to 1e-5, so no dip is deeper than 0.1 mm
-SAMPLED = 4e-5  # m: of a dip that is found by looking at a few places; half, because the deepest place may be elsewhere
+DIP = 8e-5  # m: a deeper overlap between two frames is a dip; `wb.check` allows 0.1 mm and may add 0.01 mm
+SAMPLED = 4e-5  # m: the same where a gap is looked at in a few places only; the deepest one may be elsewhere
 NEAR = 2e-4  # m: what is nearer than this between frames gets rows as soon as something dips
-FEW = (0.25, 0.5, 0.75)
-MANY = tuple(float(k) / 12.0 for k in range(1, 12))
-"""Shares of a gap at which it is looked at: the deepest of them becomes a node."""
+FAR = 0.1  # m: distances beyond it are as good as this
+BEHIND = 2e-3  # share of a gap behind the first contact of a sweep at which it is looked at
+HALVINGS = 8  # of the search for the deepest place: to a fiftieth of what is between two places
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+FEW = tuple(float(k) / 6.0 for k in range(1, 6))
+MANY = tuple(float(k) / 64.0 for k in range(1, 64))
+"""Shares of a gap at which it is looked at."""
 
 
 def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float]:
@@ -24,36 +29,52 @@ def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float
     Args:
         workspace: of this run alone.
         q: (n, nq) postures.
-        gaps: frames whose motion to the next frame is swept.
+        gaps: frames whose motion to the next frame is looked at, however thin the things in its way.
     """
-    found = {}
-    for gap in gaps:
-        contact = workspace.sweep.first_contact(q[gap], q[gap + 1], tolerance=DIP)
-        if contact is not None:
-            found[gap] = _deepest(workspace, q[gap], q[gap + 1], contact.fraction)
+    swept = SweptDepth(workspace.table, workspace.geometry, DIP)
+    found, last = {}, -1
+    for gap in sorted(gaps):
+        if gap != last:
+            swept.start(q[gap])
+        last = gap + 1
+        passing = swept.advance(q[last])[1]
+        if passing.depth.max(initial=0.0) > DIP:
+            found[gap] = _deepest(workspace, q[gap], q[last], int(passing.number[np.argmax(passing.depth)]))
     return found
 
 
 def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tuple[int, float]]:
-    """Places between frames that overlap, or nearly so, if some of them dip: a fiftieth of the time of sweeps.
+    """Places between frames that overlap, or nearly so, if some of them dip.
 
-    Looks at three places of each gap, so it may miss dips. What nearly overlaps is told too, because what pushes one
+    Looks at a few places of each gap, so it may miss dips. What nearly overlaps is told too, because what pushes one
     gap out pushes its neighbours in.
     """
     near, dipping = [], False
     for gap in gaps:
-        for share, one in zip(FEW, _depths(workspace, q[gap], q[gap + 1], FEW, NEAR), strict=True):
-            dipping |= one > SAMPLED
-            if one > -NEAR:
-                near.append((gap, share))
+        depths = _depths(workspace, q[gap], q[gap + 1], FEW, NEAR)
+        place = int(np.argmax(depths))
+        dipping |= depths[place] > SAMPLED
+        if depths[place] > -NEAR:
+            near.append((gap, FEW[place]))
     return near if dipping else []
 
 
-def _deepest(workspace: Workspace, before: Array, after: Array, otherwise: float) -> float:
-    """Share of the way at which some pair is deepest; `otherwise` where nothing overlaps at the shares looked at."""
-    depths = _depths(workspace, before, after, MANY)
-    place = int(np.argmax(depths))
-    return MANY[place] if depths[place] > 0.0 else float(np.clip(otherwise, MANY[0], MANY[-1]))
+def _deepest(workspace: Workspace, before: Array, after: Array, number: int) -> float:
+    """Share of the way between two postures (nq,) at which a pair is nearest: a corner dips in a hundredth of a gap."""
+
+    def distance(share: float) -> float:
+        near = workspace.near(np.asarray(pin.interpolate(workspace.model, before, after, share)), FAR)
+        return float(near.distance[near.number == number].min(initial=FAR))
+
+    contact = workspace.sweep.first_contact(before, after, tolerance=DIP)
+    begun = () if contact is None else (contact.fraction, contact.fraction + BEHIND)
+    shares = sorted({0.0, *MANY, *begun, 1.0})
+    place = 1 + int(np.argmin([distance(share) for share in shares[1:-1]]))
+    low, high = shares[place - 1], shares[place + 1]
+    for _ in range(HALVINGS):
+        first, second = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        low, high = (low, second) if distance(first) < distance(second) else (first, high)
+    return 0.5 * (low + high)
 
 
 def _depths(

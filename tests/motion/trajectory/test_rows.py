@@ -109,7 +109,7 @@ def test_held_terms_change_as_their_rows_say(human: Figure) -> None:
     terms = (
         Hold("left_hand", relative_to="right_hand"),
         Hold("left_foot"),
-        Plane("right_elbow", (0.0, 0.0, 1.0), (0, 0, 0.2)),
+        Plane("right_elbow", (0.0, 0.0, 1.0), point=(0.0, 0.0, 0.2), side="above"),
     )
     q = wandering(human, 2, 0.05)
     scene = wb.Scene(human)

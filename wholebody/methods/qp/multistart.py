@@ -183,7 +183,7 @@ class Search:
             self._accept(self._stay(self.best), self.how)
         if self._out_of_reach:
             self._come_near()
-        elif self.best.violation.left > tolerance:
+        elif self.best.violation.worst > tolerance:
             self._near_best()
         if self.best.violation.left <= tolerance:
             return

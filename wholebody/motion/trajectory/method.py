@@ -77,7 +77,7 @@ class Trajectory:
                 begun, note = done, f"frames {window.first} to {window.end - 1}"
                 share = len(window) / total
                 cancelled = self._teller(watch, begun / total, share, note)
-                freed = run.window(window, depths, cancelled)
+                freed = run.window(window, depths, gaps, cancelled)
                 q[window.first : window.end] = freed.q
                 if watch.ended:
                     break

@@ -154,10 +154,9 @@ class WindowProgram:
 
     def _accepted(self, there: _At, here: _At, entries: Sequence[tuple[float, float]], gained: float) -> bool:
         """Whether the filter takes a point."""
-        free = MET * 0.1 * len(self.nodes)
+        if there.worst <= MET:
+            return here.worst > MET or gained >= -1e-12 * max(1.0, here.objective)
         known = [*entries, ((1.0 - MARGIN) * here.total, here.objective)]
-        if there.total <= free:
-            return here.total > free or gained >= -1e-12 * max(1.0, here.objective)
         return all(
             there.total < total or there.objective < objective - MARGIN * there.total for total, objective in known
         )

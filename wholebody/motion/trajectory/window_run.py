@@ -21,6 +21,8 @@ from wholebody.motion.windows import Window
 from wholebody.workspace import Workspace
 
 ROUNDS = 12  # of sweeping and adding places between frames
+NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
+SIDES = (0.0, -0.005, 0.005)  # shares of a gap beside its deepest place that become nodes with it
 NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few rows are near enough to count then
 NOTHING = 1e-9  # rad, m: a deviation no larger is none
 
@@ -100,12 +102,13 @@ class ClipRun:
         """How many postures were solved for on their own."""
         return self._carried.posture_solves
 
-    def window(self, window: Window, depths: Array, cancel: Callable[[float], bool]) -> Freed:
+    def window(self, window: Window, depths: Array, gaps: Iterable[int], cancel: Callable[[float], bool]) -> Freed:
         """Free one window.
 
         Args:
             window: which frames.
             depths: (frames of the clip,) how deep each original posture is.
+            gaps: frames of the clip whose original motion to the next one dips.
             cancel: told the share done; true ends the attempt, and the window stays as it was.
         """
         terms = self._terms
@@ -115,9 +118,10 @@ class ClipRun:
         limits = self._limits(window, chart, seams)
         held = [terms.held(frame) for frame in range(window.first, window.end)]
         looking = Looking(self._workspace, chart, held, self._settings.clearance)
+        always = {gap - window.first for gap in gaps}
         best: _Attempt | None = None
         for start in self._starts(window, chart, limits, depths):
-            attempt = self._attempt(start, chart, looking, objective, limits, cancel)
+            attempt = self._attempt(start, chart, looking, objective, limits, always, cancel)
             if attempt is None:
                 return Freed(chart.original, "")
             best = attempt if best is None or attempt.rank < best.rank else best
@@ -143,7 +147,7 @@ class ClipRun:
             yield np.clip(x, limits.lower, limits.upper)
 
     def _attempt(
-        self, x: Array, chart: Chart, looking: Looking, objective: Objective, limits: Limits,
+        self, x: Array, chart: Chart, looking: Looking, objective: Objective, limits: Limits, always: set[int],
         cancel: Callable[[float], bool],
     ) -> _Attempt | None:  # fmt: skip
         program = WindowProgram(looking, objective, limits, self._solve, self._settings.iterations)
@@ -156,15 +160,19 @@ class ClipRun:
                 return None
             x = found.x
             q = chart.postures(x)
-            gaps = [gap for gap in range(len(x) - 1) if x[gap : gap + 2].any()]
-            dipping = sampled_dips(self._workspace, q, gaps) if found.met else []
-            if not dipping:
-                dipping = list(dips(self._workspace, q, gaps).items())
+            gaps = [gap for gap in range(len(x) - 1) if gap in always or x[gap : gap + 2].any()]
+            swept = dips(self._workspace, q, gaps)
+            dipping = [(gap, share + side) for gap, share in swept.items() for side in SIDES]
+            if dipping and found.met:
+                dipping += sampled_dips(self._workspace, q, gaps)
             if not dipping or not found.met:
-                return _Attempt(x, found.worst, len(dipping), objective.value(x))
-            program.add([Node(gap, share) for gap, share in dipping])
+                return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), objective.value(x))
+            before = len(program.nodes)
+            program.add([Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in dipping])
+            if len(program.nodes) == before:
+                break
         assert found is not None
-        return _Attempt(x, found.worst, len(dipping), objective.value(x))
+        return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), objective.value(x))
 
     def _limits(self, window: Window, chart: Chart, seams: tuple[bool, bool]) -> Limits:
         """Bounds on deviations and on their changes; at a seam nothing moves."""
