@@ -74,7 +74,7 @@ def _deepest(workspace: Workspace, before: Array, after: Array, number: int) -> 
     for _ in range(HALVINGS):
         first, second = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
         low, high = (low, second) if distance(first) < distance(second) else (first, high)
-    return 0.5 * (low + high)
+    return float(0.5 * (low + high))
 
 
 def _depths(

@@ -248,8 +248,8 @@ def _stands(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:
             for point in foot_points(figure)
             if joint in figure.model.supports[figure.model.frames[figure.frame_id(point)].parentJoint]
         )
-        stand = standing(figure, clip.q, clip.dt, StanceFeet(points or (name,)))
-        found[name] = np.any(list(stand.values()), axis=0)
+        marks = standing(figure, clip.q, clip.dt, StanceFeet(points or (name,)))
+        found[name] = np.any(list(marks.values()), axis=0)
     if not found:
         raise InputError(f"torques: {figure.name} has no segments {' or '.join(FEET)}; name its feet with feet=[...]")
     return found
