@@ -17,6 +17,7 @@ from hypothesis import HealthCheck, settings
 
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
+from wholebody.scene import Scene
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -130,3 +131,16 @@ def free_bodies() -> Callable[..., Figure]:
 def planar_arm() -> Callable[..., Figure]:
     """Return a function: lengths -> a fixed arm in the plane z = 0, joints "turn0", ..., frame "tip"."""
     return _planar_arm
+
+
+def _least_distance(scene: Scene, q: Any) -> float:
+    """Least signed distance of all pairs, from Pinocchio's own loop over coal, without a guess."""
+    data, placed = scene.model.createData(), pin.GeometryData(scene.geometry)
+    pin.computeDistances(scene.model, data, scene.geometry, placed, np.asarray(q))
+    return min((result.min_distance for result in placed.distanceResults), default=np.inf)
+
+
+@pytest.fixture(scope="session")
+def least_distance() -> Callable[..., float]:
+    """Return a function: scene, posture -> least signed distance of all pairs."""
+    return _least_distance

@@ -117,6 +117,27 @@ ARM = """<robot name="arm">
   <link name="base"><collision><geometry><sphere radius="0.05"/></geometry></collision></link>
   {links}
 </robot>"""
+BVH = """HIERARCHY
+ROOT hips
+{
+OFFSET 0 0 0
+CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+JOINT b
+{
+OFFSET 0 0.5 0
+CHANNELS 3 Zrotation Xrotation Yrotation
+JOINT a
+{
+OFFSET 0 1 0
+CHANNELS 3 Zrotation Xrotation Yrotation
+}
+}
+}
+MOTION
+Frames: 1
+Frame Time: 0.1
+0 0 0 0 0 0 10 0 0 0 0 0
+"""
 LINK = """<link name="link{n}"><inertial><mass value="1"/>
   <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
   <collision><origin xyz="0 0 0.2"/><geometry><sphere radius="0.05"/></geometry></collision></link>
@@ -450,10 +471,38 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
     for method in ("mirrored", "velocities", "accelerations", "jerk"):
         yield f"Clip.{method}", Call(getattr(wb.Clip(hand, [hand.neutral], 0.1), method), {})  # type: ignore[arg-type]
+    yield "Strength", Call(wb.Strength, {"percentile": 50.0, "sex": "female"}, lambda made: made.limits(arm))
+    yield "Strength.limits", Call(wb.Strength().limits, {"figure": arm})
+    found = wb.torques(clip)
+    yield "Torques.largest", Call(found.largest, {})
+    yield (
+        "torques",
+        Call(wb.torques, {"clip": clip, "friction": 0.5, "cutoff": 6.0, "strength": wb.Strength(), "feet": ["link1"]}),
+    )
     yield "Clip(frames)", Call(lambda frames: clip[frames], {"frames": slice(0, 1)})
     clip.write(path / "walk.npz")
+    (path / "walk.bvh").write_text(BVH)
+    skeleton = wb.read_skeleton(path / "walk.bvh")
+    yield "read_skeleton", Call(wb.read_skeleton, {"path": path / "walk.bvh", "unit": "metres", "up": "y"})
+    moving_skeleton = {
+        "names": ("hips", "head"), "parents": [-1, 0], "offsets": np.zeros((2, 3)),
+        "dt": 0.1, "name": "it", "notes": (),
+        "rotations": np.tile(np.eye(3), (3, 2, 1, 1)), "positions": np.zeros((3, 2, 3)),
+    }  # fmt: skip
+    yield "SkeletonMotion", Call(wb.SkeletonMotion, moving_skeleton, lambda made: made.rest())
+    yield "SkeletonMotion.part", Call(skeleton.part, {"first": 0, "last": 1})
+    local = {**moving_skeleton, "local": np.tile(np.eye(3), (3, 2, 1, 1)), "root": np.zeros((3, 3))}
+    del local["rotations"], local["positions"]
+    yield "SkeletonMotion.moved", Call(wb.SkeletonMotion.moved, local)
+    for method in ("rest", "reversed", "length"):
+        yield f"SkeletonMotion.{method}", Call(getattr(skeleton, method), {})
+    bones = {
+        "skeleton": {"left_wrist": "a", "left_elbow": "b"},
+        "figure": {"left_wrist": "link4", "left_elbow": "link2"},
+    }
+    yield "retarget", Call(wb.retarget, {"motion": skeleton, "figure": arm, "names": bones, "progress": print})
     yield "read_clip", Call(wb.read_clip, {"path": path / "walk.npz", "figure": arm})
-    checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done, frames: None}
+    checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done: None}
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
     avoided = {"clip": clip, "scene": wb.Scene(arm), "constraints": [], "progress": lambda told: None}
     yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
@@ -523,6 +572,8 @@ ANSWERS = (
     "Task", "Step", "QPStep", "Simplified", "LeftOut",
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
     "Scene.of_parts", "ClipCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
+    "Recording", "Torques", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
+    "Scene.of_parts",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 

@@ -40,8 +40,12 @@ if TYPE_CHECKING:
     from wholebody.motion.clip import Clip
     from wholebody.motion.fade import Fade
     from wholebody.motion.per_frame import PerFrame
-    from wholebody.motion.reading import read_clip
+    from wholebody.motion.reading import read_clip, read_skeleton
+    from wholebody.motion.retargeting import retarget
+    from wholebody.motion.skeleton import SkeletonMotion
     from wholebody.motion.stance import StanceFeet
+    from wholebody.motion.strength import Strength
+    from wholebody.motion.torques import Torques, torques
     from wholebody.motion.trajectory.method import Trajectory
     from wholebody.problem import Problem
     from wholebody.scene import Scene
@@ -123,11 +127,14 @@ __all__ = [
     "Relative",
     "Scene",
     "Shape",
+    "SkeletonMotion",
     "Solution",
     "Sphere",
     "StanceFeet",
     "StepLimit",
+    "Strength",
     "Task",
+    "Torques",
     "Trajectory",
     "UnknownNameError",
     "Viewer",
@@ -139,9 +146,12 @@ __all__ = [
     "follow_path",
     "load",
     "read_clip",
+    "read_skeleton",
     "read_task",
+    "retarget",
     "simplify",
     "solve",
+    "torques",
 ]
 
 _MODULES = {
@@ -160,9 +170,13 @@ _MODULES = {
     "wholebody.motion.avoidance": "AvoidanceReport Avoided avoid",
     "wholebody.motion.checking": "ClipCheck check",
     "wholebody.motion.clip": "Clip",
+    "wholebody.motion.reading": "read_clip read_skeleton",
+    "wholebody.motion.retargeting": "retarget",
+    "wholebody.motion.skeleton": "SkeletonMotion",
     "wholebody.motion.fade": "Fade",
     "wholebody.motion.per_frame": "PerFrame",
-    "wholebody.motion.reading": "read_clip",
+    "wholebody.motion.strength": "Strength",
+    "wholebody.motion.torques": "Torques torques",
     "wholebody.motion.stance": "StanceFeet",
     "wholebody.motion.trajectory.method": "Trajectory",
     "wholebody.problem": "Problem",

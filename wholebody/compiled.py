@@ -22,7 +22,9 @@ LOOPS = (
     "wholebody.methods.ccd.limbs",
     "wholebody.methods.newton.linear_algebra.normal_equations",
     "wholebody.methods.qp.active_set",
+    "wholebody.methods.qp.curved_reach",
     "wholebody.methods.qp.solvers.osqp_solver",
+    "wholebody.methods.qp.step_program",
     "wholebody.methods.qp.subproblem",
 )
 """Modules with compiled loops; each has a function `compiled_kernel`, which compiles or loads them."""

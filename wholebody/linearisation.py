@@ -199,9 +199,9 @@ class Lineariser:
         jacobian = room.jacobian[: len(room.value) + count]
         self._terms(count, room.value, jacobian, room.box, room.measure)
         contact = self._contact[:count]
-        return room._replace(
-            q=self.state.q, jacobian=jacobian, contacts=contacts, gap=self._gap[:count], gap_contact=contact,
-            clearance=clearance[contact],
+        return Passing(
+            self.state.q, room.goals, room.value, jacobian, contacts, self._gap[:count], contact, clearance[contact],
+            room.measure, room.box,
         )  # fmt: skip
 
     def _made(self) -> Passing:
@@ -252,7 +252,9 @@ class Lineariser:
         """Write values and rows of terms of other classes."""
         state = self.state
         for term, evaluate, row, rows in others:
-            part, derivative = np.atleast_1d(evaluate(state)), term.jacobian(state)
+            part, derivative = evaluate(state), term.jacobian(state)
+            if np.ndim(part) != 1:
+                part = np.atleast_1d(part)
             checked_rows(term, part, derivative, rows)
             value[row : row + rows] = part
             dense = state.wrench_jacobian(derivative) if isinstance(derivative, Wrench) else derivative

@@ -181,7 +181,9 @@ class Scene:
         rests = tuple(checks.listed(rests_on, f"attach {name!r}: rests_on", "['thorax']"))
         carried = [thing.name for thing in self._objects.values() if thing.segment is not None]
         for other in rests:
-            checks.known(other, {*self.figure.segments, *carried}, "segment or carried thing", f"attach {name!r}: rests_on")
+            checks.known(
+                other, {*self.figure.segments, *carried}, "segment or carried thing", f"attach {name!r}: rests_on"
+            )
         return self._put(name, shape, at, color, to, rests)
 
     def move(self, name: str, *, at: Any) -> Scene:

@@ -93,7 +93,7 @@ def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
 
 def test_every_tool_has_a_colour_of_its_own() -> None:
     assert set(STEPPING) <= set(plot_style.COLORS)
-    assert plot_style.look("qp").color == plot_style.COLORS["wholebody"]  # the same method in another chart
+    assert plot_style.method_style("qp").color == plot_style.COLORS["wholebody"]  # the same method in another chart
     assert len(set(plot_style.COLORS.values())) == len(plot_style.COLORS)
 
 

@@ -9,7 +9,9 @@ from typing import Any
 import pytest
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/quickstart.md", "docs/guide.md", "docs/interaction.md"])
+@pytest.mark.parametrize(
+    "page", ["README.md", "docs/quickstart.md", "docs/guide.md", "docs/interaction.md", "docs/motion.md"]
+)
 def test_code_on_the_page_runs(page: str, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", (root / page).read_text(), re.DOTALL)

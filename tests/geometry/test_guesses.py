@@ -32,7 +32,7 @@ def test_boxes_are_as_large_as_they_say() -> None:
 
 
 def test_coal_alone_would_inflate_them() -> None:
-    """Where this fails, coal has been mended, and `settle_boxes` can go."""
+    """Where this fails, coal has been mended, and `fix_box_inflation` can go."""
     ground, boxes = asked("")
     assert ground < -1e-12
     assert boxes < 0.1 - 1e-11

@@ -13,7 +13,7 @@ import trimesh
 
 from wholebody.geometry import convex, mesh_cache
 from wholebody.geometry.convex import convex_pieces, mesh_hull
-from wholebody.geometry.mesh_cache import ConvexPieces, cache_state, clear_cache, kept
+from wholebody.geometry.mesh_cache import ConvexPieces, cache_state, cached, clear_cache
 
 
 @pytest.fixture
@@ -34,8 +34,8 @@ def points(found: ConvexPieces) -> list[np.ndarray]:
 
 
 def test_what_was_kept_is_what_was_made_under_another_name_too(folder: Path) -> None:
-    first = kept((b"content",), "settings", "mesh a", made)
-    again = kept((b"content",), "settings", "mesh b", lambda: pytest.fail("made again"))
+    first = cached((b"content",), "settings", "mesh a", made)
+    again = cached((b"content",), "settings", "mesh b", lambda: pytest.fail("made again"))
     assert points(first)[0] == pytest.approx(points(again)[0])
     assert again.pieces[0].geometry.computeVolume() == pytest.approx(first.pieces[0].volume)
     assert again.added_volume == first.added_volume
@@ -47,39 +47,39 @@ def test_what_was_kept_is_what_was_made_under_another_name_too(folder: Path) -> 
 def test_other_content_or_settings_are_made_anew(folder: Path) -> None:
     asked = []
     for content, settings in ((b"a", "s"), (b"b", "s"), (b"a", "t"), (b"a", "s")):
-        kept((content,), settings, "mesh a", lambda: asked.append(1) or made())
+        cached((content,), settings, "mesh a", lambda: asked.append(1) or made())
     assert len(asked) == 3
     cut, other = (b"ab", b"c"), (b"a", b"bc")
-    kept(cut, "s", "mesh a", lambda: asked.append(1) or made())
-    kept(other, "s", "mesh a", lambda: asked.append(1) or made())
+    cached(cut, "s", "mesh a", lambda: asked.append(1) or made())
+    cached(other, "s", "mesh a", lambda: asked.append(1) or made())
     assert len(asked) == 5
 
 
 @pytest.mark.parametrize("harm", [b"", b"x" * 100, None])
 def test_a_damaged_entry_is_made_anew(folder: Path, harm: bytes | None) -> None:
-    kept((b"a",), "s", "mesh a", made)
+    cached((b"a",), "s", "mesh a", made)
     (file,) = folder.iterdir()
     data = file.read_bytes()
     file.write_bytes(data[:-1] + bytes([data[-1] ^ 1]) if harm is None else harm)
     asked = []
-    kept((b"a",), "s", "mesh a", lambda: asked.append(1) or made())
+    cached((b"a",), "s", "mesh a", lambda: asked.append(1) or made())
     assert asked
     assert file.read_bytes() == data
 
 
 def test_the_oldest_go_when_there_is_too_much(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    kept((b"0",), "s", "mesh a", made)
+    cached((b"0",), "s", "mesh a", made)
     size = cache_state().size
     monkeypatch.setattr(mesh_cache, "LARGEST_CACHE", 4 * size)
     monkeypatch.setattr(mesh_cache, "LOOKED_AT_EVERY", 1)
     for k in range(1, 9):
         for age, file in enumerate(sorted(folder.glob("*.pieces"), key=lambda path: path.stat().st_mtime)):
             os.utime(file, (1e9 + age, 1e9 + age))
-        kept((str(k).encode(),), "s", "mesh a", made)
+        cached((str(k).encode(),), "s", "mesh a", made)
         assert cache_state().size <= 4 * size
-    kept((b"8",), "s", "mesh a", lambda: pytest.fail("the newest is gone"))
+    cached((b"8",), "s", "mesh a", lambda: pytest.fail("the newest is gone"))
     asked = []
-    kept((b"0",), "s", "mesh a", lambda: asked.append(1) or made())
+    cached((b"0",), "s", "mesh a", lambda: asked.append(1) or made())
     assert asked
 
 
@@ -89,7 +89,7 @@ def test_half_written_files_of_killed_processes_go(folder: Path) -> None:
     for file in (old, new):
         file.write_bytes(b"half")
     os.utime(old, (1e9, 1e9))
-    kept((b"a",), "s", "mesh a", made)
+    cached((b"a",), "s", "mesh a", made)
     assert not old.exists()
     assert new.exists()
     assert clear_cache().entries == 1
@@ -99,7 +99,7 @@ def test_half_written_files_of_killed_processes_go(folder: Path) -> None:
 def test_without_a_folder_nothing_is_kept_and_all_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv(mesh_cache.VARIABLE, str(tmp_path / "file" / "cache"))
-    assert len(kept((b"a",), "s", "mesh a", made).pieces) == 1
+    assert len(cached((b"a",), "s", "mesh a", made).pieces) == 1
     assert cache_state().entries == 0
 
 
@@ -117,10 +117,10 @@ def test_several_processes_write_one_entry_at_once(folder: Path) -> None:
     code = (
         "import trimesh, sys\n"
         "from wholebody.geometry.convex import mesh_hull\n"
-        "from wholebody.geometry.mesh_cache import kept\n"
+        "from wholebody.geometry.mesh_cache import cached\n"
         "ball = trimesh.creation.icosphere(subdivisions=1)\n"
         "for k in range(40):\n"
-        "    found = kept((str(k % 4).encode(),), 's', 'm', lambda: mesh_hull(ball.vertices, ball.faces))\n"
+        "    found = cached((str(k % 4).encode(),), 's', 'm', lambda: mesh_hull(ball.vertices, ball.faces))\n"
         "    assert len(found.pieces) == 1\n"
     )
     running = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(3)]

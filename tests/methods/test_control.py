@@ -114,3 +114,12 @@ def test_progress_is_a_function(reach):
 def test_a_solve_that_is_let_alone_is_the_same(reach):
     one, other = wb.QP(time_limit=1000.0).solve(reach), wb.QP().solve(reach)
     assert np.array_equal(one.q, other.q)
+
+
+def test_processor_time_is_not_asked_for_before_so_much_time_went_by(monkeypatch):
+    """It costs a call of the system at every iteration."""
+    asked = []
+    control = Control()
+    monkeypatch.setattr(time, "thread_time", lambda: asked.append(1) or 0.0)
+    assert not any(control.over for _ in range(100))
+    assert not asked

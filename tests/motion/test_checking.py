@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.motion.clip_contacts import contact, contact_as_dict, runs
+from wholebody.motion.ready_equipment import equipment
 
 
 def at(*places: float) -> Array:
@@ -53,10 +55,10 @@ def test_a_ball_that_rolls_into_a_wall_and_back(free_bodies: Callable[..., Any])
     clip = ball(free_bodies, 0.0, 0.3, 0.42, 0.45, 0.45, 0.3, 0.41, 0.0)
     scene = wb.Scene(clip.figure)
     scene.add(wb.Box((0.2, 1.0, 1.0)), name="wall", at=(0.6, 0.0, 0.0))  # its face is at x = 0.5
-    told: list[tuple[int, int]] = []
-    found = wb.check(clip, scene, progress=lambda *done: told.append(done))
+    told: list[int] = []
+    found = wb.check(clip, scene, progress=told.append)
     assert np.allclose(found.depth, [0.0, 0.0, 0.02, 0.05, 0.05, 0.0, 0.01, 0.0], atol=1e-6)
-    assert found.between == pytest.approx([0.0, 0.02, 0.05, 0.05, 0.05, 0.01, 0.01], rel=0.03, abs=1e-6)
+    assert found.between == pytest.approx([0.0, 0.02, 0.05, 0.05, 0.05, 0.01, 0.01], rel=0.06, abs=1e-6)
     (only,) = found.contacts
     assert (only.first, only.second, only.kind) == ("body0", "wall", "thing")
     assert (only.frames, only.gaps, only.start) == (4, 6, 1)  # it touches on the way to frame 2
@@ -64,7 +66,7 @@ def test_a_ball_that_rolls_into_a_wall_and_back(free_bodies: Callable[..., Any])
     assert (only.deepest_frame, only.deepest_between) == (3, False)
     assert only.longest == (1, 5)
     assert (found.colliding, found.dips, found.free) == (4, 0, False)
-    assert told[-1] == (8, 8)
+    assert told[-1] == 8
 
 
 def test_a_dip_between_two_free_frames(free_bodies: Callable[..., Any]) -> None:
@@ -73,7 +75,7 @@ def test_a_dip_between_two_free_frames(free_bodies: Callable[..., Any]) -> None:
     scene.add(wb.Box((0.001, 1.0, 1.0)), name="plate")
     found = wb.check(clip, scene)
     assert (found.colliding, found.dips, found.deepest) == (0, 1, 0.0)
-    assert 0.1005 - 1e-6 <= found.deepest_between <= 0.103
+    assert 0.1005 - 1e-6 <= found.deepest_between <= 0.106
     (only,) = found.contacts
     assert (only.frames, only.gaps, only.start, only.deepest_between, only.longest) == (0, 1, 0, True, (0, 1))
 
@@ -158,7 +160,7 @@ def test_a_scene_of_another_figure_is_refused(free_bodies: Callable[..., Any], p
 
 
 def test_ctrl_c_ends_a_check(free_bodies: Callable[..., Any]) -> None:
-    def stop(done: int, frames: int) -> None:
+    def stop(done: int) -> None:
         raise KeyboardInterrupt
 
     clip = ball(free_bodies, *np.zeros(40))
@@ -180,3 +182,27 @@ def test_times_of_a_contact() -> None:
     assert (found.frames, found.gaps, found.start, found.longest) == (3, 5, 1, (1, 4))
     assert (found.deepest, found.deepest_frame, found.deepest_between) == (0.5, 4, True)
     assert contact_as_dict(found, 0.1)["longest"]["seconds"] == pytest.approx(0.3)
+
+
+def test_a_recorded_jump_with_a_ring_at_the_waist(shared_data: Path) -> None:
+    """Pairs by pairs, frames and an eighth of each motion between them; hulls, boxes and capsules."""
+    figure = wb.load("human")
+    clip = wb.read_clip(shared_data / "mocap" / "cmu_02_03.bvh", figure).resampled(1 / 15)
+    scene = wb.Scene(figure)
+    for worn in equipment("torus", figure):
+        worn.attach(scene)
+    found = wb.check(clip, scene)
+    said = {(each.first, each.second): each for each in found.contacts}
+    seen, missed = set(), 0.0
+    for k in range(len(clip) - 1):
+        for t in np.linspace(0.0, 1.0, 9)[:-1]:
+            q = pin.interpolate(scene.model, clip.q[k], clip.q[k + 1], t)
+            for names, deep in owner_depths(scene, q).items():
+                if deep <= found.tolerance:
+                    continue
+                seen.add(names)
+                missed = max(missed, deep - said[names].between[k])
+                if t == 0.0:
+                    assert said[names].depth[k] == pytest.approx(deep, abs=3e-6)
+    assert missed < 3e-6
+    assert len(seen) > 5

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.motion.feet import foot_points, slid, sliding, standing
+from wholebody.motion.feet import foot_points, slid, sliding
 from wholebody.motion.measures import deviation, foot_sliding, hand_error, jerk_ratio, share_deeper
 
 
@@ -48,25 +48,13 @@ def test_jerk_ratio(planar_arm: Callable[..., Any]) -> None:
     assert jerk_ratio(still, clip) == np.inf
 
 
-def test_a_foot_stands_where_it_is_low_and_slow() -> None:
-    """It stands for a second, swings half a metre in half a second, and stands again."""
-    dt = 0.02
-    phase = np.clip((np.arange(125) * dt - 1.0) / 0.5, 0.0, 1.0)
-    path = np.column_stack([0.5 * phase, 0 * phase, 0.02 + 0.12 * np.sin(np.pi * phase)])
-    found = standing(path, dt)
-    assert found[:49].all()
-    assert found[77:].all()
-    assert not found[52:74].any()
-    assert standing(path + np.array([0.0, 0.0, 1.0]), dt).tolist() == found.tolist()  # the ground may be anywhere
-    assert slid(path, found)[0] < 0.02
-    path[60:, 0] += np.linspace(0.0, 0.03, 65)  # and then slides
-    assert slid(path, standing(path, dt))[0] == pytest.approx(0.03, abs=0.012)
-
-
-def test_turning_round_in_the_air_is_no_stance() -> None:
-    times = np.arange(0.0, 2.0, 0.01)
-    path = np.column_stack([np.sin(6.0 * times), 0 * times, 0.02 + 0 * times])
-    assert not standing(path, 0.01)[30:-30].any()
+def test_a_point_slides_from_where_it_stood_first() -> None:
+    path = np.zeros((12, 3))
+    path[:, 0] = [0.0, 0.01, 0.02, 0.5, 1.0, 1.0, 1.0, 0.97, 0.98, 1.5, 2.0, 2.0]
+    path[:, 2] = np.linspace(0.0, 1.0, 12)  # heights do not count
+    stands = np.array([True] * 3 + [False] + [True] * 5 + [False] + [True] * 2)
+    assert slid(path, stands) == (pytest.approx(0.03), 7)
+    assert slid(path, np.zeros(12, dtype=bool)) == (0.0, 0)
 
 
 def test_feet_of_a_person() -> None:

@@ -31,12 +31,14 @@ def test_free_motion_is_followed_exactly(hand: wb.Figure, scene: wb.Scene) -> No
 
 
 @pytest.mark.parametrize("posture", ["relaxed", "grip"])
-def test_the_hand_slides_on_the_table_as_a_whole(hand: wb.Figure, scene: wb.Scene, least: Any, posture: str) -> None:
+def test_the_hand_slides_on_the_table_as_a_whole(
+    hand: wb.Figure, scene: wb.Scene, least_distance: Any, posture: str
+) -> None:
     resting = hand.posture(posture)[2]  # of the wrist, with the lowest point at z = 0
     heights = np.concatenate([np.linspace(0.15, -0.08, 25), np.full(25, -0.08)])
     q = np.array([at(hand, 0.004 * k, z, posture) for k, z in enumerate(heights)])
     recording = follow(scene, Track.of(hand, q, 1 / 60), rigid=True)
-    assert min(least(scene, shown) for shown in recording.q) > 0.0
+    assert min(least_distance(scene, shown) for shown in recording.q) > 0.0
     last = recording.q[-1]
     # The nearest place is straight above: the height at which the lowest point is one clearance over the table.
     assert last[2] == pytest.approx(resting + CLEARANCE, abs=2e-4)
@@ -44,11 +46,11 @@ def test_the_hand_slides_on_the_table_as_a_whole(hand: wb.Figure, scene: wb.Scen
     np.testing.assert_allclose(last[7:], q[-1, 7:], atol=2e-3)  # the fingers follow the glove
 
 
-def test_the_rigid_hand_is_displaced_by_its_global_depth(hand: wb.Figure, scene: wb.Scene, least: Any) -> None:
+def test_the_rigid_hand_is_displaced_by_its_global_depth(hand: wb.Figure, scene: wb.Scene, least_distance: Any) -> None:
     """With ccd: pure translation along the table's normal, the fingers exactly as the glove has them."""
     q = np.array([at(hand, 0.004 * k, z) for k, z in enumerate(np.linspace(0.15, -0.05, 40))])
     recording = follow(scene, Track.of(hand, q, 1 / 60), overlap="ccd", rigid=True)
-    assert min(least(scene, shown) for shown in recording.q) >= 0.0
+    assert min(least_distance(scene, shown) for shown in recording.q) >= 0.0
     np.testing.assert_allclose(recording.q[:, 3:], q[:, 3:], atol=1e-9)
     np.testing.assert_allclose(recording.q[-1, :2], q[-1, :2], atol=1e-3)
     assert 0.0 <= recording.q[-1, 2] - hand.posture("relaxed")[2] < 2e-3
@@ -57,7 +59,7 @@ def test_the_rigid_hand_is_displaced_by_its_global_depth(hand: wb.Figure, scene:
     assert not recording.joints.any()  # as a whole, by no joint
 
 
-def test_opposed_normals_cancel_and_the_last_free_place_is_kept(hand: wb.Figure, least: Any) -> None:
+def test_opposed_normals_cancel_and_the_last_free_place_is_kept(hand: wb.Figure, least_distance: Any) -> None:
     """Figure 4b: in a slot narrower than the hand PD_g has no way out; the hand stops before it."""
     scene = wb.Scene(hand)
     for name, sign in (("left cheek", 1.0), ("right cheek", -1.0)):
@@ -65,8 +67,8 @@ def test_opposed_normals_cancel_and_the_last_free_place_is_kept(hand: wb.Figure,
     q = np.array([at(hand, x, 0.2) for x in np.linspace(-0.2, 0.3, 40)])
     for overlap, allowed in (("ccd", 1e-3), ("qp", 1e-5)):
         recording = follow(scene, Track.of(hand, q, 1 / 60), overlap=overlap, rigid=True)
-        assert min(least(scene, shown) for shown in recording.q) > -allowed
-        assert least(scene, q[-1]) < -0.005
+        assert min(least_distance(scene, shown) for shown in recording.q) > -allowed
+        assert least_distance(scene, q[-1]) < -0.005
         assert recording.q[-1, 0] < q[-1, 0] - 0.05
 
 
@@ -90,14 +92,14 @@ def test_what_is_released_is_back_within_thirty_frames(hand: wb.Figure, scene: w
     assert np.abs(pin.difference(hand.model, up, loop.shown)).max() < 1e-3
 
 
-def test_nothing_is_jumped_over(hand: wb.Figure, least: Any) -> None:
+def test_nothing_is_jumped_over(hand: wb.Figure, least_distance: Any) -> None:
     scene = wb.Scene(hand).add(wb.Box((2.0, 2.0, 0.004)), name="sheet", at=(0.0, 0.0, 0.0))
     loop = FrameLoop(scene, at(hand, 0.0, 0.4), rigid=True)
     for _ in range(30):
         before = loop.shown
         frame = loop.frame(at(hand, 0.0, -0.4))
         for share in np.linspace(0.0, 1.0, 6):
-            assert least(scene, pin.interpolate(hand.model, before, frame.q, share)) > -1e-4
+            assert least_distance(scene, pin.interpolate(hand.model, before, frame.q, share)) > -1e-4
     assert loop.shown[2] > 0.0
 
 
@@ -110,13 +112,13 @@ def test_the_same_seed_gives_the_same_frames(hand: wb.Figure) -> None:
     np.testing.assert_array_equal(runs[0], runs[1])
 
 
-def test_a_start_in_penetration_is_freed_and_noted(hand: wb.Figure, scene: wb.Scene, least: Any) -> None:
+def test_a_start_in_penetration_is_freed_and_noted(hand: wb.Figure, scene: wb.Scene, least_distance: Any) -> None:
     deep = at(hand, 0.0, 0.02)
     recording = follow(scene, Track.of(hand, [deep, deep], 1 / 60), rigid=True)
     assert recording.notes[0].startswith("frame 0: ")
     assert "inside table" in recording.notes[0]
     assert recording.notes[1] == ""
-    assert least(scene, recording.q[0]) > 0.0
+    assert least_distance(scene, recording.q[0]) > 0.0
 
 
 def test_a_start_that_cannot_be_freed_is_refused() -> None:

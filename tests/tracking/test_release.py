@@ -48,7 +48,7 @@ def arms_up(avatar: wb.Figure) -> Any:
 
 @pytest.mark.parametrize("overlap", ["ccd", "qp"])
 @pytest.mark.parametrize("release", [step_back, arms_down, arms_up])
-def test_two_arms_come_back_from_a_wall(avatar: wb.Figure, overlap: str, release: Any, least: Any) -> None:
+def test_two_arms_come_back_from_a_wall(avatar: wb.Figure, overlap: str, release: Any, least_distance: Any) -> None:
     scene = wb.Scene(avatar).add(wb.Box((0.2, 3.0, 3.0)), name="wall", at=(FACE + 0.1, 0.0, 1.5))
 
     def away(q: Any) -> float:
@@ -58,12 +58,12 @@ def test_two_arms_come_back_from_a_wall(avatar: wb.Figure, overlap: str, release
     assert not loop.frame(ahead(avatar, -0.25)).note
     for x in [*np.linspace(-0.25, 0.2, 30), *[0.2] * 10]:
         loop.frame(ahead(avatar, x))
-        assert least(scene, loop.shown) > -1e-3
-    assert least(scene, ahead(avatar, 0.2)) < -0.1
+        assert least_distance(scene, loop.shown) > -1e-3
+    assert least_distance(scene, ahead(avatar, 0.2)) < -0.1
     assert away(ahead(avatar, 0.2)) > 0.1
     free = release(avatar)
-    assert least(scene, free) > 0.005
+    assert least_distance(scene, free) > 0.005
     for _ in range(IN_TIME):
         loop.frame(free)
-        assert least(scene, loop.shown) > -1e-3
+        assert least_distance(scene, loop.shown) > -1e-3
     assert away(free) < 1e-3

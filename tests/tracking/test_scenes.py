@@ -30,14 +30,14 @@ def first_contact(name: str) -> tuple[InteractionScene, Track]:
 
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize(("overlap", "allowed"), [("qp", 1e-5), ("ccd", 1e-3)])
-def test_the_shown_figure_stays_outside(name: str, overlap: str, allowed: float, least: Any) -> None:
+def test_the_shown_figure_stays_outside(name: str, overlap: str, allowed: float, least_distance: Any) -> None:
     made, part = first_contact(name)
     scene = made.scene
     recording = follow(scene, part, overlap=overlap, rigid=made.rigid)
-    assert min(least(scene, q) for q in part.q) < -0.01  # the tracked one goes in
-    assert min(least(scene, q) for q in recording.q) > -allowed
+    assert min(least_distance(scene, q) for q in part.q) < -0.01  # the tracked one goes in
+    assert min(least_distance(scene, q) for q in recording.q) > -allowed
     for a, b in zip(recording.q[:-1:2], recording.q[1::2], strict=True):
-        assert least(scene, pin.interpolate(scene.model, a, b, 0.5)) > -max(allowed, 1e-4)
+        assert least_distance(scene, pin.interpolate(scene.model, a, b, 0.5)) > -max(allowed, 1e-4)
     assert all(scene.figure.within_limits(q) for q in recording.q)
     assert bool(scene.figure.cones) == (not made.rigid)  # every avatar is judged by its cones
     if scene.figure.cones:

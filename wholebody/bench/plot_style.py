@@ -1,4 +1,4 @@
-"""One look for all charts: a tool has the same colour everywhere, and the same data give the same file."""
+"""One style for all charts: a tool has the same colour everywhere, and the same data give the same file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ COLORS = {
 other settings are further blues."""
 
 
-class Look(NamedTuple):
+class Style(NamedTuple):
     """Colour and marker of a method; the principal ones are drawn wide and with their spread."""
 
     color: str
@@ -31,36 +31,36 @@ class Look(NamedTuple):
     principal: bool
 
 
-_LOOKS = {
-    "qp": Look(COLORS["wholebody"], "o", True),
-    "qp/active_set": Look(COLORS["wholebody/active_set"], ".", False),
-    "qp/osqp": Look(COLORS["wholebody/osqp"], "o", True),
-    "qp/daqp": Look(COLORS["wholebody/daqp"], ".", False),
-    "qp/quadprog": Look(COLORS["wholebody/quadprog"], ".", False),
-    "qp/proxqp": Look(COLORS["wholebody/proxqp"], ".", False),
-    "qp/piqp": Look(COLORS["wholebody/piqp"], ".", False),
-    "newton/slack": Look("#e69f00", "s", True),
-    "newton/barrier": Look("#a06a00", "D", True),
-    "newton/kkt": Look("#f3cf7a", "s", False),
-    "ccd": Look("#000000", "v", True),
-    "dls": Look("#8c8c8c", "X", True),
-    "placo": Look(COLORS["placo"], "P", True),
-    "mink": Look(COLORS["mink"], "h", True),
-    "pink": Look(COLORS["pink"], "*", True),
+_STYLES = {
+    "qp": Style(COLORS["wholebody"], "o", True),
+    "qp/active_set": Style(COLORS["wholebody/active_set"], ".", False),
+    "qp/osqp": Style(COLORS["wholebody/osqp"], "o", True),
+    "qp/daqp": Style(COLORS["wholebody/daqp"], ".", False),
+    "qp/quadprog": Style(COLORS["wholebody/quadprog"], ".", False),
+    "qp/proxqp": Style(COLORS["wholebody/proxqp"], ".", False),
+    "qp/piqp": Style(COLORS["wholebody/piqp"], ".", False),
+    "newton/slack": Style("#e69f00", "s", True),
+    "newton/barrier": Style("#a06a00", "D", True),
+    "newton/kkt": Style("#f3cf7a", "s", False),
+    "ccd": Style("#000000", "v", True),
+    "dls": Style("#8c8c8c", "X", True),
+    "placo": Style(COLORS["placo"], "P", True),
+    "mink": Style(COLORS["mink"], "h", True),
+    "pink": Style(COLORS["pink"], "*", True),
 }
 _SOLVERS = ("#35507a", "#5f86b3", "#8aa0c0")
 """Shades for the QP method with further solvers: one family, seen at a glance."""
 _OTHERS = ("#882255", "#117733", "#999933", "#661100", "#aa4499", "#44aa99")
 
 
-def look(adapter: str) -> Look:
-    """Return how a method looks; one that is not known here has a look of its own by its name."""
-    if adapter in _LOOKS:
-        return _LOOKS[adapter]
+def method_style(adapter: str) -> Style:
+    """Return the style of a method; one that is not known here has a style of its own, by its name."""
+    if adapter in _STYLES:
+        return _STYLES[adapter]
     number = sha256(adapter.encode()).digest()[0]
     if adapter.startswith("qp/"):
-        return Look(_SOLVERS[number % len(_SOLVERS)], ".", False)
-    return Look(_OTHERS[number % len(_OTHERS)], "p", True)
+        return Style(_SOLVERS[number % len(_SOLVERS)], ".", False)
+    return Style(_OTHERS[number % len(_OTHERS)], "p", True)
 
 
 _SETTINGS = {

@@ -122,7 +122,7 @@ def reach_times(rows: Sequence[ReachRow], path: Path) -> tuple[Path, Path]:
         mine = [row for row in rows if row.method == method]
         times = np.sort([row.milliseconds for row in mine if row.status == "solved"])
         share = 100.0 * np.arange(1, len(times) + 1) / len(mine)
-        color = plot_style.look(method).color
+        color = plot_style.method_style(method).color
         axis.step(times, share, where="post", color=color, linewidth=1.8, label=method)
     plot_style.plain_log(axis)
     axis.set(ylim=(0.0, 103.0), xlabel="time of a solve [ms]", ylabel="reaches solved [%]")

@@ -17,7 +17,7 @@ from wholebody.checks import known, number, shown
 from wholebody.errors import InputError
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
 from wholebody.geometry.hull import hull_piece
-from wholebody.geometry.mesh_cache import ConvexPieces, kept
+from wholebody.geometry.mesh_cache import ConvexPieces, cached
 from wholebody.geometry.meshes import EmptyMeshError, read_mesh
 from wholebody.geometry.pieces import LARGEST, SMALLEST
 
@@ -126,7 +126,7 @@ def _of_file(shape: LinkShape, share: float | None) -> ConvexPieces:
     if file.suffix.lower() not in WHOLE_IN_ONE_FILE:
         return make()
     settings = f"link {HULL_VERTICES} {share!r} {shape.size!r} {file.suffix.lower()} {coacd_version()}"
-    return kept((file.read_bytes(),), settings, what, make)
+    return cached((file.read_bytes(),), settings, what, make)
 
 
 def _of_triangles(shape: LinkShape, share: float | None) -> ConvexPieces:
@@ -134,7 +134,7 @@ def _of_triangles(shape: LinkShape, share: float | None) -> ConvexPieces:
     vertices, faces = shape.triangles
     settings = f"link {HULL_VERTICES} {share!r} {coacd_version()}"
     content = (np.ascontiguousarray(vertices).tobytes(), np.ascontiguousarray(faces).tobytes())
-    return kept(content, settings, "mesh", lambda: _pieces(vertices, faces, share, "mesh"))
+    return cached(content, settings, "mesh", lambda: _pieces(vertices, faces, share, "mesh"))
 
 
 def _pieces(vertices: Array, faces: NDArray[np.int64], share: float | None, what: str) -> ConvexPieces:

@@ -138,7 +138,10 @@ class State:
 
     def wrench_jacobian(self, wrench: Wrench) -> Array:
         """Jacobian (m, nv) of one `Wrench`."""
-        return self.folded((wrench.rows @ self.jacobian) * (self.support[wrench.joint] - self.support[wrench.against]))
+        moved = self.support[wrench.joint]
+        if wrench.against:
+            moved = moved - self.support[wrench.against]
+        return self.folded((wrench.rows @ self.jacobian) * moved)
 
     def folded(self, rows: Array) -> Array:
         """Rows (k, nv) of rows (k, n) over the columns of `jacobian`: joints that follow another move with it."""

@@ -1,5 +1,5 @@
 """Geometry: shapes, convex pieces, contacts, penetration, sweeps."""
 
-from wholebody.geometry.guesses import settle_boxes
+from wholebody.geometry.guesses import fix_box_inflation
 
-settle_boxes()
+fix_box_inflation()

@@ -15,7 +15,7 @@ from wholebody.arrays import Array
 from wholebody.errors import InputError, MissingPackageError
 from wholebody.geometry.components import Component, enclosed_volume, split_components
 from wholebody.geometry.hull import hull_piece, thickened
-from wholebody.geometry.mesh_cache import ConvexPieces, kept
+from wholebody.geometry.mesh_cache import ConvexPieces, cached
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 from wholebody.geometry.simplified_hull import simplified_hull
 
@@ -133,7 +133,7 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, what: str) -> tuple[Array,
 @lru_cache(maxsize=DECOMPOSED_AT_MOST)
 def _decomposed(vertices: bytes, faces: bytes, max_vertices: int, threshold: float, what: str) -> ConvexPieces:
     settings = f"decomposed {max_vertices} {threshold!r} {coacd_version()}"
-    return kept((vertices, faces), settings, what, lambda: _decompose(vertices, faces, max_vertices, threshold, what))
+    return cached((vertices, faces), settings, what, lambda: _decompose(vertices, faces, max_vertices, threshold, what))
 
 
 def coacd_version() -> str:

@@ -5,7 +5,7 @@ exactly the same number. Code that must be repeatable clears these guesses first
 
 coal also keeps one decision for the whole process: whether boxes have their exact size, or 1 + 1e-10 times that. The
 first query of a box decides it, by whether its direction has a zero component (coal 3.0.2, a static variable of its
-support functions of boxes: one for half-spaces, another for GJK). `settle_boxes` makes that first query for each.
+support functions of boxes: one for half-spaces, another for GJK). `fix_box_inflation` makes that first query for each.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Guesses:
             request.cached_support_func_guess = np.zeros(2, dtype=np.int32)
 
 
-def settle_boxes() -> None:
+def fix_box_inflation() -> None:
     """Make coal use the exact size of boxes in this process, whatever queries follow."""
     direction = np.full(3, 3.0**-0.5)
     turned = coal.Transform3s(pin.exp3(direction), np.full(3, 3.0))

@@ -91,7 +91,7 @@ def cache_folder() -> Path:
     return Path(platformdirs.user_cache_path("wholebody", appauthor=False)) / "convex-pieces"
 
 
-def kept(content: tuple[bytes, ...], settings: str, what: str, make: Callable[[], ConvexPieces]) -> ConvexPieces:
+def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[[], ConvexPieces]) -> ConvexPieces:
     """Return pieces from the cache, or make and cache them.
 
     Args:

@@ -25,8 +25,8 @@ METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "trajectory": ("wholebody.motion.trajectory.method", "Trajectory"),
         "frames": ("wholebody.motion.per_frame", "PerFrame"),
-        "fade": ("wholebody.motion.fade", "Fade"),
         "bisection": ("wholebody.motion.bisection.method", "Bisection"),
+        "fade": ("wholebody.motion.fade", "Fade"),
     }
 )
 """Methods by name: module and class of the settings."""

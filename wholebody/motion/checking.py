@@ -27,8 +27,8 @@ LARGEST = 1.0  # m
 ROUNDING = 1e-9  # rad, m: by which a limit may be missed; share by which a speed may be
 EVERY = 16  # frames after which progress is told
 
-Progress = Callable[[int, int], object]
-"""Called with the number of frames that are done, and that of all."""
+Progress = Callable[[int], object]
+"""Called with the number of frames that are done."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class ClipCheck:
         depth: (n,) deepest overlap of any pair in each frame, metres; 0 if there is none.
         between: (n - 1,) deepest overlap of any pair from each frame to the next one, both included. No pair gets
             deeper than this, or than the tolerance where this is less. What is beyond the tolerance may be too large by
-            a tenth of the tolerance and a fiftieth of itself.
+            a tenth of the tolerance and a twentieth of itself.
         contacts: pairs of segments and things that overlap by more than the tolerance, the deepest first.
         limits: joints beyond their limits, the worst first.
         speeds: joints faster than their velocity limits, the worst first.
@@ -160,7 +160,7 @@ def check(
         clip: the clip.
         scene: things around the figure, and attached to it; the figure alone by default.
         depth: up to which an overlap is no contact, metres.
-        progress: called with the number of frames that are done, and that of all.
+        progress: called with the number of frames that are done.
 
     Raises:
         InputError: no clip, a scene of a figure with other joints, a depth out of range, or a joint whose motion
@@ -182,9 +182,9 @@ def check(
             table.add(frame, found, between=False)
             table.add(frame - 1, passing, between=True)
             if tell is not None and frame % EVERY == 0:
-                tell(frame, len(clip))
+                tell(frame)
     if tell is not None:
-        tell(len(clip), len(clip))
+        tell(len(clip))
     deep, between = table.deepest()
     return ClipCheck(
         clip=clip,

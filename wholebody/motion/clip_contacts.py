@@ -125,7 +125,7 @@ def contact(first: str, second: str, kind: Kind, depth: Array, between: Array, t
     long = int(np.argmax(ends - starts))
     deepest = int(np.argmax(times))
     # a gap is never less deep than its ends: the frame is meant where it is as deep, to the accuracy of gaps
-    beside = [k for k in (deepest - 1, deepest + 1) if 0 <= k < len(times) and times[k] >= 0.97 * times[deepest]]
+    beside = [k for k in (deepest - 1, deepest + 1) if 0 <= k < len(times) and times[k] >= 0.95 * times[deepest]]
     if deepest % 2 and beside:
         deepest = max(beside, key=lambda k: times[k])
     return Contact(

@@ -1,4 +1,4 @@
-"""Feet that stand: when a point of a foot stands, from its height and speed, and how far it slides meanwhile."""
+"""Points of feet that stand, and how far they slide meanwhile."""
 
 from __future__ import annotations
 
@@ -11,17 +11,7 @@ from numpy.typing import NDArray
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip_contacts import runs
-
-LOW = 0.05
-"""Metres above its own lowest height: a higher point does not stand. More takes a foot that swings low for one that
-stands, less loses feet of recordings whose ground is not level."""
-
-SLOW = 0.2
-"""Metres a second: a faster point does not stand. A foot that swings reaches 2 to 4 m/s; the noise of recordings is up
-to 0.1 m/s."""
-
-SHORTEST = 0.1  # s: a foot that is low and slow for less is turning round in the air
-GROUND = 0.02  # share of the frames that may be lower than the ground: recordings have single frames that are too low
+from wholebody.motion.stance import StanceFeet, standing
 
 POINTS = ("heel", "ball", "toe_tip")
 """Ends of the names of frames that are points of a foot."""
@@ -61,25 +51,10 @@ def paths(figure: Figure, q: Array, frames: tuple[str, ...]) -> Array:
     return found
 
 
-def standing(path: Array, dt: float) -> NDArray[np.bool_]:
-    """In which frames a point stands: low, slow, and for at least `SHORTEST` seconds.
-
-    Args:
-        path: (n, 3) position of the point in each frame, z up, metres.
-        dt: seconds from frame to frame.
-
-    Returns:
-        (n,) true where it stands.
-    """
-    if len(path) < 2:
-        return np.ones(len(path), dtype=bool)
-    height = path[:, 2] - np.quantile(path[:, 2], GROUND)
-    slow = np.linalg.norm(np.gradient(path, dt, axis=0), axis=1) < SLOW
-    stands: NDArray[np.bool_] = slow & (height < LOW)
-    for first, after in zip(*runs(stands), strict=True):
-        if (after - first) * dt < SHORTEST and after - first < len(path):
-            stands[first:after] = False
-    return stands
+def standing_points(figure: Figure, q: Array, dt: float) -> dict[str, NDArray[np.bool_]]:
+    """In which frames of (n, nq), `dt` seconds apart, each point of the feet stands: name -> (n,)."""
+    names = foot_points(figure)
+    return dict(standing(figure, q, dt, StanceFeet(names))) if names else {}
 
 
 def slid(path: Array, stands: NDArray[np.bool_]) -> tuple[float, int]:
@@ -102,9 +77,7 @@ def slid(path: Array, stands: NDArray[np.bool_]) -> tuple[float, int]:
 
 def sliding(figure: Figure, q: Array, dt: float) -> tuple[Sliding, ...]:
     """How far each point of the feet slides while it stands, at postures (n, nq), `dt` seconds apart."""
-    names = foot_points(figure)
-    found = []
-    for name, path in zip(names, paths(figure, q, names).transpose(1, 0, 2), strict=True):
-        stands = standing(path, dt)
-        found.append(Sliding(name, stands, *slid(path, stands)))
+    stand, found = standing_points(figure, q, dt), []
+    for name, path in zip(stand, paths(figure, q, tuple(stand)).transpose(1, 0, 2), strict=True):
+        found.append(Sliding(name, stand[name], *slid(path, stand[name])))
     return tuple(found)

@@ -14,7 +14,7 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.checking import ClipCheck, joint_jerk
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_contacts import runs
-from wholebody.motion.feet import foot_points, paths, standing
+from wholebody.motion.feet import paths, standing_points
 
 ROUNDING = 1e-9  # s: by which time steps may differ
 
@@ -85,12 +85,11 @@ def foot_sliding(before: Clip, after: Clip) -> float:
         InputError: two clips of different figures or lengths.
     """
     _same(before, after, "foot_sliding")
-    names = foot_points(before.figure)
-    old, new = (paths(clip.figure, clip.q, names) for clip in (before, after))
-    most = 0.0
-    for k in range(len(names)):
+    stand, most = standing_points(before.figure, before.q, before.dt), 0.0
+    old, new = (paths(clip.figure, clip.q, tuple(stand)) for clip in (before, after))
+    for k, stands in enumerate(stand.values()):
         offset = (new[:, k] - old[:, k])[:, :2]
-        for first, end in zip(*runs(standing(old[:, k], before.dt)), strict=True):
+        for first, end in zip(*runs(stands), strict=True):
             most = max(most, float(np.linalg.norm(offset[first:end] - offset[first], axis=1).max()))
     return most
 

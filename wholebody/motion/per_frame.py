@@ -166,7 +166,7 @@ def _passed(follower: Follower, terms: FrameTerms, frames: range) -> Array:
 def _lift(window: Window, q: Array, follower: Follower, workspace: Workspace) -> None:
     """Ask for more room in the frames on both sides of motions that dip, until none does."""
     more = np.zeros(len(q))
-    gaps = range(max(0, window.first - 1), min(len(q) - 1, window.end))
+    gaps = list(range(max(0, window.first - 1), min(len(q) - 1, window.end)))
     for _ in range(LIFTS):
         dipping = list(dips(workspace, q, gaps))
         if not dipping:

@@ -260,9 +260,10 @@ def _best_radius(inside: Array, outside: Array, grid: _Grid) -> float:
     worth = np.concatenate([np.full(len(inside), UNCOVERED), np.full(len(outside), -1.0)])
     order = np.argsort(distance, kind="stable")
     gained = np.cumsum(worth[order])
+    least = 0.5 * float(grid.cell)
     if not len(gained) or gained.max() <= 0.0:
-        return 0.5 * grid.cell
-    return max(float(distance[order[int(np.argmax(gained))]]), 0.5 * grid.cell)
+        return least
+    return max(float(distance[order[int(np.argmax(gained))]]), least)
 
 
 def _gap(points: Array, centers: Array, radii: Array) -> Array:

@@ -26,7 +26,7 @@ from wholebody.tracking.warm_start import warm_started
 from wholebody.workspace import Workspace
 
 FRAME = 1.0 / 60.0  # s: frame time of a screen
-LEGS = (np.inf, 0.01, 0.002)  # m, rad: distances by which the goal moves in a frame, tried until the motion is free
+GOAL_MOVES = (np.inf, 0.01, 0.002)  # m, rad: moves of the goal in a frame, tried until the motion is free
 
 
 class DragFrame(NamedTuple):
@@ -109,7 +109,7 @@ class Drag:
             return solution
 
     def _followed(self) -> int:
-        """Move by the longest of `LEGS` towards the goal for which the motion is free; returns the iterations.
+        """Move by the longest of `GOAL_MOVES` towards the goal for which the motion is free; returns the iterations.
 
         If a thing was moved into the figure, move out of it.
         """
@@ -123,10 +123,10 @@ class Drag:
         spent, tried = 0, list[Array]()
         left = goal.error(self._workspace.state.update(self.q))
         error = max(float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:])))
-        for leg in LEGS:
-            if leg < error:
-                retarget(self.problem, self._number, interpolated_target(goal, left, leg / error))
-            elif np.isfinite(leg):
+        for move in GOAL_MOVES:
+            if move < error:
+                retarget(self.problem, self._number, interpolated_target(goal, left, move / error))
+            elif np.isfinite(move):
                 continue  # the goal is nearer than that, and was tried already
             step = self.tracker.frame(self.q)
             spent, q = spent + step.iterations, self._bounded(step.q)

@@ -16,7 +16,7 @@ from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.scenes import CLOSING, OPENING, Scene, Shown, chosen, draw
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk, Store
-from wholebody.bench.plot_style import look
+from wholebody.bench.plot_style import method_style
 from wholebody.bench.tables import read_rows
 from wholebody.errors import InputError
 
@@ -151,8 +151,8 @@ def test_principal_methods_have_colours_of_their_own() -> None:
         "mink",
         "pink",
     )
-    assert len({look(name).color for name in names}) == len(names)
-    assert look("qp/some_solver") == look("qp/some_solver")
+    assert len({method_style(name).color for name in names}) == len(names)
+    assert method_style("qp/some_solver") == method_style("qp/some_solver")
 
 
 def test_settings_are_checked(fakes: ModuleType) -> None:

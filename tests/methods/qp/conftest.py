@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -35,39 +34,26 @@ def random_program() -> Callable[..., QuadraticProgram]:
     return _random_program
 
 
-def _least_distance(scene: wb.Scene, q: Any) -> float:
-    """Least signed distance of all pairs, from Pinocchio's own loop."""
-    data, placed = scene.model.createData(), pin.GeometryData(scene.geometry)
-    pin.computeDistances(scene.model, data, scene.geometry, placed, q)
-    return min((result.min_distance for result in placed.distanceResults), default=np.inf)
-
-
 @pytest.fixture(scope="session")
-def least_distance() -> Callable[..., float]:
-    """Return a function: scene, posture -> least signed distance of all pairs."""
-    return _least_distance
-
-
-def _honest(problem: wb.Problem, solution: wb.Solution, tolerance: float = 1e-5) -> wb.Solution:
-    """Check that an answer is what its status says it is; return it."""
-    q, figure = solution.q, problem.scene.figure
-    assert np.isfinite(q).all()
-    assert q == pytest.approx(pin.normalize(figure.model, q), abs=1e-9)
-    assert figure.within_limits(q)
-    judged = wb.assess(problem, q)
-    assert judged.goal_error == pytest.approx(solution.assessment.goal_error, abs=1e-12)
-    slack = 1.1 * tolerance + 2e-6
-    if solution.status in ("solved", "unreachable"):
-        assert _least_distance(problem.scene, q) >= problem.clearances.min(initial=0.0) - slack
-        assert judged.holds(slack)
-    if solution.status == "solved":
-        assert judged.met(slack)
-    if solution.status == "unreachable":
-        assert not judged.met(tolerance)
-    return solution
-
-
-@pytest.fixture(scope="session")
-def honest() -> Callable[..., wb.Solution]:
+def honest(least_distance: Callable[..., float]) -> Callable[..., wb.Solution]:
     """Return a function that checks an answer against its status and returns it."""
-    return _honest
+
+    def checked(problem: wb.Problem, solution: wb.Solution, tolerance: float = 1e-5) -> wb.Solution:
+        """Check that an answer is what its status says it is; return it."""
+        q, figure = solution.q, problem.scene.figure
+        assert np.isfinite(q).all()
+        assert q == pytest.approx(pin.normalize(figure.model, q), abs=1e-9)
+        assert figure.within_limits(q)
+        judged = wb.assess(problem, q)
+        assert judged.goal_error == pytest.approx(solution.assessment.goal_error, abs=1e-12)
+        slack = 1.1 * tolerance + 2e-6
+        if solution.status in ("solved", "unreachable"):
+            assert least_distance(problem.scene, q) >= problem.clearances.min(initial=0.0) - slack
+            assert judged.holds(slack)
+        if solution.status == "solved":
+            assert judged.met(slack)
+        if solution.status == "unreachable":
+            assert not judged.met(tolerance)
+        return solution
+
+    return checked

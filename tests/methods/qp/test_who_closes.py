@@ -148,3 +148,18 @@ def test_counts_as_a_table_says_them():
     assert programs_text({"osqp": 1, "active set": 7}) == "active set 7, osqp 1"
     assert summed_programs(["active set 7, osqp 1", "", "osqp 2"]) == "active set 7, osqp 3"
     assert summed_programs([]) == ""
+
+
+@pytest.mark.parametrize(("hot_start", "rounds"), [(True, 2), (False, 5)])
+def test_with_a_hot_start_osqp_is_not_asked_for_long(random_program, monkeypatch, hot_start, rounds):
+    """Where no set near OSQP's first answers settles, semismooth Newton steps are several times as fast."""
+    from wholebody.methods.qp.solvers import osqp_solver
+
+    limits = []
+    whole = osqp_solver.Workspace.run
+    monkeypatch.setattr(osqp_solver.Workspace, "run", lambda self, limit: limits.append(limit) or whole(self, limit))
+    monkeypatch.setattr(osqp_solver, "solve_from", lambda *given: None)
+    answer = osqp_solver.OSQPSolver(hot_start).solve_cold(random_program(np.random.default_rng(0)))
+    assert len(limits) == rounds
+    assert answer.exact
+    assert answer.by == "semismooth newton"

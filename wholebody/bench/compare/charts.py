@@ -13,7 +13,7 @@ from wholebody.bench import plot_style
 from wholebody.bench.adapters.base import Budget
 from wholebody.bench.compare.record import COARSE, FINE
 from wholebody.bench.compare.results import Quantity, Results, middle
-from wholebody.bench.plot_style import look
+from wholebody.bench.plot_style import method_style
 
 BAND = 30.0  # where points are drawn whose median is no answer: above all values, which are metres, radians, shares
 GREY = "#666666"
@@ -45,7 +45,7 @@ def speed_accuracy(results: Results, family: str, title: str, path: Path) -> tup
 
 
 def _draw(panel: Any, points: list[Point], adapter: str, quantity: Quantity) -> Any:
-    seen = look(adapter)
+    seen = method_style(adapter)
     order = 3 if seen.principal else 2
     width, size = (1.8, 6.0) if seen.principal else (0.9, 4.0)
     x = [MS * point.seconds for point in points]
@@ -106,7 +106,7 @@ def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Pat
             times, cases = profile(results, family, adapter, tolerance)
             if not cases:
                 continue
-            seen = look(adapter)
+            seen = method_style(adapter)
             shares = [100.0 * (place + 1) / cases for place in range(len(times))]
             x = [MS * time for time in times]
             (drawn[adapter],) = panel.step(

@@ -92,36 +92,25 @@ def _interval(dt: float) -> Stream:
     return Stream(problem, lead + way + ends, dt=dt, shown=REST + len(way) // 2)
 
 
-STREAMS.case(
-    "dt-1-ms",
-    "Frames of 1 ms",
-    why="The goal moves half a millimetre a frame: steps are smaller than tolerances, and errors of each step add up.",
-    acceptable=OUTSIDE,
-)(partial(_interval, 1e-3))
-
-
-STREAMS.case(
-    "dt-10-ms",
-    "Frames of 10 ms",
-    why="The goal moves 5 mm a frame over a boulder, 5 cm below its surface: the usual case, for comparison.",
-    acceptable=OUTSIDE,
-)(partial(_interval, 1e-2))
-
-
-STREAMS.case(
-    "dt-100-ms",
-    "Frames of 100 ms",
-    why="The goal moves 5 cm a frame, as far as contacts are looked for: steps begin to cut through what is curved.",
-    acceptable=OUTSIDE,
-)(partial(_interval, 0.1))
-
-
-STREAMS.case(
-    "dt-1-s",
-    "Frames of 1 s",
-    why="The goal moves 50 cm a frame and is past the boulder in two: nothing that was known in the last frame holds.",
-    acceptable=OUTSIDE,
-)(partial(_interval, 1.0))
+for _dt, _name, _title, _why in (
+    (
+        1e-3, "dt-1-ms", "Frames of 1 ms",
+        "The goal moves half a millimetre a frame: steps are smaller than tolerances, and errors of each step add up.",
+    ),
+    (
+        1e-2, "dt-10-ms", "Frames of 10 ms",
+        "The goal moves 5 mm a frame over a boulder, 5 cm below its surface: the usual case, for comparison.",
+    ),
+    (
+        0.1, "dt-100-ms", "Frames of 100 ms",
+        "The goal moves 5 cm a frame, as far as contacts are looked for: steps begin to cut through what is curved.",
+    ),
+    (
+        1.0, "dt-1-s", "Frames of 1 s",
+        "The goal moves 50 cm a frame and is past the boulder in two: nothing that was known in the last frame holds.",
+    ),
+):  # fmt: skip
+    STREAMS.case(_name, _title, why=_why, acceptable=OUTSIDE)(partial(_interval, _dt))
 
 
 @STREAMS.case(

@@ -6,12 +6,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import add_clip, clip_of
+from wholebody.cli.clip.arguments import add_clip, add_equipment, clip_of, dressed
 
 if TYPE_CHECKING:
     from wholebody.motion.avoidance import Avoided
-    from wholebody.motion.clip import Clip
-    from wholebody.scene import Scene
 
 DESCRIPTION = """\
 Free a motion of collisions of the body with itself and with what it wears. The answer is judged by all pairs in all
@@ -23,10 +21,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser = commands.add_parser("avoid", help="free a motion of collisions", description=DESCRIPTION)
     add_clip(parser)
     parser.add_argument("--method", default="trajectory", metavar="NAME", help="how (default: trajectory)")
-    parser.add_argument(
-        "--equipment", action="append", default=[], metavar="WHAT",
-        help="what the body wears: a ready name such as pack, or a mesh that is put on its back; may be repeated",
-    )  # fmt: skip
+    add_equipment(parser)
     parser.add_argument("--feet", action="store_true", help="hold feet where they stand")
     parser.add_argument("--out", type=Path, metavar="FILE", help="default: <name>-free.npz, beside FILE")
     parser.set_defaults(run=run)
@@ -39,9 +34,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     from wholebody.motion.avoidance import as_avoider, avoid
     from wholebody.motion.stance import StanceFeet
+    from wholebody.scene import Scene
 
     method, clip = as_avoider(arguments.method), clip_of(arguments)
-    scene = _scene(clip, arguments.equipment)
+    scene = dressed(Scene(clip.figure), arguments.equipment)
     console = Console()
     with Progress(TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), transient=True) as bar:
         task = bar.add_task(clip.name, total=1.0)
@@ -56,23 +52,6 @@ def run(arguments: argparse.Namespace) -> int:
     written = avoided.clip.write(out)
     _tell(console, avoided, written)
     return 0 if avoided.report.solved else 1
-
-
-def _scene(clip: Clip, names: list[str]) -> Scene:
-    from wholebody.geometry.shapes import Mesh
-    from wholebody.motion.equipment import Equipment
-    from wholebody.motion.ready_equipment import READY, equipment
-    from wholebody.scene import Scene
-
-    scene = Scene(clip.figure)
-    for name in names:
-        if name in READY or not Path(name).suffix:
-            worn = equipment(name, clip.figure)
-        else:
-            worn = (Equipment.worn(Mesh(name), clip.figure, name=Path(name).stem),)
-        for one in worn:
-            one.attach(scene)
-    return scene
 
 
 def _tell(console: object, avoided: Avoided, written: Path) -> None:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import add_clip, figure_of
+from wholebody.cli.clip.arguments import add_clip, add_equipment, dressed, figure_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,8 +21,9 @@ joint limits, joint speeds, feet that slide while they stand, jerk. Overlaps of 
 carries and with the things around it are told apart."""
 EPILOG = """\
 examples:
-  wholebody clip check walk.npz
-  wholebody clip check walk.npz --scene room.toml --html walk.html
+  wholebody clip check walk.bvh
+  wholebody clip check walk.bvh --equipment pack --html walk.html
+  wholebody clip check walk.npz --scene room.toml
   wholebody clip check walk.npz --json > walk.json
 exit code: 1 if something overlaps by more than the depth, or a joint is beyond its limit"""
 MOST = 20  # lines of a table
@@ -37,6 +38,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         formatter_class=shape,
     )  # fmt: skip
     add_clip(parser)
+    add_equipment(parser)
     parser.add_argument("--scene", type=Path, metavar="TASK.toml", help="task file with the figure and its things")
     parser.add_argument("--depth", type=float, metavar="MM", help="deepest overlap that is no contact (default: 0.1)")
     parser.add_argument("--json", action="store_true", help="print everything as JSON instead of tables")
@@ -58,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.html is not None:
         check_writable(arguments.html)
-    scene = _scene(arguments)
+    scene = dressed(_scene(arguments), arguments.equipment)
     clip = read_clip(arguments.file, scene.figure)
     found = checked(clip, scene, DEPTH if arguments.depth is None else 1e-3 * arguments.depth)
     if arguments.json:
@@ -95,7 +97,7 @@ def checked(clip: Clip, scene: Scene, depth: float) -> ClipCheck:
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
         work = bar.add_task("checking every pair", total=len(clip))
-        return check(clip, scene, depth=depth, progress=lambda done, _: bar.update(work, completed=done))
+        return check(clip, scene, depth=depth, progress=lambda done: bar.update(work, completed=done))
 
 
 def show(console: Console, found: ClipCheck) -> None:

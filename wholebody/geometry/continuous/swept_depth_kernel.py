@@ -56,10 +56,10 @@ def screen(
 
 @compiled()
 def lower_bounds(
-    asked: Indices, pairs: Indices, place0: Array, place1: Array, rows0: Array, rows1: Array, speed: Array,
-    wanted: Array, share: float, accuracy: float, joint: Indices, turn: Array, speeds: Array,
-    carries: NDArray[np.bool_], reach: Array, points: Array, first_point: Indices, radius: Array, radii: Array,
-    faces: Array, first_face: Indices, bound: Array,
+    asked: Indices, pairs: Indices, places: Array, first_place: Indices, last_place: Indices, rows0: Array,
+    rows1: Array, speed: Array, wanted: Array, share: float, accuracy: float, joint: Indices, turn: Array,
+    speeds: Array, carries: NDArray[np.bool_], reach: Array, points: Array, first_point: Indices, radius: Array,
+    radii: Array, faces: Array, first_face: Indices, bound: Array,
 ) -> None:  # fmt: skip
     """Bound the distances of pairs from below, over a part of a motion.
 
@@ -70,13 +70,14 @@ def lower_bounds(
     Args:
         asked: (k,) places of the pairs.
         pairs: (p, 2) the pieces of each pair.
-        place0: (n, 4, 3) where the pieces are at the beginning of the part.
-        place1: (n, 4, 3) where they are at its end.
+        places: (m, n, 4, 3) where the pieces are at some times.
+        first_place: (k,) the time, of `places`, at which the part begins.
+        last_place: (k,) the time at which it ends.
         rows0: (k, 4) distance and normal, from the first piece to the second, at the beginning.
         rows1: (k, 4) the same at the end.
         speed: (k,) by how much a pair can come nearer during the whole motion.
         wanted: (k,) a bound that is sufficient.
-        share: the part, of the whole motion.
+        share: length of each part, of the whole motion.
         accuracy: metres to which the distances are known.
         joint: (n,) joint of each piece.
         turn: (njoints,) see `MotionBounds`.
@@ -91,10 +92,12 @@ def lower_bounds(
         first_face: (n + 1,)
         bound: (k,) room for the answer.
     """
-    normal = np.empty(3)
+    normal, sags = np.empty(3), np.empty(2)
     for k in range(len(asked)):
         first, second = pairs[asked[k], 0], pairs[asked[k], 1]
+        place0, place1 = places[first_place[k]], places[last_place[k]]
         best = 0.5 * (rows0[k, 0] + rows1[k, 0] - speed[k] * share) - accuracy
+        sags[:] = -1.0
         for side in range(4):
             if best >= wanted[k]:
                 break
@@ -111,13 +114,15 @@ def lower_bounds(
                 square += normal[j] ** 2
             if not 0.98 < square < 1.02:
                 continue
-            sag = share * share / 8.0 * _curvature(
-                other, carrier, max(rows0[k, 0], rows1[k, 0]), joint, turn, speeds, carries, reach
-            )  # fmt: skip
+            if sags[side % 2] < 0.0:
+                gap = max(rows0[k, 0], rows1[k, 0])
+                bend = _curvature(other, carrier, gap, joint, turn, speeds, carries, reach)
+                sags[side % 2] = share * share / 8.0 * bend
+            sag = sags[side % 2]
             if np.isfinite(reach[carrier]):
                 for j in range(3):
                     normal[j] /= np.sqrt(square)
-                height = _support(carrier, normal, points, first_point, radius, radii)
+                height = _support(carrier, normal[0], normal[1], normal[2], points, first_point, radius, radii)
                 at0 = _above(carrier, other, normal, height, place0, points, first_point, radius, radii)
                 at1 = _above(carrier, other, normal, height, place1, points, first_point, radius, radii)
                 best = max(best, min(at0, at1) - sag - accuracy)
@@ -157,13 +162,16 @@ def _curvature(
 
 
 @compiled()
-def _support(piece: int, normal: Array, points: Array, first_point: Indices, radius: Array, radii: Array) -> float:
-    """Height of a piece above its origin along a direction in its own axes."""
+def _support(
+    piece: int, x: float, y: float, z: float, points: Array, first_point: Indices, radius: Array, radii: Array
+) -> float:
+    """Height of a piece above its origin along a direction (x, y, z) in its own axes."""
+    begin, end = first_point[piece], first_point[piece + 1]
+    if begin == end:
+        return float(np.sqrt((radii[piece, 0] * x) ** 2 + (radii[piece, 1] * y) ** 2 + (radii[piece, 2] * z) ** 2))
     most = -np.inf
-    for k in range(first_point[piece], first_point[piece + 1]):
-        most = max(most, points[k, 0] * normal[0] + points[k, 1] * normal[1] + points[k, 2] * normal[2])
-    if most == -np.inf:
-        return float(np.sqrt(np.sum((radii[piece] * normal) ** 2)))
+    for k in range(begin, end):
+        most = max(most, points[k, 0] * x + points[k, 1] * y + points[k, 2] * z)
     return float(most + radius[piece])
 
 
@@ -173,13 +181,11 @@ def _above(
     radius: Array, radii: Array,
 ) -> float:  # fmt: skip
     """Least height of a piece above a plane of another one: `normal` and `height` in the axes of the carrier."""
-    world, local = np.zeros(3), np.zeros(3)
-    between = 0.0
+    between = x = y = z = 0.0
     for i in range(3):
-        for j in range(3):
-            world[i] += place[carrier, j, i] * normal[j]
-        between += world[i] * (place[other, 3, i] - place[carrier, 3, i])
-    for j in range(3):
-        for i in range(3):
-            local[j] -= place[other, j, i] * world[i]
-    return between - height - _support(other, local, points, first_point, radius, radii)
+        world = place[carrier, 0, i] * normal[0] + place[carrier, 1, i] * normal[1] + place[carrier, 2, i] * normal[2]
+        between += world * (place[other, 3, i] - place[carrier, 3, i])
+        x -= place[other, 0, i] * world
+        y -= place[other, 1, i] * world
+        z -= place[other, 2, i] * world
+    return between - height - _support(other, x, y, z, points, first_point, radius, radii)

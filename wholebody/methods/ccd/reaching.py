@@ -14,7 +14,7 @@ from wholebody.figures.figure import Figure
 from wholebody.methods.ccd.cones import guards
 from wholebody.methods.ccd.limbs import Limbs, Placement, compiled_kernel, floats, moved, rotated
 from wholebody.methods.ccd.sweep import Aims, sweep
-from wholebody.methods.ccd.terms import Request, Wish
+from wholebody.methods.ccd.terms import GoalPlace, Request
 from wholebody.methods.control import Control
 
 LEVER = 0.3  # m per radian: weight of orientation against position; about the length of a forearm
@@ -42,25 +42,25 @@ class _Goals:
         aims: as sweeps take them.
     """
 
-    def __init__(self, model: Any, limbs: Limbs, data: Any, wishes: Sequence[Wish]) -> None:
-        """Take the wishes, with joints that these limbs do not move where `data` has them."""
+    def __init__(self, model: Any, limbs: Limbs, data: Any, goals: Sequence[GoalPlace]) -> None:
+        """Take the goals, with joints that these limbs do not move where `data` has them."""
         self.aims, self._frames, self._kernel = Aims(), limbs.frames, compiled_kernel()
         nodes, local = [], []
-        for wish in wishes:
-            frame = model.frames[wish.frame]
+        for goal in goals:
+            frame = model.frames[goal.frame]
             joint = int(frame.parentJoint)
             node, placed = limbs.carrier(joint), data.oMi[joint] * frame.placement
             at = data.oMi[limbs.joints[node]].actInv(placed) if node >= 0 else pin.SE3.Identity()
             stand: Placement = floats(at)
-            if wish.place is not None:
+            if goal.place is not None:
                 nodes.append(node)
-                local.append(moved(stand, *wish.offset))
-                self.aims.add(node, NOWHERE, wish.place, weight=wish.weight)
-            if wish.rotation is not None:
-                for axis, wanted in zip(AXES, wish.rotation.T, strict=True):
+                local.append(moved(stand, *goal.offset))
+                self.aims.add(node, NOWHERE, goal.place, weight=goal.weight)
+            if goal.rotation is not None:
+                for axis, wanted in zip(AXES, goal.rotation.T, strict=True):
                     nodes.append(node)
                     local.append(rotated(stand, *axis))
-                    self.aims.add(node, NOWHERE, wanted, weight=0.5 * LEVER * LEVER * wish.weight, direction=True)
+                    self.aims.add(node, NOWHERE, wanted, weight=0.5 * LEVER * LEVER * goal.weight, direction=True)
         self._nodes, self._local = np.array(nodes, dtype=np.intp), np.array(local, dtype=float).reshape(-1, 3)
         self._points = self.aims.points
 
@@ -95,7 +95,7 @@ class Reach:
         for guard in self._guards:
             guard.read(self._data)
             guard.keep()
-        goals = _Goals(self._model, limbs, self._data, self._request.wishes)
+        goals = _Goals(self._model, limbs, self._data, self._request.goals)
         goals.carry()
         aims = goals.aims
         steps = aims.plan(limbs)

@@ -25,7 +25,7 @@ HELD = 1e-6  # m, rad: a hold that is met to this at the start is kept by joints
 
 
 @dataclass(frozen=True)
-class Wish:
+class GoalPlace:
     """A frame, or a point of it, and its target.
 
     Attributes:
@@ -48,13 +48,13 @@ class Request:
     """A problem in the form that cyclic coordinate descent takes.
 
     Attributes:
-        wishes: the goals.
+        goals: the goals.
         joints: Pinocchio's indices of the joints that move for the goals.
         fixed: joints that must not move, not even to resolve overlap.
         cones: names of the reach cones to keep.
     """
 
-    wishes: tuple[Wish, ...]
+    goals: tuple[GoalPlace, ...]
     joints: tuple[int, ...]
     fixed: frozenset[int]
     cones: tuple[str, ...]
@@ -69,7 +69,7 @@ def read(problem: Problem) -> Request:
     figure = problem.scene.figure
     refused: list[str] = []
     fixed = {joint for bound in problem.bounds if isinstance(bound, Freeze) for joint in _frozen(figure, bound)}
-    wishes, joints = [], set[int]()
+    goals, joints = [], set[int]()
     for number, goal in enumerate(problem.goals):
         where = f"goals[{number}], {type(goal).__name__}"
         if not isinstance(goal, (Point, Frame, Orientation)):
@@ -78,7 +78,7 @@ def read(problem: Problem) -> Request:
         path = [joint for joint in reaching(figure, goal.frame) if joint not in fixed]
         if not path:
             refused.append(f"{where}({goal.frame!r}), which no joint moves that may turn (the root stays)")
-        wishes.append(_wish(figure, goal))
+        goals.append(_goal_place(figure, goal))
         joints.update(path)
     cones: dict[str, None] = {}
     moving = _dofs(figure, joints)
@@ -108,7 +108,7 @@ def read(problem: Problem) -> Request:
     refused += [f"joint {name!r}, which follows another one (mimic)" for name in list(followers_of(figure.model))[:1]]
     if refused:
         raise UnsupportedTermError("ccd", refused)
-    return Request(tuple(wishes), tuple(sorted(joints)), frozenset(fixed), tuple(cones))
+    return Request(tuple(goals), tuple(sorted(joints)), frozenset(fixed), tuple(cones))
 
 
 def reaching(figure: Figure, frame: str) -> tuple[int, ...]:
@@ -143,12 +143,12 @@ def _frozen(figure: Figure, bound: Freeze) -> list[int]:
     return [figure.joint_id(name) for name in figure.joint_names(bound.joints)]
 
 
-def _wish(figure: Figure, goal: Point | Frame | Orientation) -> Wish:
+def _goal_place(figure: Figure, goal: Point | Frame | Orientation) -> GoalPlace:
     frame = figure.frame_id(goal.frame)
     if isinstance(goal, Point):
         offset, place = np.asarray(goal.offset, dtype=float), np.asarray(goal.target, dtype=float)
-        return Wish(frame, tuple(offset.tolist()), tuple(place.tolist()), None, goal.weight)
+        return GoalPlace(frame, tuple(offset.tolist()), tuple(place.tolist()), None, goal.weight)
     if isinstance(goal, Frame):
         target = placement(goal.target)
-        return Wish(frame, (0.0, 0.0, 0.0), tuple(target.translation.tolist()), target.rotation, goal.weight)
-    return Wish(frame, (0.0, 0.0, 0.0), None, target_rotation(goal.target, "target").rotation, goal.weight)
+        return GoalPlace(frame, (0.0, 0.0, 0.0), tuple(target.translation.tolist()), target.rotation, goal.weight)
+    return GoalPlace(frame, (0.0, 0.0, 0.0), None, target_rotation(goal.target, "target").rotation, goal.weight)

@@ -11,7 +11,7 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.methods.newton.feasibility import reach
 from wholebody.methods.newton.inequalities import Kind
-from wholebody.methods.newton.kkt import settle
+from wholebody.methods.newton.kkt import project
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.system import ActiveSystem, unit
 from wholebody.solution import Status
@@ -71,7 +71,7 @@ def solved(
     system, x = active_system.system, found.x
     nearness: tuple[float, ...] = ()
     if nearest is not None and found.met:
-        settled = settle(system, nearest, x, before, tolerance=max(tolerance, FINEST), iterations=iterations)
+        settled = project(system, nearest, x, before, tolerance=max(tolerance, FINEST), iterations=iterations)
         x, nearness = (unit(settled.x) if settled.met else x), settled.errors
     residual = system.residual(x)
     size = np.abs(np.where(system.inequality, np.minimum(residual, 0.0), residual))

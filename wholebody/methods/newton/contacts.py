@@ -49,7 +49,7 @@ class ContactSet:
         self._here: Placed | None = None
         self._there: Placed | None = None
 
-    def look(self, data: Any) -> None:
+    def measure(self, data: Any) -> None:
         """Measure at the joints' places in `data` (Pinocchio's), where a step leads."""
         self._there = Placed(self.workspace.proximity.query(Joints(data), self._within), self._within)
 
@@ -79,7 +79,7 @@ class ContactSet:
         return not passes_through(self.workspace, self._here, self._there, before, after)
 
     def renew(self, data: Any, bodies: Array, world: int) -> Coincide:
-        """The inequalities at the posture of the last `look`.
+        """The inequalities at the posture of the last `measure`.
 
         Args:
             data: Pinocchio's, with the joint placements there.

@@ -9,7 +9,7 @@ from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.system import ActiveSystem
 
-MENDING = 30  # most steps that only restore the constraints, after the goals were not met
+RESTORATIONS = 30  # most steps that only restore the constraints, after the goals were not met
 
 
 class FeasibilityResult(NamedTuple):
@@ -66,6 +66,6 @@ def reach(
         run.iterate(iterations, goals=True, measures="ignore")
     if run.hard > tolerance and len(run.goal_rows):
         stationary = run.stationary
-        run.iterate(MENDING, goals=False, measures="ignore")
+        run.iterate(RESTORATIONS, goals=False, measures="ignore")
         run.stationary = stationary if run.hard <= tolerance else run.stationary
     return FeasibilityResult(run.x, run.met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)

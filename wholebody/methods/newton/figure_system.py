@@ -77,7 +77,7 @@ class FigureSystem(ActiveSystem):
         self.q = q
         self._ordered = self.bodies.variables(q)
         if self.contacts is not None:
-            self.contacts.look(self.bodies.data)
+            self.contacts.measure(self.bodies.data)
         return self._ordered
 
     def posture(self, x: Array) -> Array:

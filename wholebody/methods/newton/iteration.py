@@ -37,11 +37,11 @@ LARGEST_TURN = (
 )
 FUNNEL = 0.5  # m or rad of violation allowed for a metre of goal; larger = longer steps, more to restore
 WIDEST = 0.5  # m or rad: largest violation allowed after any step
-MEND = 0.7  # share of the funnel from which a step only restores; larger = fewer such steps, more damped ones
-MENDING_DAMPING = 0.03  # of goals in such a step: they keep their errors, but may give way
+RESTORE_ABOVE = 0.7  # share of the funnel from which a step only restores; larger = fewer such steps, more damped ones
+RESTORING_DAMPING = 0.03  # of goals in such a step: they keep their errors, but may give way
 NARROW = 0.7  # factor on the funnel after such a step
 WORTH = 0.05  # least ratio of actual to predicted reduction of a step
-MENDED = 0.2  # the same for a step that only restores the constraints
+RESTORED = 0.2  # the same for a step that only restores the constraints
 STAGNANT = 1e-6  # relative reduction below which a step counts as no progress
 LEAST_PROGRESS = 0.1  # the same in frames
 STALLED = 1  # number of steps with less reduction than that after which a frame ends
@@ -117,11 +117,11 @@ class Iteration:
             self.active_system.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
             before = self._norms(self.residual)
             try:
-                mend = not goals or (self.goal > self.goal_tolerance and before[0] > MEND * funnel)
+                restore = not goals or (self.goal > self.goal_tolerance and before[0] > RESTORE_ABOVE * funnel)
                 step = self.step(
-                    damping, share, 0.0 if mend else min(1.0, pull / max(self.goal, 1e-300)), goals, measures
+                    damping, share, 0.0 if restore else min(1.0, pull / max(self.goal, 1e-300)), goals, measures
                 )
-                asked = before[0] + min(pull, self.goal) if self.goal > FAR and not mend else np.inf
+                asked = before[0] + min(pull, self.goal) if self.goal > FAR and not restore else np.inf
                 while self._motion(step) > AMPLIFIED * asked and damping < ENOUGH:
                     damping = max(FIRST_DAMPING, damping * DAMPING_UP)
                     step = self.step(damping, share, min(1.0, pull / max(self.goal, 1e-300)), goals, measures)
@@ -139,7 +139,7 @@ class Iteration:
             found = self.system.residual(trial)
             after = self._norms(found)
             promised = self._norms(self.residual + length * self.system.pattern.times(self.values, step))
-            better = self._better(before, after, promised, 0.0 if mend else funnel) or not self.state.finished()
+            better = self._better(before, after, promised, 0.0 if restore else funnel) or not self.state.finished()
             if not (free and better):
                 self.residuals.append(self.residuals[-1])
                 if damping >= MOST_DAMPING:
@@ -151,14 +151,14 @@ class Iteration:
                 damping = max(FIRST_DAMPING, damping * DAMPING_UP)
                 share, pull = max(0.5 * share, 0.05), max(0.5 * pull, 1e-3)
                 continue
-            if mend and after[1] >= before[1]:
+            if restore and after[1] >= before[1]:
                 funnel = max(NARROW * funnel, self.tolerance)
             nearer = sum(after) < (1.0 - (LEAST_PROGRESS if early_exit else STAGNANT)) * least
             least = min(least, sum(after))
             stagnant = 0 if nearer or not self.state.finished() else stagnant + 1
             self.advance(trial, length)
             gain = before[1] - promised[1]
-            if mend or before[1] - after[1] >= GOOD * gain:
+            if restore or before[1] - after[1] >= GOOD * gain:
                 damping = damping * DAMPING_DOWN if damping > FIRST_DAMPING else 0.0
             elif gain > self.goal_tolerance and before[1] - after[1] < POOR * gain:
                 damping = max(FIRST_DAMPING, damping * DAMPING_UP)
@@ -210,7 +210,7 @@ class Iteration:
         asked = self.residual * share
         asked[self.goal_rows] = self.residual[self.goal_rows] * min(pull, share)
         diagonal = np.full(len(asked), HARD_DAMPING + HARD_SHARE * damping * damping)
-        softness = (GOAL_DAMPING if pull else MENDING_DAMPING) + damping if goals else FREE
+        softness = (GOAL_DAMPING if pull else RESTORING_DAMPING) + damping if goals else FREE
         diagonal[self.goal_rows] = softness / self.system.share[self.goal_rows] ** 2
         asked[self.objective] = 0.0
         if measures == "lower":
@@ -265,8 +265,8 @@ class Iteration:
         bend = min(before[1] * before[1], WIDEST)  # violation of curved equations after a full step towards the goals
         if hard <= max(funnel, bend) and gain > 0.0 and before[1] - goal >= WORTH * gain:
             return True
-        mended = before[0] - hard >= MENDED * max(before[0] - promised[0], 0.0) and hard < before[0]
-        return mended and (before[0] > self.tolerance or goal <= before[1])
+        restored = before[0] - hard >= RESTORED * max(before[0] - promised[0], 0.0) and hard < before[0]
+        return restored and (before[0] > self.tolerance or goal <= before[1])
 
 
 def largest_turn(step: Array) -> float:

@@ -30,7 +30,7 @@ MOST_CONVEXITY = 1e6
 DECREASE = 1e-4  # least share of the predicted decrease of a step (Armijo)
 
 
-class Settled(NamedTuple):
+class Projection(NamedTuple):
     """The end of the iteration.
 
     Attributes:
@@ -50,9 +50,9 @@ def kkt_algebra(system: System) -> QuasiDefinite:
     return QuasiDefinite(system.pattern, (rows, columns))
 
 
-def settle(
+def project(
     system: System, algebra: QuasiDefinite, x: Array, anchor: Array, *, tolerance: float, iterations: int
-) -> Settled:
+) -> Projection:
     """Move x, which meets the equations or nearly so, to the nearest place to the anchor (both (7 n,)).
 
     Args:
@@ -98,7 +98,7 @@ def settle(
         else:
             break
         x, y, residual, values = trial, multiplier, found, system.values(trial)
-    return Settled(x, tuple(errors), errors[-1] <= tolerance)
+    return Projection(x, tuple(errors), errors[-1] <= tolerance)
 
 
 def _brought_back(

@@ -17,7 +17,7 @@ from wholebody.methods.contradictions import Contradiction, contradictions, leas
 from wholebody.methods.newton.feasibility import FeasibilityResult, reach
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import Kind
-from wholebody.methods.newton.refinement import polish
+from wholebody.methods.newton.refinement import refine
 from wholebody.methods.starts import Minima, bent, restarts
 from wholebody.solution import Solution, TraceEntry
 
@@ -101,7 +101,7 @@ class Search:
         if not best.judgement.holds(self.settings.counted) and not hopeless:
             best = self._least_violation(best, q)
         if self._serves(best) and self.active_system.objective.minimised:
-            best = self._polished(best)
+            best = self._refined(best)
         return best
 
     def solution(self, found: Found, began: float) -> Solution:
@@ -148,10 +148,10 @@ class Search:
         self.residuals += reached.residuals
         return self._judged(reached, how)
 
-    def _polished(self, found: Found) -> Found:
+    def _refined(self, found: Found) -> Found:
         """The same with lower measures, if possible."""
         active_system, tolerance = self.active_system, self.settings.tolerance
-        x, spent = polish(active_system, found.reached.x, active_system.objective.value, tolerance=tolerance)
+        x, spent = refine(active_system, found.reached.x, active_system.objective.value, tolerance=tolerance)
         self.iterations += spent
         lower = self._judged(found.reached._replace(x=x), found.how)
         return lower if self._serves(lower) and self._better(lower, found) else found

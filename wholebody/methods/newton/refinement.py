@@ -25,7 +25,7 @@ BACK = 6  # most Newton steps back to the equations
 ROUNDING = 1e-13  # relative change of the measures that is rounding
 
 
-def polish(
+def refine(
     active_system: ActiveSystem, x: Array, measure: Callable[[Array], float], *, tolerance: float
 ) -> tuple[Array, int]:
     """Lower the measures from x (7 n,), where all equations hold.

@@ -15,7 +15,6 @@ from wholebody.arrays import Array
 
 DEPTH = 5  # steps remembered; more adds little where a handful of joints settles slowly
 STRETCH = 6.0  # an accelerated step is at most this many times the plain one
-ROUNDING = 1e-10  # relative size below which differences of steps say nothing
 
 
 class Anderson:
@@ -37,7 +36,7 @@ class Anderson:
             return None
         changes = np.diff(np.array(self._steps[-DEPTH - 1 :]), axis=0).T
         ways = np.array(self._ways[-changes.shape[1] :]).T
-        coefficients = np.linalg.lstsq(changes, step, rcond=ROUNDING)[0]
+        coefficients = np.linalg.lstsq(changes, step, rcond=None)[0]
         fast: Array = step - (ways + changes) @ coefficients
         if not np.isfinite(fast).all():
             return None

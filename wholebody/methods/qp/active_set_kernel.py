@@ -6,6 +6,7 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
+from wholebody.methods.qp.dense_kernel import add, dot, gram, solve
 
 
 @compiled(error_model="numpy")
@@ -62,7 +63,7 @@ def solve_growing(
             return -1
         missed = False
         for j in range(k):
-            if not chosen[j] and _dot(elastic[j], x) < least[j] - 1e-9:
+            if not chosen[j] and dot(elastic[j], x) < least[j] - 1e-9:
                 chosen[j] = missed = True
         if not missed:
             return attempt
@@ -159,28 +160,28 @@ def settle(
             for r in range(size):
                 for i in range(n):
                     scaled[r, i] = stacked[r, i] * inverse[i]
-                multiplier[r] = _dot(stacked[r], x) - _dot(scaled[r], linear) - right[r]
-            _gram(scaled, stacked, size, system)
+                multiplier[r] = dot(stacked[r], x) - dot(scaled[r], linear) - right[r]
+            gram(scaled, stacked, size, system)
             for r in range(size):
                 system[r, r] += compliance[r]
-            in_columns = not _solve(system, multiplier[:size])
+            in_columns = not solve(system, multiplier[:size])
             if not in_columns:
                 for i in range(n):
                     trial[i] = linear[i]
                 for r in range(size):
-                    _add(multiplier[r], stacked[r], trial)
+                    add(multiplier[r], stacked[r], trial)
                 for i in range(n):
                     trial[i] = x[i] - inverse[i] * trial[i]
                 worst = 0.0
                 for r in range(size):
-                    left = abs(_dot(stacked[r], trial) - right[r] - compliance[r] * multiplier[r])
+                    left = abs(dot(stacked[r], trial) - right[r] - compliance[r] * multiplier[r])
                     if not left <= worst:
                         worst = left
                 in_columns = not worst <= row_tolerance
         if in_columns:
             _minimise_in_columns(stacked, right, compliance, size, diagonal, linear, inverse, x, multiplier)
         for r in range(size):
-            _add(multiplier[r], stacked[r], gradient)
+            add(multiplier[r], stacked[r], gradient)
         for i in range(n):
             if not in_columns:
                 x[i] -= inverse[i] * gradient[i]
@@ -197,7 +198,7 @@ def settle(
                 same = same and lower[i] - bound_tolerance <= x[i] <= upper[i] + bound_tolerance
         for c in range(k):
             j = places[c]
-            reached[c] = _dot(elastic[j], x)
+            reached[c] = dot(elastic[j], x)
             same = same and (pushing[j] or reached[c] >= least[j] - row_tolerance)
         for a in range(count):
             same = same and multiplier[m + a] <= 0.0
@@ -250,42 +251,6 @@ def settle(
         mask = at_lower if kind == 0 else (at_upper if kind == 1 else pushing)
         mask[place] = not mask[place]
     return False
-
-
-@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
-def _dot(a: Array, b: Array) -> float:
-    total = 0.0
-    for i in range(len(b)):
-        total += a[i] * b[i]
-    return total
-
-
-@compiled()
-def _add(factor: float, row: Array, total: Array) -> None:
-    for i in range(len(total)):
-        total[i] += factor * row[i]
-
-
-@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
-def _gram(scaled: Array, stacked: Array, size: int, system: Array) -> None:
-    """Lower triangle (size, size) of the products of rows, four at a time."""
-    n = stacked.shape[1]
-    for r in range(size):
-        own = scaled[r]
-        s = 0
-        while s + 3 <= r:
-            a, b, c, d = 0.0, 0.0, 0.0, 0.0
-            for i in range(n):
-                entry = own[i]
-                a += entry * stacked[s, i]
-                b += entry * stacked[s + 1, i]
-                c += entry * stacked[s + 2, i]
-                d += entry * stacked[s + 3, i]
-            system[r, s], system[r, s + 1], system[r, s + 2], system[r, s + 3] = a, b, c, d
-            s += 4
-        while s <= r:
-            system[r, s] = _dot(own, stacked[s])
-            s += 1
 
 
 @compiled(error_model="numpy")
@@ -377,29 +342,3 @@ def _minimise_in_columns(
         for i in range(n):
             total += stacked[r, i] * x[i]
         multiplier[r] = total / compliance[r]
-
-
-@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
-def _solve(system: Array, right: Array) -> bool:
-    """Solve a symmetric positive definite system in place by Cholesky's L L'; false where it is not one."""
-    size = len(right)
-    for i in range(size):
-        for j in range(i + 1):
-            total = system[i, j]
-            for p in range(j):
-                total -= system[i, p] * system[j, p]
-            if j < i:
-                system[i, j] = total / system[j, j]
-            elif total > 0.0:
-                system[i, i] = np.sqrt(total)
-            else:
-                return False
-        total = right[i]
-        for p in range(i):
-            total -= system[i, p] * right[p]
-        right[i] = total / system[i, i]
-    for i in range(size - 1, -1, -1):
-        right[i] /= system[i, i]
-        for p in range(i):
-            right[p] -= system[i, p] * right[i]
-    return True

@@ -13,6 +13,8 @@ Its positive part joins the program as soft rows. A dozen programs lead to a sta
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -34,7 +36,10 @@ WITHIN = 0.12  # m: pairs nearer than this get rows
 RADIUS = 0.5  # rad, m: of the first step
 LARGEST_RADIUS = 1.0
 LEAST_RADIUS = 1e-4
+HELD = 1e-2  # m, rad: holds missed by more than this do not bend; what they pull with says nothing yet
+UNIT = 1e-9  # by which rows of a wrench may differ from the axes of the world
 FLAT = 1e-3  # share of the violation that a step must be foreseen to gain, or the posture is stationary
+NEARLY_FLAT = 1e-2  # the same where only the size of what is left counts
 WORTH, POOR, GOOD = 0.05, 0.25, 0.6  # shares of the gain foreseen: a step is taken, was too long, may be longer
 SHRINK = 0.3
 DAMPING = 1e-2  # share of the largest curvature that every direction has at least; less: sets that go in circles
@@ -65,13 +70,15 @@ class CurvedReach:
         Returns:
             A posture that may be inside of things; converged where nothing nearer is near.
         """
-        return self._descend(self._alone, start, enough, most, 0.0)
+        return self._descend(self._alone, start, enough, most, 0.0, NEARLY_FLAT)
 
     def among_things(self, start: Array, enough: float, most: int) -> LocalSolution:
         """Descend from a posture (nq,) and pass through nothing; arguments as of `through_everything`."""
-        return self._descend(self._lineariser, start, enough, most, WITHIN)
+        return self._descend(self._lineariser, start, enough, most, WITHIN, FLAT)
 
-    def _descend(self, lineariser: Lineariser, q: Array, enough: float, most: int, within: float) -> LocalSolution:
+    def _descend(
+        self, lineariser: Lineariser, q: Array, enough: float, most: int, within: float, flat: float
+    ) -> LocalSolution:
         working_set = WorkingSet(self._solver)
         here = self._iterate_at(lineariser, q, within)
         push = np.zeros(len(here.rows.soft_error))
@@ -83,7 +90,7 @@ class CurvedReach:
                 here.at, rows, 0.5 * radius, None, 0.0, np.zeros(len(rows.soft_error)), False
             )
             lineariser.state.update(here.at.q)
-            bend, weight = self._curvature(rows, push)
+            bend, weight = self._curvature(rows, push if here.violation.hold <= HELD else np.zeros_like(push))
             lower, upper = program.lower.copy(), program.upper.copy()
             if not within:  # where nothing is in the way, and a translation bends nothing
                 lower[self._walk], upper[self._walk] = here.at.lower[self._walk], here.at.upper[self._walk]
@@ -101,7 +108,8 @@ class CurvedReach:
             pull = float(rows.soft_weight[: rows.goals].max(initial=1.0))
             goal = np.sqrt(foreseen.goal**2 + float(weight @ (bend @ x) ** 2) / pull)
             gain = here.violation.total - foreseen._replace(goal=float(goal)).total
-            if gain <= FLAT * here.violation.total:
+            held = not within or max(here.violation.hold, here.violation.elastic) <= enough
+            if gain <= (flat * here.violation.total if held else enough):
                 converged = True
                 break
             there = self._iterate_at(
@@ -134,46 +142,61 @@ class CurvedReach:
             rows: of the linearisation at the state's posture.
             push: (soft rows,) multipliers of the last program; goals pull with what is left of them.
         """
-        state, nv = self._lineariser.state, self._lineariser.state.model.nv
+        state = self._lineariser.state
         force = np.concatenate([rows.soft_weight[: rows.goals] * rows.soft_error[: rows.goals], push[rows.goals :]])
-        total, row = np.zeros((nv, nv)), 0
+        columns = state.support.shape[1]
+        total, row = np.zeros((columns, columns)), 0
         for term in self._problem.goals:
             part = term.jacobian(state)
             size = len(part.rows) if isinstance(part, Wrench) else len(part)
             if isinstance(part, Wrench) and part.against == 0:
-                total += _bending(state, part, force[row : row + size])
+                _add_bending(total, state, part, force[row : row + size])
             row += size
         for held, equal in zip(self._problem.constraints, self._subproblem.equalities, strict=True):
-            if not equal:
-                continue
-            part = held.jacobian(state)
-            if isinstance(part, Wrench) and part.against == 0 and equal == len(part.rows):
-                total += _bending(state, part, force[row : row + equal])
+            pulls = force[row : row + equal]
             row += equal
-        value, vector = np.linalg.eigh(total)
+            if pulls.any():
+                part = held.jacobian(state)
+                if isinstance(part, Wrench) and part.against == 0 and equal == len(part.rows):
+                    _add_bending(total, state, part, pulls)
+        bending = state.folded(state.folded(total).T)
+        bent = np.flatnonzero(bending.any(axis=0))
+        value, vector = np.linalg.eigh(bending[np.ix_(bent, bent)])
         kept = value > NEGLIGIBLE * max(float(value.max(initial=0.0)), 1.0)
-        return vector[:, kept].T, value[kept]
+        ways = np.zeros((int(kept.sum()), len(bending)))
+        ways[:, bent] = vector[:, kept].T
+        return ways, value[kept]
 
 
-def _bending(state: State, part: Wrench, force: Array) -> Array:
-    """Second derivative (nv, nv) of force times place, for the rows of one term on one joint.
+def _add_bending(total: Array, state: State, part: Wrench, force: Array) -> None:
+    """Add the second derivative of force times place, for the rows of one term on one joint, to a total.
 
     The rows are forces along the world's axes through a point, or moments, or both in this order; others have none.
+
+    Args:
+        total: (n, n) over the columns of the state's Jacobian; it is changed.
+        state: at the posture.
+        part: rows of the term.
+        force: (rows,) what each pulls with.
     """
-    linear = part.rows[:3]
-    nv = state.model.nv
-    if len(linear) == 3 and np.allclose(linear[:, :3], np.eye(3)):
-        F, moment = force[:3], force[3:6] if len(force) == 6 else np.zeros(3)
+    linear, moment = part.rows[:3], force[3:6] if len(force) == 6 else np.zeros(3)
+    if len(linear) != 3:
+        return
+    pull, point = force[:3], np.zeros(3)
+    if np.abs(linear[:, :3] - np.eye(3)).max() <= UNIT:
         point = np.array([linear[1, 5], linear[2, 3], linear[0, 4]])
-    elif len(linear) == 3 and not linear[:, :3].any():
-        F, moment, point = np.zeros(3), force[:3], np.zeros(3)
+    elif not linear[:, :3].any():
+        pull, moment = np.zeros(3), force[:3]
     else:
-        return np.zeros((nv, nv))
-    support = np.flatnonzero(state.support[part.joint])
-    v, w = state.jacobian[:3, support].T, state.jacobian[3:, support].T
-    moved = v + np.cross(w, point)
-    upper = np.triu(np.cross(F, w) @ moved.T + 0.5 * np.cross(moment, w) @ w.T)
-    upper += np.triu(upper, 1).T
-    total = np.zeros((nv, nv))
-    total[np.ix_(support, support)] = upper
-    return total
+        return
+    compiled_kernel().add_bending(total, state.jacobian, state.support[part.joint], point, pull, moment)
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody.methods.qp import bending_kernel
+
+    three, jacobian = np.zeros(3), np.zeros((6, 1), order="F")
+    bending_kernel.add_bending(np.zeros((1, 1)), jacobian, np.zeros(1), three, three, three)
+    return bending_kernel

@@ -77,6 +77,10 @@ class Feasibility:
         other = self._attempt(start, directions, True, local.iterations)
         return other if other.violation.total < local.violation.total else local._replace(iterations=other.iterations)
 
+    def once(self, start: Array) -> LocalSolution:
+        """The same by one attempt, with places and directions together: for one start of many."""
+        return self._attempt(start, self._directions(start), False, 0)
+
     def _attempt(self, start: Array, directions: Mask, later: bool, count: int) -> LocalSolution:
         """One of them: with or without places first; `count` programs were solved before."""
         weight = np.where(directions & later, DIRECTIONS_LATER, 1.0)

@@ -33,10 +33,15 @@ REACH_TRIALS = 10  # most descents without contacts that tell whether goals are 
 REACH_TRIAL_PROGRAMS = 60  # most programs of each
 FAR = (1.0, 0.6)  # shares of the joints' ranges that their starts may be away by
 HELD = 1e-3  # m, rad: by which constraints may be missed where such a descent ends
-AGREEING = 5  # of them that have to come to rest equally near
-AGREE = 1.05  # times the least violation up to which they count as equally near
+AGREEING = 3  # of them that have to come to rest equally near
+AGREEING_FEW = 5  # the same for figures of few degrees of freedom, whose minima lie apart and whose programs are cheap
+FEW = 12  # degrees of freedom
+AGREE = 1.1  # times the least violation up to which they count as equally near
 COMING_NEAR = 40  # most programs from there to the nearest posture among things
 PUSHED_OUT = 2  # of the nearest ends of such descents, how many are pushed out of things
+PUSHING_OUT = 15  # most programs of each
+INSIDE_PROBES = 5  # seeded starts for goals inside of things, which only look for the nearest posture
+STAYING = 40  # most programs that improve the measures at the nearest posture to goals that are not met
 FOR_WAYS = 0.5  # share of the time limit that ways after the first may take: to come nearest takes its time too
 
 
@@ -69,6 +74,7 @@ class Search:
         self.contradictions: tuple[Contradiction, ...] = ()
         self._least = 0.0  # what is known to be left of the goals at least, metres
         self._minima = Minima()  # where relaxed probes ended that were pushed out of things
+        self._relaxed_minima = Minima()  # where the others ended
         self._nearest: list[LocalSolution] = []  # where probes without contacts ended
         self._out_of_reach: bool | None = None
         self._best: LocalSolution | None = None
@@ -94,17 +100,18 @@ class Search:
         first = self._descend(start, full_step=not self.settings.measures, early_exit=True)
         if self._accept(first, "directly") or self.control.over:
             return
-        if self._accept(self._feasibility_first(start), "by feasibility first"):
-            return
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         least = least_left(self.contradictions)
-        if least is None or (not least and self._known_out_of_reach(self.best.q)):
+        if least is None or self._accept(self._feasibility_first(start), "by feasibility first"):
+            return
+        if self._known_out_of_reach(self.best.q):
             return
         self._least = least
         if self._proven():
             return
         rng = np.random.default_rng(self.settings.seed)
-        starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, self.settings.restarts))
+        count = min(self.settings.restarts, INSIDE_PROBES) if least else self.settings.restarts
+        starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, count))
         for local, how in self._relaxed_probes(starts):
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
@@ -128,6 +135,7 @@ class Search:
             if (
                 self._without_gain == NO_NEARER
                 or self._minima.complete
+                or self._relaxed_minima.complete
                 or self._left <= 0
                 or self.control.spent > FOR_WAYS
             ):
@@ -135,7 +143,8 @@ class Search:
             relaxed = self._probe(q, RELAXATION_DEPTH)
             nearer = relaxed.violation.left < (1.0 - NEARER) * self.best.violation.left
             self._without_gain = 0 if nearer else self._without_gain + 1
-            if relaxed.violation.left > REACHED * self.settings.tolerance:
+            if relaxed.violation.worst > REACHED * self.settings.tolerance:
+                self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
                 continue
             probe = self._probe(relaxed.q, 0.0)
             if not _held(probe, self.settings.tolerance) and not _held(self.best, self.settings.tolerance):
@@ -154,7 +163,7 @@ class Search:
         """
         most = max(min(self._left, PROBE_PROGRAMS), 1)
         lineariser = self.lineariser if depth == 0.0 else self.lineariser.relaxed(depth)
-        local = self._feasibility(lineariser, most, "probe").run(start)
+        local = self._feasibility(lineariser, most, "probe").once(start)
         self.spent += local.iterations
         self._left -= local.iterations
         return local
@@ -174,13 +183,11 @@ class Search:
             self._accept(self._stay(self.best), self.how)
         if self._out_of_reach:
             self._come_near()
+        elif self.best.violation.worst > tolerance:
+            self._near_best()
         if self.best.violation.left <= tolerance:
             return
-        nearest = self._descend(self.best.q, note="nearest", measures=False)
-        self._accept(nearest, self.how)
-        # it began at the best and came to rest: nothing nearer is near that
-        best = self.best._replace(converged=self.best.converged or nearest.converged)
-        self._best = best
+        best = self.best
         if best.violation.left > tolerance and self.problem.measures and self.settings.measures:
             local = self._stay(best)
             if _held(local, tolerance) and local.violation.left <= best.violation.left + tolerance:
@@ -204,8 +211,9 @@ class Search:
         start = self.problem.scene.figure.clamp(self.problem.start)
         rng = np.random.default_rng(self.settings.seed)
         self._out_of_reach = False
+        agreeing = AGREEING_FEW if self.problem.scene.model.nv < FEW else AGREEING
         for begin in chain([q], restarts(self.problem, state, start, rng, REACH_TRIALS - 1, FAR)):
-            local = reach.through_everything(begin, REACHED * tolerance, REACH_TRIAL_PROGRAMS)
+            local = reach.through_everything(begin, REACHED * tolerance, self._at_most(REACH_TRIAL_PROGRAMS))
             self.spent += local.iterations
             if local.violation.worst <= REACHED * tolerance or not local.converged or self.control.over:
                 return False
@@ -214,10 +222,20 @@ class Search:
             self._nearest.append(local)
             self._nearest.sort(key=lambda local: local.violation.total)
             most = AGREE * self._nearest[0].violation.total + tolerance
-            if sum(local.violation.total <= most for local in self._nearest) == AGREEING:
+            if sum(local.violation.total <= most for local in self._nearest) == agreeing:
                 self._out_of_reach = True
                 break
         return self._out_of_reach
+
+    def _near_best(self) -> None:
+        """Come as near as goes from the best posture; where that comes to rest nothing nearer is near."""
+        nearest = self._curved().among_things(self.best.q, self.settings.tolerance, self._at_most(COMING_NEAR))
+        self.spent += nearest.iterations
+        if not nearest.converged:
+            self._accept(nearest, self.how)
+            nearest = self._descend(self.best.q, note="nearest", measures=False)
+        self._accept(nearest, self.how)
+        self._best = self.best._replace(converged=self.best.converged or nearest.converged)
 
     def _come_near(self) -> None:
         """Where the goals are out of reach, come as near as goes without passing through anything."""
@@ -225,15 +243,21 @@ class Search:
         starts = [self.best.q, *(self._pushed_out(local.q) for local in self._nearest[:PUSHED_OUT])]
         for begin in starts:
             if not self.control.over:
-                local = reach.among_things(begin, tolerance, COMING_NEAR)
+                local = reach.among_things(begin, tolerance, self._at_most(COMING_NEAR))
                 self.spent += local.iterations
+                if not _held(local, tolerance) and local.violation.total < self.best.violation.total:
+                    local = self._descend(local.q, note="nearest", measures=False, most=COMING_NEAR)
                 self._accept(local, self.how)
 
     def _pushed_out(self, q: Array) -> Array:
         """Where leaving what a posture (nq,) is inside of ends, with the goals' errors to stay as they are."""
-        local = self._descent(PROBE_PROGRAMS, self._goal_errors(q), "nearest", measures=False).run(q)
+        local = self._descent(self._at_most(PUSHING_OUT), self._goal_errors(q), "nearest", measures=False).run(q)
         self.spent += local.iterations
         return local.q
+
+    def _at_most(self, programs: int) -> int:
+        """So many programs, or what one descent may have where that is less."""
+        return min(programs, self.settings.iterations)
 
     def _curved(self) -> CurvedReach:
         return CurvedReach(self.problem, self.lineariser, self.solver, self.control)
@@ -241,7 +265,8 @@ class Search:
     def _stay(self, local: LocalSolution) -> LocalSolution:
         """Descend with the goals' errors to stay as they are: what must hold is mended, then the measures improve."""
         nearest = self._goal_errors(local.q)
-        stayed = self._descent(self.settings.iterations, nearest, "nearest").run(local.q)
+        most = self._at_most(STAYING) if _held(local, self.settings.tolerance) else self.settings.iterations
+        stayed = self._descent(most, nearest, "nearest").run(local.q)
         self.spent += stayed.iterations
         left = float(np.linalg.norm(self._goal_errors(stayed.q)))
         violation = stayed.violation._replace(goal=left, left=left)

@@ -26,8 +26,8 @@ from wholebody.methods.qp.subproblem import (
     PULL,
     Rows,
     Subproblem,
-    compiled_kernel,
 )
+from wholebody.methods.qp.subproblem import compiled_kernel as compiled_subproblem
 from wholebody.methods.qp.working_set import LIMITS, WorkingSet
 from wholebody.problem import Problem
 from wholebody.workspace import Workspace
@@ -37,6 +37,7 @@ DAMPING = 10.0  # of the pull of goals out of reach: larger = slower to close in
 OUT_OF_REACH = 1 / 3  # share of a goal's error that a step leaves, from which on it is damped wholly
 SETTLING = 0.5  # s: measures lessen by 1/e in it: longer = slower to settle, shorter = joints swing about the optimum
 RESTING = 1e-5  # m, rad: a goal missed by less than this, and more than foreseen, rests; less left of one is reached
+LITTLE = 0.1  # damping that makes no difference to how a step looks
 WORSE = 2.0  # times the damping of a program that its answer may ask for before it is solved again with that
 
 
@@ -48,6 +49,8 @@ class Answer(NamedTuple):
         motion: longest way of any point of any piece, metres, to first order.
         turn: largest turn of a piece, radians.
         worst: largest violation of an elastic row at x = 0, metres.
+        spare: least distance beyond its clearance that a contact has after the displacement, metres, to first order;
+            negative infinite where it is not known.
         exact: see `QPSolution`, like the next two.
         iterations: of the solver.
         by: what closed the program.
@@ -57,6 +60,7 @@ class Answer(NamedTuple):
     motion: float
     turn: float
     worst: float
+    spare: float
     exact: bool
     iterations: int
     by: str
@@ -80,10 +84,11 @@ class StepProgram:
         """
         state, self._working_set = workspace.state, working_set
         self._workspace, self._subproblem = workspace, Subproblem(problem, state)
-        self._kernel, self._motion = compiled_tracking_kernel(), compiled_kernel().motion
+        self._kernel, self._motion = compiled_kernel(), compiled_subproblem().motion
         self.goals = len(self._subproblem.goal_share)
         self._soft = self.goals + int((self._subproblem.kind == 0).sum())
         self._variables, self._columns, self._elastic = state.model.nv, len(state.column_joint), 0
+        self._settled = False
         self._unknown = np.zeros((2, self._variables), dtype=bool)
         places = np.arange(state.model.nv, dtype=float)
         self._joints = np.concatenate(
@@ -94,7 +99,7 @@ class StepProgram:
         self._numbers = numbers_of(self._subproblem.scale, gain)
         self._before = np.zeros(state.model.nq + self._soft + 2)
         """See `tracking_kernel.solve`."""
-        self._foreseen = self._before[state.model.nq : -2]
+        self._after = self._before.copy()
         self._grow(64)
 
     def solve(self, at: Passing, measures: bool) -> Answer:
@@ -105,17 +110,26 @@ class StepProgram:
             measures: whether the measures count; without them the nearest posture to the goals is sought.
         """
         answer, damping, asked = self._once(at, measures, 0.0)
-        if asked > WORSE * damping:
+        if asked > WORSE * max(damping, LITTLE):
             answer, _, _ = self._once(at, measures, asked)
         return answer
 
-    def ended(self, q: Array, displacement: Array) -> None:
-        """Remember a step: the posture (nq,) where it ended, and its displacement (nv,)."""
-        before, gone = self._before, self._soft_rows @ displacement
-        left = gone[: self.goals] - self._target[: self.goals]
-        before[: len(q)] = q
-        np.add(self._soft_values[0], gone, out=self._foreseen)
-        before[-2], before[-1] = sqrt(left @ left), 1.0
+    def ended(self, q: Array, displacement: Array, whole: bool) -> None:
+        """Remember a step.
+
+        Args:
+            q: (nq,) the posture where it ended.
+            displacement: (nv,).
+            whole: whether that is the last program's answer as it was.
+        """
+        after = self._after
+        if not (whole and self._settled):
+            gone = self._soft_rows @ displacement
+            left = gone[: self.goals] - self._target[: self.goals]
+            after[len(q) : -2] = self._soft_values[0] + gone
+            after[-2], after[-1] = sqrt(left @ left), 1.0
+        after[: len(q)] = q
+        self._before, self._after = after, self._before
 
     def rows(self, at: Passing) -> Rows:
         """The rows of the last program; overwritten by the next."""
@@ -123,14 +137,14 @@ class StepProgram:
         labels = self._integers[: 2 * k].reshape(2, k)
         return Rows(
             self._soft_rows, self._soft_values[0], self._soft_values[1], self.goals,
-            self._floats[ends[7] : ends[8]].reshape(k, n), self._floats[ends[8] : ends[9]], labels[0],
+            self._floats[ends[6] : ends[7]].reshape(k, n), self._floats[ends[7] : ends[8]], labels[0],
             self._subproblem.one_sided + len(at.contacts.distance), labels[1],
         )  # fmt: skip
 
     def program(self) -> QuadraticProgram:
         """The last program; overwritten by the next."""
         n, k, ends = self._variables, self._elastic, self._ends()
-        elastic, least, weight = (self._floats[ends[i - 1] : ends[i]] for i in (8, 10, 11))
+        elastic, least, weight = (self._floats[ends[i - 1] : ends[i]] for i in (7, 9, 10))
         return QuadraticProgram(
             self._entries[0], self._entries[1], self._soft_rows, self._target, self._soft_values[1],
             elastic.reshape(k, n), least, weight, self._entries[2], self._entries[3],
@@ -159,22 +173,24 @@ class StepProgram:
         k = self._elastic = own.one_sided + len(at.gap)
         if 5 * k > len(self._integers):
             self._grow(2 * k)
-        solved, count, motion, turn, worst, left, damping, asked = self._kernel.solve(
+        held = working.held if working.hot else self._unknown
+        solved, count, motion, turn, worst, spare, damping, asked = self._kernel.solve(
             at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.contacts.number, at.measure, at.box, at.q,
-            self._before, own.kind, own.bound, own.goal_share, working.held if working.hot else self._unknown,
-            working.pushing, workspace.state.columns, self._joints, at.contacts.placements, workspace.table.reach,
-            self._floats, self._integers, self._masks, self._numbers, measures, working.hot, least_damping,
+            self._before, self._after, own.kind, own.bound, own.goal_share, held, working.pushing,
+            workspace.state.columns, self._joints, at.contacts.placements, workspace.table.reach, self._floats,
+            self._integers, self._masks, self._numbers, measures, working.hot, least_damping,
         )  # fmt: skip
+        self._settled = solved
         if solved:
             working.pushing = self._integers[2 * k : 2 * k + count].copy()
             by = working.solver.count([ACTIVE_SET])
-            return Answer(self._x, motion, turn, worst, True, 0, by), damping, asked
+            return Answer(self._x, motion, turn, worst, spare, True, 0, by), damping, asked
         answer = working.solve(self.program(), self.rows(at).key)
         motion, turn = self.motion(at, answer.x)
         remains = self._soft_rows[: self.goals] @ answer.x - self._target[: self.goals]
         left, error = sqrt(remains @ remains), sqrt(at.value[: self.goals] @ at.value[: self.goals])
         asked = DAMPING * min(1.0, left / (OUT_OF_REACH * max(error, 1e-12))) if left > RESTING else 0.0
-        return Answer(answer.x, motion, turn, worst, answer.exact, answer.iterations, answer.by), damping, asked
+        return Answer(answer.x, motion, turn, worst, spare, answer.exact, answer.iterations, answer.by), damping, asked
 
     def _ends(self) -> Any:
         """See `tracking_kernel.parts`."""
@@ -186,10 +202,10 @@ class StepProgram:
         ends = self._kernel.parts(n, m, elastic, self._columns)
         self._floats = floats = np.zeros(ends[-1])
         self._integers, self._masks = np.zeros(5 * elastic, dtype=np.intp), np.zeros(2 * (n + elastic), dtype=bool)
-        self._x, self._target = floats[:n], floats[ends[3] : ends[4]]
-        self._soft_values = floats[ends[4] : ends[5]].reshape(2, m)
-        self._entries = floats[ends[5] : ends[6]].reshape(4, n)
-        self._soft_rows = floats[ends[6] : ends[7]].reshape(m, n)
+        self._x, self._target = floats[:n], floats[ends[2] : ends[3]]
+        self._soft_values = floats[ends[3] : ends[4]].reshape(2, m)
+        self._entries = floats[ends[4] : ends[5]].reshape(4, n)
+        self._soft_rows = floats[ends[5] : ends[6]].reshape(m, n)
 
 
 def numbers_of(scale: float, gain: float) -> Array:
@@ -209,16 +225,16 @@ def numbers_of(scale: float, gain: float) -> Array:
 
 
 @lru_cache(maxsize=1)
-def compiled_tracking_kernel() -> Any:
+def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.methods.qp import tracking_kernel
 
-    none, index, one = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros(1, dtype=np.intp)
+    none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
     ends = tracking_kernel.parts(1, 0, 0, 1)
     tracking_kernel.solve(
-        none, np.zeros((0, 1)), none, index, none, index, np.zeros((2, 2)), np.zeros((2, 1)), none, np.zeros(2), index,
-        np.zeros((2, 0)), none, np.zeros((2, 1), dtype=bool), index, np.zeros((1, 6)), np.array([0, 0, 0, 0]),
-        np.zeros((1, 4, 3)), np.ones(1), np.zeros(ends[-1]), one[:0], np.zeros(2, dtype=bool), numbers_of(1.0, 1.0),
-        True, False, 0.0,
+        none, np.zeros((0, 1)), none, index, none, index, np.zeros((2, 2)), np.zeros((2, 1)), none, np.zeros(2),
+        np.zeros(2), index, np.zeros((2, 0)), none, np.zeros((2, 1), dtype=bool), index, np.zeros((1, 6)),
+        np.zeros(4, dtype=np.intp), np.zeros((1, 4, 3)), np.ones(1), np.zeros(ends[-1]), index,
+        np.zeros(2, dtype=bool), numbers_of(1.0, 1.0), True, False, 0.0,
     )  # fmt: skip
     return tracking_kernel

@@ -28,6 +28,7 @@ LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
 LARGEST_WITHIN = 0.5
 HEADROOM = 2.5  # pairs within this many times the last step's motion get rows, so that the next may be longer
 UNSEEN = 1e-4  # m: by which turning may bring things nearer than the linearisation says without being looked after
+SPARE = 10.0  # times what turning brings nearer, roughly: a step that leaves all pairs more room is not looked at
 CORRECTIONS = 3  # programs that ask again for what turning brought nearer, before the step is cut
 CUTS = 6  # times that a step is halved before it is given up
 OF_A_FRAME = 1e-4  # m, rad: to which the goals of a frame are met
@@ -118,6 +119,7 @@ class QPTracker:
         self._query_distance = LEAST_WITHIN
         self._alone = OneAtATime("tracker")
         self.workspace = problem.workspace()
+        self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_shortfall`
         self._set_up()
 
     def step(self, q: Array, measures: bool = True) -> QPStep:
@@ -187,13 +189,15 @@ class QPTracker:
             motion = answer.motion
         share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
         displacement = answer.x.copy() if share == 1.0 else share * answer.x
-        following = None
-        if 0.5 * share**2 * motion * answer.turn > UNSEEN:
+        following, curved = None, 0.5 * share**2 * motion * answer.turn
+        if curved > UNSEEN and answer.spare < SPARE * curved:
             displacement, share, following = self._looked_after(at, displacement, share)
         self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
         if following is None:
             following = pin.integrate(self.workspace.model, q, displacement)
-        program.ended(following, displacement)
+            program.ended(following, displacement, share == 1.0)
+        else:
+            program.ended(following, displacement, False)
         return QPStep(
             following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
             answer.iterations, answer.by, self._working_set.solver.counted(), share,
@@ -240,9 +244,10 @@ class QPTracker:
         workspace = self.workspace
         q = pin.integrate(workspace.model, at.q, displacement)
         near = workspace.near(q, float(np.maximum.reduce(at.clearance, initial=0.0)) + UNSEEN)
-        after = np.full(len(workspace.table.pairs), np.inf)
+        after = self._distance
         after[near.number] = near.distance
         short: Array = np.maximum(kept - after[at.contacts.number], 0.0)
+        after[near.number] = np.inf
         return short, q
 
     def _set_up(self) -> None:

@@ -11,7 +11,7 @@ from wholebody.compiled import compiled
 from wholebody.methods.qp.active_set_kernel import solve_growing, work_size
 from wholebody.methods.qp.subproblem_kernel import motion, program, sort_rows
 
-Ends: TypeAlias = tuple[int, int, int, int, int, int, int, int, int, int, int, int, int]
+Ends: TypeAlias = tuple[int, int, int, int, int, int, int, int, int, int, int, int]
 
 
 @compiled(error_model="numpy")
@@ -26,6 +26,7 @@ def solve(
     box: Array,
     q: Array,
     before: Array,
+    after: Array,
     kind: Indices,
     bound: Array,
     share: Array,
@@ -57,6 +58,7 @@ def solve(
         q: (nq,) the posture.
         before: (nq + m + 2,) where the last step ended, the errors of its soft rows there to first order, what it left
             of the goals, and 1 where there was such a step.
+        after: (nq + m + 2,) the same of this step, but for the posture, where the program is solved.
         kind: (c,) see `subproblem_kernel.sort_rows`, like the next two.
         bound: (2, c).
         share: (g,).
@@ -76,7 +78,8 @@ def solve(
 
     Returns:
         Whether the program is solved; how many elastic rows push; longest way and largest turn of the pieces; largest
-        violation of an elastic row; what is left of the way to the goals; the damping, and what the answer asks for.
+        violation of an elastic row; least room that a contact row has after the step; the damping, and what the answer
+        asks for.
     """
     n, goals = box.shape[1], len(share)
     equal, one_sided = 0, 0
@@ -85,12 +88,12 @@ def solve(
         one_sided += (kind[c] == 3) * 2 + (kind[c] == 1) + (kind[c] == 2)
     m, k = goals + equal, one_sided + len(gap)
     ends = parts(n, m, k, len(columns))
-    x, gone, spread = floats[: ends[0]], floats[ends[0] : ends[1]], floats[ends[1] : ends[2]]
-    shift, target = floats[ends[2] : ends[3]], floats[ends[3] : ends[4]]
-    soft_values = floats[ends[4] : ends[5]].reshape((2, m))
-    entries, soft = floats[ends[5] : ends[6]].reshape((4, n)), floats[ends[6] : ends[7]].reshape((m, n))
-    elastic, violated = floats[ends[7] : ends[8]].reshape((k, n)), floats[ends[8] : ends[9]]
-    least, elastic_weight, work = floats[ends[9] : ends[10]], floats[ends[10] : ends[11]], floats[ends[11] :]
+    x, spread = floats[: ends[0]], floats[ends[0] : ends[1]]
+    shift, target = floats[ends[1] : ends[2]], floats[ends[2] : ends[3]]
+    soft_values = floats[ends[3] : ends[4]].reshape((2, m))
+    entries, soft = floats[ends[4] : ends[5]].reshape((4, n)), floats[ends[5] : ends[6]].reshape((m, n))
+    elastic, violated = floats[ends[6] : ends[7]].reshape((k, n)), floats[ends[7] : ends[8]]
+    least, elastic_weight, work = floats[ends[8] : ends[9]], floats[ends[9] : ends[10]], floats[ends[10] :]
     labels, pushing_keys, places = integers[: 2 * k].reshape((2, k)), integers[2 * k : 3 * k], integers[3 * k : 5 * k]
     at_lower, at_upper, pushing, chosen = masks[:n], masks[n : 2 * n], masks[2 * n : 2 * n + k], masks[2 * n + k :][:k]
     terms = goals + len(kind)
@@ -128,7 +131,7 @@ def solve(
         elastic_weight[j] = numbers[13]
         worst = max(worst, violated[j])
     if not hot:
-        return False, 0, 0.0, 0.0, worst, 0.0, damping, 0.0
+        return False, 0, 0.0, 0.0, worst, -np.inf, damping, 0.0
     for i in range(n):
         at_lower[i], at_upper[i] = held[0, i], held[1, i]
     rounds = solve_growing(
@@ -136,7 +139,7 @@ def solve(
         labels[1], pushed, at_lower, at_upper, pushing, chosen, numbers[19:25], work, places, x,
     )  # fmt: skip
     if rounds < 0:
-        return False, 0, 0.0, 0.0, worst, 0.0, damping, 0.0
+        return False, 0, 0.0, 0.0, worst, -np.inf, damping, 0.0
     for i in range(n):
         held[0, i], held[1, i] = at_lower[i], at_upper[i]
     count = 0
@@ -150,12 +153,20 @@ def solve(
             count += 1
     left = 0.0
     for r in range(m):
-        gone[r] = 0.0
+        gone = 0.0
         for i in range(n):
-            gone[r] += soft[r, i] * x[i]
+            gone += soft[r, i] * x[i]
+        after[last + r] = soft_values[0, r] + gone
         if r < goals:
-            left += (gone[r] - target[r]) ** 2
+            left += (gone - target[r]) ** 2
     left = np.sqrt(left)
+    after[last + m], after[last + m + 1] = left, 1.0
+    spare = np.inf
+    for j in range(one_sided, k):
+        ahead = -violated[j]
+        for i in range(n):
+            ahead += elastic[j, i] * x[i]
+        spare = min(spare, ahead)
     asked = numbers[10] * min(1.0, numbers[11] * left / error) if left > numbers[12] else 0.0
     wide, pieces = len(columns), len(reach)
     for c in range(wide):
@@ -164,24 +175,23 @@ def solve(
         spread, columns, joints[wide : 2 * wide], joints[2 * wide : len(joints) - pieces],
         joints[len(joints) - pieces :], placement, reach,
     )  # fmt: skip
-    return True, count, way, turn, worst, left, damping, asked
+    return True, count, way, turn, worst, spare, damping, asked
 
 
 @compiled()
 def parts(n: int, m: int, k: int, columns: int) -> Ends:
     """Where the parts of the room end for n variables, m soft and k elastic rows.
 
-    They are x (n,), what soft rows go (m,), x over the columns of the joint Jacobian, shift (m,), target (m,), errors
+    They are x (n,), x over the columns of the joint Jacobian, shift (m,), target (m,), errors
     and weights (2, m), diagonal, linear, lower and upper (4, n), soft rows (m, n), elastic rows (k, n), their violation
     (k,), least (k,) and weight (k,), and what `active_set_kernel.solve_growing` needs.
     """
     a = n
-    b = a + m
-    c = b + columns
+    c = a + columns
     d = c + m
     e = d + m
     f = e + 2 * m
     g = f + 4 * n
     h = g + m * n
     i = h + k * n
-    return a, b, c, d, e, f, g, h, i, i + k, i + 2 * k, i + 3 * k, i + 3 * k + work_size(n, m, k)
+    return a, c, d, e, f, g, h, i, i + k, i + 2 * k, i + 3 * k, i + 3 * k + work_size(n, m, k)

@@ -14,6 +14,7 @@ from wholebody.workspace import Workspace
 
 PLACES = 9  # postures of a gap at which the depth of a dip is measured
 ADDED = 5e-4  # m: what the margin of a pair gets beyond the depth of its dip; arcs between frames are shorter
+FAR = 0.1  # m: a pair farther apart at one of the two frames needs no margin there
 THROUGH = 2e-3  # m: a deeper dip is no arc between two postures that touch, but passes through something
 WIDENINGS = 3  # of margins at a gap, before its frames are predicted from each other
 VISITS = 5  # of a gap; what did not help so often does not help
@@ -125,7 +126,7 @@ class Gaps:
         return found.good
 
     def _distance(self, q: Array, pair: int) -> float:
-        """Distance of a pair in a posture, metres; 0 where it is not near."""
-        near = self._workspace.near(q, ADDED)
+        """Distance of a pair in a posture, metres; 0 where it is far."""
+        near = self._workspace.near(q, FAR)
         found = near.distance[near.number == pair]
         return max(0.0, float(found[0])) if len(found) else 0.0

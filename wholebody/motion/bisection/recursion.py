@@ -62,7 +62,7 @@ class Recursion:
         points = sorted({0, last, *evaluation})
         corrected = [frame for frame in points if self.bad[frame]]
         for frame in corrected:
-            self._key(frame, [frame])
+            self._key(frame)
         self.keys.update(points)
         for frame in corrected:
             if frame not in self.stuck:
@@ -90,17 +90,18 @@ class Recursion:
 
     def _bisect(self, group: Group) -> bool:
         """Predict the middle and interpolate the others; whether the middle is free now."""
-        if not self._key(group.middle, range(group.first - 1, group.last + 2)):
+        if not self._key(group.middle):
             return False
         self._fill(group.first - 1, group.middle, group.last + 1)
         return True
 
-    def _key(self, frame: int, sides: Sequence[int]) -> bool:
-        """Predict the posture of a frame: with planes, then without, then from free postures beside its group."""
+    def _key(self, frame: int) -> bool:
+        """Predict the posture of a frame: with planes, then without, then from the nearest free postures beside it."""
         if self._watch.tell(self.share_done(), f"frame {frame}"):
             return False
         planes = path_planes(self._scene.figure, self.q, frame, self._joints, self._state)
-        starts = [self.q[frame], *(self.q[side] for side in (sides[0], sides[-1]) if not self.bad[side])]
+        free = np.flatnonzero(~self.bad)
+        starts = [self.q[frame], *(self.q[side] for side in (*free[free < frame][-1:], *free[free > frame][:1]))]
         attempts = [(starts[0], planes)] if planes else []
         attempts += [(start, []) for start in starts]
         for start, through in attempts:

@@ -17,6 +17,7 @@ from wholebody.methods.qp.solvers.split_form import HEAVIEST, IDLE, SCALE, read_
 
 RHO = 0.1  # OSQP's step length at the beginning; it adapts
 ROUNDS = (25, 50, 100, 200, 400)  # iterations, until an active set read off the multipliers settles
+HOT_ROUNDS = 2  # of them with a hot start: more take several times as long as semismooth Newton steps
 FAR = 1e30  # OSQP's infinity
 
 
@@ -47,7 +48,7 @@ class OSQPSolver(QPSolver):
         """Minimise; see `QPSolver.solve_cold`."""
         workspace = self.workspace(program)
         iterations = 0
-        for limit in ROUNDS:
+        for limit in ROUNDS[:HOT_ROUNDS] if self.hot_start else ROUNDS:
             iterations += workspace.run(limit)
             solution = solve_from(program, workspace.active(), CORRECTIONS)
             if solution is not None:

@@ -1,0 +1,103 @@
+"""`wholebody bench motion`: its clips, what it keeps, and its report."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.bench.motion import cases, measuring, report
+from wholebody.bench.motion.measuring import CHECKED, MotionRow
+from wholebody.bench.tables import read_rows
+from wholebody.cli import main
+
+NAME = "sword cut"
+
+
+@pytest.mark.parametrize("name", cases.SYNTHETIC)
+def test_synthetic_clips_collide_are_smooth_and_within_limits(name: str) -> None:
+    figure = wb.load("human")
+    clip = cases.synthetic(name, figure)
+    assert clip.dt == pytest.approx(1 / 30)
+    assert all(figure.within_limits(q, 1e-6) for q in clip.q)
+    assert np.abs(clip.velocities()[[0, -1]]).max() < 0.5
+    found = wb.check(clip)
+    assert found.colliding > 5
+    assert not wb.check(clip[:1]).contacts
+
+
+@pytest.mark.parametrize("worn", cases.EQUIPMENT)
+def test_equipment_is_attached(worn: str) -> None:
+    scene = cases.dressed(wb.load("human"), worn)
+    assert all(thing.segment is not None for thing in scene.objects.values())
+    assert bool(scene.objects) == (worn != "nothing")
+
+
+def test_a_run_goes_on_where_it_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+
+    def run(worn: tuple[str, ...]) -> list[MotionRow]:
+        return measuring.run({NAME: None}, worn, (CHECKED,), tmp_path, {}, tell=lambda *said: told.append(said[2]))
+
+    (first,) = run(("nothing",))
+    clip = cases.synthetic(NAME, wb.load("human"))
+    found = wb.check(clip)
+    assert (first.frames, first.before, first.dips) == (len(clip), found.colliding, found.dips)
+    assert first.deepest_mm == pytest.approx(1e3 * found.deepest)
+    assert (first.angle, first.jerk, first.hand_mm, first.outcome) == (0.0, 1.0, -1.0, "left")
+    assert read_rows(tmp_path / "motion.csv", MotionRow)[1] == [first]
+    told.clear()
+    again, other = run(("nothing", "pack"))
+    assert again == first  # its times too: it was not measured again
+    assert other.equipment == "pack"
+    assert sum("check" in line for line in told) == 1
+    monkeypatch.setattr(measuring, "measured", None)
+    assert run(("pack",)) == [other]
+
+
+def test_a_case_that_ends_is_told_and_the_others_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measuring, "START", 0.0)
+    monkeypatch.setattr(measuring, "SLOWEST", 1e-3)
+    (row,) = measuring.run({NAME: None}, ("nothing",), (CHECKED,), tmp_path, {})
+    assert (row.outcome, row.frames > 0, row.measured) == ("overtime", True, False)
+    assert "sword cut, nothing, check: overtime" in report.report([row], {"wholebody": "0"})
+
+
+def test_a_recording_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+    (tmp_path / "broken.bvh").write_text("HIERARCHY\n")
+    rows = measuring.run({"broken": tmp_path / "broken.bvh"}, ("nothing",), (CHECKED,), tmp_path / "out", {})
+    assert rows[0].outcome == "no clip"
+    assert "broken.bvh" in rows[0].said
+
+
+def rows() -> list[MotionRow]:
+    base = MotionRow("walk", "pack", "bisection", 60, 2.0, "free", 1.0, 1.0, 20, 0, 0, 30.0, 0.01, 0.05, angle=0.1,
+                     distance_mm=9.0, jerk=2.0, sliding_mm=0.5, solves=40)  # fmt: skip
+    return [
+        base,
+        dataclasses.replace(base, method="trajectory", angle=0.06, jerk=1.1, seconds=3.0, programs=12, hand_mm=0.4),
+        dataclasses.replace(base, method="fade", outcome="left", after=3, deepest_mm=2.0, seconds=0.2),
+        dataclasses.replace(base, method=CHECKED, seconds=0.1, outcome="left"),
+    ]
+
+
+def test_the_report_has_every_method(tmp_path: Path) -> None:
+    text = report.report(rows(), {"wholebody": "0"})
+    assert "| trajectory | 1 of 1 | 0.01 | 0.05 |" in text
+    assert "| fade | 0 of 1 | 2.00 |" in text
+    assert "deviation (rad) is 0.60 of bisection's" in text
+    assert "| walk | pack | 60 | 20 | 0 | 30.0 | 0.1 |" in text
+    assert "nan" not in text
+    for path in (*report.chart(rows(), tmp_path / "motion"), *report.check_chart(rows(), tmp_path / "check")):
+        assert path.stat().st_size > 1000
+
+
+def test_an_unknown_name_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = str(tmp_path)
+    assert main(["bench", "motion", "--out", out, "--equipment", "pak"]) == 2
+    assert "pack" in capsys.readouterr().err
+    assert main(["bench", "motion", "--out", out, "--clips", str(tmp_path / "none")]) == 2
+    assert "--clips" in capsys.readouterr().err

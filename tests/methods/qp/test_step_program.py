@@ -1,0 +1,175 @@
+"""The compiled program of a tracking step against the plain way: rows, numbers and answer, entry by entry."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.figures.state import State
+from wholebody.linearisation import Linearisation, Passing
+from wholebody.methods.qp.solvers.registry import make_solver
+from wholebody.methods.qp.step_program import (
+    DAMPING,
+    LITTLE,
+    OUT_OF_REACH,
+    RADIUS,
+    RESTING,
+    SETTLING,
+    WORSE,
+    StepProgram,
+)
+from wholebody.methods.qp.subproblem import PULL, Subproblem
+from wholebody.methods.qp.working_set import WorkingSet
+
+DT = 0.01
+
+
+@pytest.fixture(scope="module")
+def scene() -> wb.Scene:
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.2, 0.24, 0.2)), name="block", at=(0.44, -0.44, 1.05))
+    return scene.add(wb.Sphere(0.1), name="ball", at=(0.3, 0.3, 1.2))
+
+
+def whole(at: Passing) -> Linearisation:
+    """The same as what `Lineariser.at` returns."""
+    terms, goals = len(at.value), at.goals
+    return Linearisation(
+        np.array(at.q), at.value[:goals], at.jacobian[:goals], at.value[goals:], at.jacobian[goals:terms], at.contacts,
+        at.gap, at.jacobian[terms:], at.gap_contact, at.clearance, float(at.measure[0, -1]), at.measure[0, :-1],
+        at.measure[1, :-1], at.box[0], at.box[1],
+    )  # fmt: skip
+
+
+class Plain:
+    """The way of a step in array code: what `StepProgram` does in one call."""
+
+    def __init__(self, problem: wb.Problem) -> None:
+        self.subproblem = Subproblem(problem, State(problem.scene.model))
+        self.working_set = WorkingSet(make_solver("osqp"))
+        self.before: tuple[np.ndarray, np.ndarray, float] | None = None
+        self.damped = 0
+
+    def solve(self, at: Linearisation):
+        rows = self.subproblem.rows(at)
+        error, goals = max(float(np.linalg.norm(at.goal_error)), 1e-12), rows.goals
+        shift, damping = np.zeros(len(rows.soft_error)), 0.0
+        if self.before is not None and np.array_equal(self.before[0], at.q):
+            shift = rows.soft_error - self.before[1]
+            if not np.abs(shift[:goals]).max(initial=0.0) < RESTING:
+                shift[:goals] = 0.0
+            damping = DAMPING * min(1.0, self.before[2] / OUT_OF_REACH / error)
+        for _ in range(2):
+            program = self.subproblem.program(
+                at, rows, RADIUS, PULL * RADIUS, damping, shift, True, DT / SETTLING if goals else 1.0
+            )
+            answer = self.working_set.solve(program, rows.key)
+            left = float(np.linalg.norm((rows.soft @ answer.x - program.target)[:goals]))
+            asked = DAMPING * min(1.0, left / OUT_OF_REACH / error) if left > RESTING else 0.0
+            if asked <= WORSE * max(damping, LITTLE):
+                break
+            damping = asked
+        self.damped += damping > LITTLE
+        return rows, program, answer
+
+    def ended(self, q, rows, program, displacement) -> None:
+        gone = rows.soft @ displacement
+        self.before = q, rows.soft_error + gone, float(np.linalg.norm((gone - program.target)[: rows.goals]))
+
+
+PROBLEMS = {
+    "into a block": {
+        "goals": [wb.Point("right_index_tip", (0.42, -0.44, 1.05))],
+        "constraints": [
+            wb.Hold("left_foot"),
+            wb.Hold("right_foot"),
+            wb.StepLimit(4.0, root_velocity=1.0, root_turn=2.0),
+        ],
+        "measures": [wb.Displacement()],
+    },
+    "inequalities": {
+        "goals": [wb.Point("left_index_tip", (0.3, 0.3, 1.1)), wb.Axis("head", (0, 0, 1.0), direction=(0.2, 0, 1.0))],
+        "constraints": [wb.Hold("left_foot"), wb.Balance(), wb.Plane("right_elbow", (0.0, 1.0, 0.2))],
+        "measures": [wb.Discomfort(0.1), wb.Displacement()],
+    },
+    "no goals": {"constraints": [wb.Hold("left_foot")], "measures": [wb.Effort()]},
+}
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_it_is_the_plain_one_entry_by_entry(scene: wb.Scene, name: str) -> None:
+    """Sixty steps, some from elsewhere than where the last ended."""
+    problem = wb.Problem(scene, clearance=0.01, **PROBLEMS[name])
+    workspace, plain = problem.workspace(), Plain(problem)
+    compiled = StepProgram(problem, workspace, WorkingSet(make_solver("osqp")), DT)
+    lineariser, rng, q = problem.lineariser(workspace, DT), np.random.default_rng(0), problem.start
+    for number in range(60):
+        if number % 20 == 19:
+            q = problem.scene.figure.clamp(pin.integrate(workspace.model, q, 0.02 * rng.normal(size=len(q) - 1)))
+        at = lineariser.passing(q, 0.06)
+        answer = compiled.solve(at, measures=True)
+        found, found_rows = compiled.program(), compiled.rows(at)
+        rows, program, wanted = plain.solve(whole(at))
+        for field in ("soft", "soft_error", "soft_weight", "elastic", "elastic_violation", "contact", "key"):
+            assert np.array_equal(getattr(found_rows, field), getattr(rows, field)), field
+        assert (found_rows.goals, found_rows.contacts) == (rows.goals, rows.contacts)
+        for field in ("rows", "weight", "elastic", "least", "elastic_weight", "lower", "upper", "linear"):
+            assert np.array_equal(getattr(found, field), getattr(program, field)), field
+        assert found.target == pytest.approx(program.target, abs=1e-12)
+        assert found.diagonal == pytest.approx(program.diagonal, rel=1e-6)
+        assert answer.x == pytest.approx(wanted.x, abs=1e-8)
+        assert answer.exact
+        contacts = slice(len(program.least) - len(at.gap), None)
+        room = (program.elastic @ wanted.x - rows.elastic_violation)[contacts].min(initial=np.inf)
+        assert answer.spare == pytest.approx(room, abs=1e-8) or answer.by != "active set"
+        displacement = answer.x.copy() if number % 7 else 0.5 * answer.x
+        q = pin.integrate(workspace.model, q, displacement)
+        compiled.ended(q, displacement, number % 7 != 0)
+        plain.ended(q, rows, program, displacement)
+    assert plain.damped > 0 or name != "into a block"
+
+
+def follow(problem: wb.Problem, targets: np.ndarray) -> np.ndarray:
+    """Postures (steps, nq) of a fingertip that is asked from place to place."""
+    tracker, q, postures = wb.QP().tracker(problem, DT), problem.start, []
+    for place in targets:
+        problem.retarget([wb.Point("right_index_tip", place)])
+        q = tracker.step(q).q
+        postures.append(q)
+    return np.array(postures)
+
+
+def test_a_body_that_meets_an_obstacle_does_not_bend_for_a_tenth_of_a_millimetre(scene: wb.Scene) -> None:
+    """Limbs keep to the order of their speed when the goal goes on into the block; feet stay within 5 micrometres."""
+    holds = [wb.Hold("left_foot"), wb.Hold("right_foot"), wb.StepLimit(4.0, root_velocity=1.0, root_turn=2.0)]
+    problem = wb.Problem(scene, constraints=holds, measures=[wb.Displacement()], clearance=0.01)
+    tip = scene.state(problem.start).frame(scene.frame_id("right_index_tip")).translation.copy()
+    share = np.linspace(0.0, 1.0, 70)[1:, None]
+    targets = tip + share * (np.array([0.42, -0.44, 1.05]) - tip)
+    postures = follow(problem, targets)
+    speed = np.abs(np.diff(postures[:, scene.figure.limits.idx_q], axis=0)).mean(axis=1) / DT
+    assert (
+        np.linalg.norm(scene.state(postures[-1]).frame(scene.frame_id("right_index_tip")).translation - targets[-1])
+        > 0.02
+    )
+    for earlier, later in itertools.pairwise(speed[10:]):
+        assert later < 1.6 * earlier + 0.01
+    for foot in problem.constraints[:2]:
+        assert max(np.abs(foot.value(scene.state(q))).max() for q in postures) < 5e-6
+
+
+def test_a_goal_that_rests_is_met_while_the_body_settles(scene: wb.Scene) -> None:
+    """The measures still move the body; the fingertip stays where it is to 0.1 micrometres."""
+    problem = wb.Problem(
+        scene, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")], measures=[wb.Displacement()], clearance=0.01
+    )
+    place = np.array([0.3, -0.25, 1.25])
+    postures = follow(problem, np.array([place] * 60))
+    assert np.abs(np.diff(postures[-2:], axis=0)).max() > 1e-5
+    for q in postures[-5:]:
+        tip = scene.state(q).frame(scene.frame_id("right_index_tip")).translation
+        assert np.linalg.norm(tip - place) < 1e-7

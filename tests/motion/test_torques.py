@@ -1,0 +1,217 @@
+"""Torques of clips: statics, flight, a pendulum, momentum and forward dynamics as oracles; strength of people."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.motion.ground_forces import ground_forces
+from wholebody.motion.strength import FEMALE, MALE, Strength
+from wholebody.motion.torques import smoothed, torques
+
+GRAVITY = 9.81
+
+
+@pytest.fixture(scope="module")
+def human() -> wb.Figure:
+    return wb.load("human")
+
+
+def swaying(human: wb.Figure, frames: int = 60, dt: float = 1 / 60) -> wb.Clip:
+    """A clip that bends the knees and swings the arms smoothly, both feet near the ground."""
+    base = human.posture("standing")
+    q = np.tile(base, (frames, 1))
+    phase = 2.0 * np.pi * np.arange(frames) * dt
+    for name, size in (("left_shoulder_flexion", 0.4), ("right_elbow_flexion", 0.5), ("spine2_lateral", 0.1)):
+        joint = human.model.joints[human.joint_id(name)]
+        q[:, joint.idx_q] += size * (1.0 - np.cos(phase))
+    q[:, 2] -= 0.004 * (1.0 - np.cos(phase))
+    return wb.Clip(human, q, dt, "swaying")
+
+
+def test_somebody_who_stands_still_weighs_what_he_weighs(human: wb.Figure) -> None:
+    found = torques(wb.Clip(human, np.tile(human.posture("standing"), (5, 1)), 0.1))
+    mass = sum(inertia.mass for inertia in human.model.inertias[1:])
+    center = pin.centerOfMass(human.model, human.model.createData(), human.posture("standing"))
+    np.testing.assert_allclose(found.force.sum(axis=1), np.tile([0.0, 0.0, GRAVITY * mass], (5, 1)), atol=0.01)
+    np.testing.assert_allclose(found.center_of_pressure[:, :2], np.tile(center[:2], (5, 1)), atol=1e-5)
+    assert np.abs(found.missing).max() < 0.01
+    assert found.supported.all()
+
+
+def test_torques_bear_the_part_of_the_body_beyond_the_joint(human: wb.Figure) -> None:
+    q = human.posture("standing").copy()
+    joint = human.model.joints[human.joint_id("left_elbow_flexion")]
+    q[joint.idx_q] = np.pi / 2.0
+    found = torques(wb.Clip(human, np.tile(q, (3, 1)), 0.1))
+    data = human.model.createData()
+    pin.centerOfMass(human.model, data, q, np.zeros(human.model.nv), np.zeros(human.model.nv))
+    number = human.joint_id("left_elbow_flexion")
+    arm = data.mass[number] * GRAVITY * (data.oMi[number].act(data.com[number]) - data.oMi[number].translation)[0]
+    axis = data.oMi[number].rotation @ np.array([0.0, -1.0, 0.0])
+    assert found.torque[1, joint.idx_v] == pytest.approx(arm * -axis[1], rel=1e-6)
+    assert arm > 1.0
+
+
+def test_forces_of_the_ground_change_the_momentum(human: wb.Figure) -> None:
+    clip = swaying(human)
+    found = torques(clip, cutoff=None)
+    data = human.model.createData()
+    mass = pin.computeTotalMass(human.model)
+    centers = np.array([pin.centerOfMass(human.model, data, q).copy() for q in clip.q])
+    acceleration = (centers[2:] - 2.0 * centers[1:-1] + centers[:-2]) / clip.dt**2
+    wanted = mass * (acceleration + [0.0, 0.0, GRAVITY])
+    given = found.force.sum(axis=1) + found.missing[:, :3]
+    np.testing.assert_allclose(given[1:-1], wanted, atol=0.003 * mass * GRAVITY)
+
+
+def test_forward_dynamics_gives_the_motion_back(human: wb.Figure) -> None:
+    clip = swaying(human)
+    found = torques(clip, cutoff=None)
+    assert np.abs(found.missing).max() < 0.01
+    v, a = clip.velocities(), clip.accelerations()
+    data = human.model.createData()
+    for k in (5, 20, 44):
+        pin.forwardKinematics(human.model, data, clip.q[k])
+        outer = pin.StdVec_Force([pin.Force.Zero() for _ in human.model.joints])
+        for number, foot in enumerate(found.feet):
+            force, at = found.force[k, number], found.pressure[k, number]
+            joint = human.model.frames[human.frame_id(foot)].parentJoint
+            turning = found.moment[k, number] + np.cross(at, force)
+            outer[joint] = data.oMi[joint].actInv(pin.Force(force, turning))
+        torque = found.torque[k].copy()
+        torque[:6] = 0.0
+        gained = pin.aba(human.model, data, clip.q[k], v[k], torque, outer)
+        np.testing.assert_allclose(gained, a[k], atol=0.01)
+
+
+def test_nothing_pushes_somebody_who_flies(human: wb.Figure) -> None:
+    t = np.arange(20) / 100.0
+    q = np.tile(human.posture("standing"), (20, 1))
+    q[:, 2] += 1.0 + 2.0 * t - 0.5 * GRAVITY * t**2
+    q[:, 0] += 3.0 * t
+    found = torques(wb.Clip(human, q, 0.01), cutoff=None)
+    assert not found.supported.any()
+    assert np.abs(found.missing).max() < 1e-6
+    assert np.abs(found.torque).max() < 1e-6
+    assert not found.force.any()
+
+
+def test_what_the_ground_cannot_give_is_said(human: wb.Figure) -> None:
+    q = np.tile(human.posture("standing"), (60, 1))
+    q[20:40, 2] += 0.3  # hovers
+    found = torques(wb.Clip(human, q, 0.01), cutoff=None)
+    assert found.supported[[5, 30, 55]].tolist() == [True, False, True]
+    assert found.missing[30, 2] == pytest.approx(GRAVITY * pin.computeTotalMass(human.model), rel=1e-6)
+    assert "the ground cannot give" in str(found)
+
+
+PENDULUM = """<robot name="pendulum"><link name="base"/>
+<link name="one"><inertial><origin xyz="0 0 -0.3"/><mass value="2"/>
+<inertia ixx="0.02" iyy="0.03" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="two"><inertial><origin xyz="0 0.05 -0.2"/><mass value="1"/>
+<inertia ixx="0.01" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="a" type="revolute"><parent link="base"/><child link="one"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
+<joint name="b" type="revolute"><parent link="one"/><child link="two"/><origin xyz="0 0 -0.6"/><axis xyz="0.6 0.8 0"/>
+<limit lower="-3" upper="3" effort="9" velocity="9"/></joint></robot>"""
+
+
+def test_a_pendulum_that_swings_freely_needs_no_torque(tmp_path: Path) -> None:
+    (tmp_path / "pendulum.urdf").write_text(PENDULUM)
+    arm = wb.load(tmp_path / "pendulum.urdf")
+    model = arm.model
+    q, v = np.array([0.8, -0.3]), np.zeros(2)
+    frames, dt = [], 1e-3
+    data = model.createData()
+    for _ in range(300):
+        frames.append(q)
+        v = v + dt * pin.aba(model, data, q, v, np.zeros(2))  # symplectic Euler: its second differences are exact
+        q = q + dt * v
+    found = torques(wb.Clip(arm, np.array(frames), dt), cutoff=None)
+    weight = np.abs(pin.computeGeneralizedGravity(model, data, frames[0])).max()
+    assert np.abs(found.torque[2:-2]).max() < 0.01 * weight
+    assert found.feet == ()
+    assert not found.missing.any()
+
+
+def test_the_ground_pushes_within_its_friction_and_does_not_pull() -> None:
+    rng = np.random.default_rng(0)
+    points = np.array([[0.1, 0.1, 0], [0.1, -0.1, 0], [-0.1, 0.1, 0], [-0.1, -0.1, 0]])
+    for _ in range(50):
+        wrench = rng.normal(size=6) * [300, 300, 900, 60, 60, 20]
+        found = ground_forces(wrench, np.array([0.0, 0.0, 1.0]), points, 0.6)
+        assert (found.forces[:, 2] >= 0.0).all()
+        assert (np.linalg.norm(found.forces[:, :2], axis=1) <= 0.6 * found.forces[:, 2] + 1e-9).all()
+        total = np.concatenate([found.forces.sum(axis=0), np.cross(points - [0.0, 0.0, 1.0], found.forces).sum(axis=0)])
+        np.testing.assert_allclose(total + found.missing, wrench, atol=1e-6)
+
+
+def test_noise_of_recordings_is_filtered_and_slow_motion_is_not(human: wb.Figure) -> None:
+    clip = swaying(human, 240, 1 / 120)
+    noise = np.random.default_rng(1).normal(scale=0.002, size=clip.q.shape)
+    noise[:, 3:7] = 0.0
+    noisy = clip.with_q(clip.q + noise)
+    clean, wild = smoothed(noisy), noisy
+    inside = slice(30, -30)
+    assert np.abs(clean.q - clip.q)[inside].max() < 0.005
+    true, kept = clip.accelerations()[inside], clean.accelerations()[inside]
+    assert np.abs(kept - true).max() < 0.05 * np.abs(wild.accelerations()[inside] - true).max()
+    assert smoothed(clip, None) is clip
+
+
+@pytest.mark.parametrize(("sex", "table"), [("male", MALE), ("female", FEMALE)])
+def test_strength_is_the_table_at_its_percentiles_and_grows_between(
+    human: wb.Figure, sex: str, table: dict[str, tuple[float, ...]]
+) -> None:
+    knee = human.model.joints[human.joint_id("left_knee_flexion")].idx_v
+    before = 0.0
+    for percentile in (5, 20, 50, 80, 95):
+        lower, upper = Strength(percentile, sex).limits(human)
+        assert upper[knee] > before
+        before = upper[knee]
+        if percentile in (5, 50, 95):
+            place = (5, 50, 95).index(percentile)
+            assert upper[knee] == pytest.approx(table["knee flexion"][place])
+            assert -lower[knee] == pytest.approx(table["knee extension"][place])
+    wrist = human.model.joints[human.joint_id("left_wrist_flexion")].idx_v
+    assert np.isinf(Strength(50, sex).limits(human)[1][wrist])
+
+
+def test_a_deep_squat_needs_more_of_the_knees_than_standing(human: wb.Figure) -> None:
+    straight = torques(wb.Clip(human, np.tile(human.posture("standing"), (3, 1)), 0.1))
+    q = human.posture("standing").copy()
+    for side in ("left", "right"):
+        for name, angle in (("hip_flexion", 1.2), ("knee_flexion", 1.5), ("ankle_dorsiflexion", 0.5)):
+            q[human.model.joints[human.joint_id(f"{side}_{name}")].idx_q] = angle
+    bent = torques(wb.Clip(human, np.tile(q, (3, 1)), 0.1))
+    assert bent.largest()["left_knee_flexion"] > straight.largest()["left_knee_flexion"] + 20.0
+    knee = human.model.joints[human.joint_id("left_knee_flexion")].idx_v
+    assert bent.torque[1, knee] < 0.0  # the extensors work
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"friction": 0.0}, "friction"),
+        ({"cutoff": -1.0}, "cutoff"),
+        ({"strength": 50}, "strength"),
+        ({"feet": "left_foot"}, "feet"),
+        ({"feet": []}, "feet"),
+    ],
+)
+def test_wrong_settings_are_refused(human: wb.Figure, options: dict[str, object], message: str) -> None:
+    clip = wb.Clip(human, human.posture("standing")[None], 0.1)
+    with pytest.raises(wb.InputError, match=message):
+        torques(clip, **options)  # type: ignore[arg-type]
+
+
+def test_wrong_strength_is_refused() -> None:
+    with pytest.raises(wb.InputError, match="percentile"):
+        Strength(percentile=1)
+    with pytest.raises(wb.UnknownNameError, match="sex"):
+        Strength(sex="x")

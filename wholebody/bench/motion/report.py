@@ -1,0 +1,135 @@
+"""Tables and charts of `wholebody bench motion`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wholebody.bench import plot_style
+from wholebody.bench.motion.measuring import CHECKED, MotionRow
+from wholebody.bench.report import render
+
+DEEP = 0.1  # mm: what may remain, in frames and in between
+ASKED = {"jerk": 1.2, "sliding_mm": 1.0, "hand_mm": 1.0}
+REAL_TIME = {"check": 0.1, "bisection": 1.0, "frames": 1.0, "trajectory": 2.0}
+"""Seconds for each second of motion that are asked of a method."""
+
+LOOKS = {"trajectory": ("#0072b2", "o"), "bisection": ("#d55e00", "s"), "frames": ("#009e73", "^"),
+         "fade": ("#8c8c8c", "X"), "check": ("#000000", ".")}  # fmt: skip
+
+DRAWN = (
+    ("distance_mm", "deviation of the joints' centres, mm", None),
+    ("jerk", "jerk, of that before", 1.2),
+    ("sliding_mm", "standing feet slide, mm", 1.0),
+)
+"""Column, title and what is asked."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """All cases of one method.
+
+    Attributes:
+        method: its name.
+        cases: how many were asked.
+        rows: those with an answer.
+        asked: seconds for each second of motion that are asked for; infinite where nothing is.
+    """
+
+    method: str
+    cases: int
+    rows: tuple[MotionRow, ...]
+    asked: float
+
+    @property
+    def free(self) -> int:
+        """How many clips are free and within limits."""
+        return sum(row.outcome == "free" for row in self.rows)
+
+    def of(self, name: str) -> list[float]:
+        """A column of all answers."""
+        return [float(getattr(row, name)) for row in self.rows]
+
+    def most(self, name: str) -> float:
+        """The greatest value of a column; not a number without answers."""
+        return max(self.of(name), default=float("nan"))
+
+
+def standings(rows: Sequence[MotionRow]) -> list[Standing]:
+    """The methods in the order in which they were asked."""
+    found = []
+    for method in dict.fromkeys(row.method for row in rows):
+        own = [row for row in rows if row.method == method]
+        answers = tuple(row for row in own if row.measured)
+        found.append(Standing(method, len(own), answers, REAL_TIME.get(method, float("inf"))))
+    return found
+
+
+def against_bisection(rows: Sequence[MotionRow]) -> float:
+    """Median of the trajectory's deviation in parts of bisection's, where both end free; not a number without."""
+    free = {row.key: row.angle for row in rows if row.outcome == "free"}
+    ratios = [
+        angle / free[clip, worn, "bisection"]
+        for (clip, worn, method), angle in free.items()
+        if method == "trajectory" and free.get((clip, worn, "bisection"), 0.0) > 0.0
+    ]
+    return float(np.median(ratios)) if ratios else float("nan")
+
+
+def report(rows: Sequence[MotionRow], facts: Mapping[str, str]) -> str:
+    """The tables as Markdown."""
+    return render(
+        "motion.md",
+        standings=[each for each in standings(rows) if each.method != CHECKED],
+        checks=[row for row in rows if row.method == CHECKED and row.measured],
+        rows=[row for row in rows if row.method != CHECKED and row.measured],
+        missing=[row for row in rows if not row.measured],
+        ratio=against_bisection(rows),
+        asked=ASKED,
+        deep=DEEP,
+        facts=facts,
+    )
+
+
+def chart(rows: Sequence[MotionRow], path: Path) -> tuple[Path, Path]:
+    """Deviation, jerk and sliding against seconds for each second of motion; a point a clip, hollow where not free."""
+    drawn, axes = plot_style.figure(1, len(DRAWN), (10.5, 3.6))
+    for axis, (name, title, asked) in zip(axes[0], DRAWN, strict=True):
+        for each in standings([row for row in rows if row.method != CHECKED]):
+            color, marker = LOOKS.get(each.method, ("#882255", "p"))
+            for outcome, face in (("free", color), ("left", "none")):
+                own = [row for row in each.rows if row.outcome == outcome]
+                axis.scatter(
+                    [row.slowness for row in own], [max(getattr(row, name), 1e-3) for row in own], s=22, marker=marker,
+                    facecolors=face, edgecolors=color, linewidths=0.9, label=each.method if outcome == "free" else None,
+                )  # fmt: skip
+        if asked is not None:
+            axis.axhline(asked, color="#555555", linewidth=0.9, linestyle=":")
+        axis.axvline(1.0, color="#555555", linewidth=0.9, linestyle=":")
+        plot_style.plain_log(axis)
+        axis.set_yscale("log")
+        axis.set_xlabel("CPU seconds a second of motion")
+        axis.set_title(title, fontsize=10)
+    if axes[0][0].get_legend_handles_labels()[0]:
+        axes[0][0].legend(fontsize=8, frameon=False)
+    return plot_style.save(drawn, path)
+
+
+def check_chart(rows: Sequence[MotionRow], path: Path) -> tuple[Path, Path]:
+    """CPU time of a check a frame, by clip; a point a piece of equipment."""
+    own = [row for row in rows if row.measured]
+    names = list(dict.fromkeys(row.clip for row in own))
+    drawn, axes = plot_style.figure(1, 1, (7.4, 0.9 + 0.32 * len(names)))
+    axis = axes[0][0]
+    for row in own:
+        color, marker = LOOKS.get(row.method, ("#882255", "p"))
+        axis.scatter(row.check_ms, names.index(row.clip), s=18, color=color, marker=marker)
+    axis.axvline(1e3 / 30.0 / 10.0, color="#555555", linewidth=0.9, linestyle=":")
+    axis.set_yticks(range(len(names)), names)
+    axis.set_ylim(len(names) - 0.4, -0.6)
+    axis.set_xlim(left=0.0)
+    axis.set_xlabel("CPU time of a check, ms a frame (dotted: a tenth of real time at 30 Hz)")
+    return plot_style.save(drawn, path)

@@ -1,0 +1,64 @@
+"""`wholebody bench motion`: clips freed of collisions by each method."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from wholebody.cli.bench.publishing import add_common, check_count, publish
+
+CAPTIONS = {
+    "motion": "Deviation, jerk and sliding against seconds for each second of motion; hollow: not free; dotted: asked",
+    "motion-check": "CPU time of a check of each clip, a point for each piece of equipment",
+}
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "motion",
+        help="clips freed of collisions by each method, with each piece of equipment",
+        description="Free clips of collisions by each method, with each piece of equipment, and judge every frame and "
+        "every motion between frames; clips that need no recordings, and the recordings of a folder. Each case runs in "
+        "a process of its own. A run that was ended goes on where its folder holds what was measured.",
+    )
+    parser.add_argument(
+        "--clips", type=Path, metavar="DIR", help="folder of recordings (BVH), beside the built-in clips"
+    )
+    parser.add_argument("--only", nargs="+", metavar="CLIP", help="names of clips (default: all)")
+    parser.add_argument("--equipment", nargs="+", metavar="NAME", help="what is worn (default: all)")
+    parser.add_argument("--methods", nargs="+", metavar="NAME", help="methods, and check (default: all)")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="cases at a time (default: 1)")
+    parser.set_defaults(run=run)
+    add_common(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, or go on; --quick takes two clips with two pieces of equipment."""
+    from wholebody.bench.machine import machine
+    from wholebody.bench.motion import cases, measuring, report
+    from wholebody.motion.avoidance import METHODS
+
+    check_count(arguments.jobs, "--jobs")
+    recordings = {path.stem: path for path in cases.recordings(arguments.clips)}
+    known: dict[str, Path | None] = {**dict.fromkeys(cases.SYNTHETIC), **recordings}
+    names = cases.chosen(arguments.only, tuple(known), "--only")
+    worn = cases.chosen(arguments.equipment, cases.EQUIPMENT, "--equipment")
+    ways = cases.chosen(arguments.methods, (measuring.CHECKED, *METHODS), "--methods")
+    if arguments.quick:
+        names, worn = names[:2], worn[:2]
+    facts = machine()
+    rows = measuring.run(
+        {name: known[name] for name in names}, worn, ways, arguments.out, facts, arguments.jobs, _tell
+    )  # fmt: skip
+    charts = {}
+    if any(row.measured and row.method != measuring.CHECKED for row in rows):
+        charts["motion"] = report.chart(rows, arguments.out / "motion")
+    if any(row.measured for row in rows):
+        charts["motion-check"] = report.check_chart(rows, arguments.out / "motion-check")
+    publish("motion", report.report(rows, facts), charts, CAPTIONS, arguments)
+    return 0
+
+
+def _tell(done: int, count: int, said: str) -> None:
+    print(f"{done} of {count}: {said}", flush=True)

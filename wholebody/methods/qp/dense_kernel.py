@@ -1,0 +1,72 @@
+"""Small dense linear algebra as compiled loops: at these sizes a call to BLAS costs more than its work."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.compiled import compiled
+
+
+@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
+def dot(a: Array, b: Array) -> float:
+    """The product of two vectors."""
+    total = 0.0
+    for i in range(len(b)):
+        total += a[i] * b[i]
+    return total
+
+
+@compiled()
+def add(factor: float, row: Array, total: Array) -> None:
+    """Add a multiple of a row to a vector, in place."""
+    for i in range(len(total)):
+        total[i] += factor * row[i]
+
+
+@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
+def gram(scaled: Array, stacked: Array, size: int, system: Array) -> None:
+    """Lower triangle (size, size) of the products of rows, four at a time."""
+    n = stacked.shape[1]
+    for r in range(size):
+        own = scaled[r]
+        s = 0
+        while s + 3 <= r:
+            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+            for i in range(n):
+                entry = own[i]
+                a += entry * stacked[s, i]
+                b += entry * stacked[s + 1, i]
+                c += entry * stacked[s + 2, i]
+                d += entry * stacked[s + 3, i]
+            system[r, s], system[r, s + 1], system[r, s + 2], system[r, s + 3] = a, b, c, d
+            s += 4
+        while s <= r:
+            system[r, s] = dot(own, stacked[s])
+            s += 1
+
+
+@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
+def solve(system: Array, right: Array) -> bool:
+    """Solve a symmetric positive definite system in place by Cholesky's L L'; false where it is not one."""
+    size = len(right)
+    for i in range(size):
+        for j in range(i + 1):
+            total = system[i, j]
+            for p in range(j):
+                total -= system[i, p] * system[j, p]
+            if j < i:
+                system[i, j] = total / system[j, j]
+            elif total > 0.0:
+                system[i, i] = np.sqrt(total)
+            else:
+                return False
+        total = right[i]
+        for p in range(i):
+            total -= system[i, p] * right[p]
+        right[i] = total / system[i, i]
+    for i in range(size - 1, -1, -1):
+        right[i] /= system[i, i]
+        for p in range(i):
+            right[p] -= system[i, p] * right[i]
+    return True

@@ -1,0 +1,210 @@
+"""The text of a BVH file: joints, channels and numbers, every fault with its line.
+
+pybvh says no lines of faults in the motion, and refuses joints with positions or with less than three rotations.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.checks import TIME_STEP
+from wholebody.errors import FileFormatError, one_line
+from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
+
+CHANNEL = re.compile(r"([XYZ])(position|rotation)", re.IGNORECASE)
+MOST_JOINTS = 1000
+DEEPEST = 200  # braces within braces
+
+
+@dataclass
+class BvhJoint:
+    """A joint, or the end of a limb, which has no channels.
+
+    Attributes:
+        name: such as "LeftUpLeg".
+        parent: index, -1 for the root.
+        offset: in the parent's axes, units of the file.
+        channels: (axis, "position" or "rotation") in the order of the file.
+        line: where it begins.
+    """
+
+    name: str
+    parent: int
+    line: int
+    offset: tuple[float, ...] = ()
+    channels: list[tuple[str, str]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class BvhText:
+    """What the text says.
+
+    Attributes:
+        joints: parents before children.
+        table: (frames, channels) numbers of the motion.
+        dt: seconds.
+    """
+
+    joints: list[BvhJoint]
+    table: Array
+    dt: float
+
+
+def parsed(text: str, name: str) -> BvhText:
+    """Joints and numbers of a BVH text.
+
+    Args:
+        text: of the file.
+        name: of the file, for messages.
+
+    Raises:
+        FileFormatError: with the line, what is wrong.
+    """
+    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+    place = _Hierarchy(name, lines).read()
+    frames, rest = _counted(name, lines, place.at, r"frames:\s*(\S+)", "Frames:")
+    step, rest = _counted(name, lines, rest, r"frame\s+time:\s*(\S+)", "Frame Time:")
+    number = lines[rest - 2][0]
+    count = _whole(frames, f"{name}, line {number}")
+    if not 1 <= count <= MOST_FRAMES:
+        raise FileFormatError(f"{name}, line {number}: {count} frames; give 1 to {MOST_FRAMES}")
+    number = lines[rest - 1][0]
+    dt = _number(step, f"{name}, line {number}")
+    if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
+        raise FileFormatError(f"{name}, line {number}: the frame time is {dt:g} s; give a positive one")
+    wide = sum(len(joint.channels) for joint in place.joints)
+    table = np.empty((min(count, len(lines)), wide))
+    rows = lines[rest:]
+    for k, (number, line) in enumerate(rows[:count]):
+        words = line.split()
+        if len(words) != wide:
+            raise FileFormatError(f"{name}, line {number}: {len(words)} values for {wide} channels")
+        try:
+            table[k] = words
+        except ValueError:
+            table[k] = [_number(word, f"{name}, line {number}") for word in words]
+        wrong = np.flatnonzero(~(np.abs(table[k]) <= LARGEST))
+        if len(wrong):
+            raise FileFormatError(
+                f"{name}, line {number}: value {wrong[0] + 1} is {words[wrong[0]][:20]}; mend the frame"
+            )
+    if len(rows) != count:
+        number = rows[-1][0] if rows else number
+        what = "cut off" if len(rows) < count else "longer than it says"
+        raise FileFormatError(f"{name}, line {number}: {len(rows)} frames and not {count}; the file is {what}")
+    return BvhText(place.joints, table, dt)
+
+
+class _Hierarchy:
+    """Reads the lines of the joints."""
+
+    def __init__(self, name: str, lines: list[tuple[int, str]]) -> None:
+        self.name, self.lines = name, lines
+        self.joints: list[BvhJoint] = []
+        self.at = 0
+        self._open: list[int] = []
+
+    def read(self) -> _Hierarchy:
+        """Read up to and with the line MOTION; `at` is the line after it."""
+        if not self.lines or self.lines[0][1].upper() != "HIERARCHY":
+            raise FileFormatError(f"{self.name}, line 1: is no BVH file; its first line is not HIERARCHY")
+        for at, (number, line) in enumerate(self.lines[1:], 2):
+            self.at = at
+            if line.upper() == "MOTION":
+                break
+            self._line(f"{self.name}, line {number}", number, line)
+        else:
+            raise FileFormatError(f"{self.name}, line {self.lines[-1][0]}: the file is cut off; there is no MOTION")
+        where = f"{self.name}, line {self.lines[self.at - 1][0]}"
+        if self._open:
+            raise FileFormatError(f"{where}: {len(self._open)} braces are not closed before MOTION")
+        if not self.joints:
+            raise FileFormatError(f"{where}: there is no ROOT")
+        for joint in self.joints:
+            if len(joint.offset) != 3:
+                raise FileFormatError(f"{self.name}, line {joint.line}: {one_line(joint.name)} has no OFFSET")
+        if sum(kind == "position" for _, kind in self.joints[0].channels) != 3:
+            raise FileFormatError(f"{self.name}, line {self.joints[0].line}: the root has not three position channels")
+        return self
+
+    def _line(self, where: str, number: int, line: str) -> None:
+        word, _, rest = line.partition(" ") if " " in line else line.partition("\t")
+        word, rest = word.upper(), rest.strip()
+        if word in ("ROOT", "JOINT", "END"):
+            self._begin(where, number, word, rest)
+        elif line == "{":
+            if not self.joints or len(self._open) > DEEPEST:
+                raise FileFormatError(f"{where}: a brace that opens no joint")
+        elif line == "}":
+            if not self._open:
+                raise FileFormatError(f"{where}: a brace that closes nothing")
+            self._open.pop()
+        elif word in ("OFFSET", "CHANNELS") and self._open:
+            self._field(where, self.joints[self._open[-1]], word, rest.split())
+        else:
+            raise FileFormatError(f"{where}: {one_line(line, 40)!r} is no line of a hierarchy")
+
+    def _begin(self, where: str, number: int, word: str, rest: str) -> None:
+        name = rest.removesuffix("{").strip()
+        if word == "ROOT" and self.joints:
+            raise FileFormatError(f"{where}: a second root, {one_line(name)!r}; give each skeleton a file of its own")
+        if word != "ROOT" and not self._open:
+            raise FileFormatError(f"{where}: {word} outside of the root")
+        if len(self.joints) >= MOST_JOINTS:
+            raise FileFormatError(f"{where}: more than {MOST_JOINTS} joints")
+        parent = self._open[-1] if self._open else -1
+        if word == "END":
+            name = f"{self.joints[parent].name}_end"
+        if not name:
+            raise FileFormatError(f"{where}: a joint without a name")
+        while word == "END" and any(joint.name == name for joint in self.joints):
+            name += "_"
+        if any(joint.name == name for joint in self.joints):
+            raise FileFormatError(f"{where}: a second joint is called {one_line(name)!r}; rename one")
+        self._open.append(len(self.joints))
+        self.joints.append(BvhJoint(name, parent, number))
+
+    def _field(self, where: str, joint: BvhJoint, word: str, words: list[str]) -> None:
+        if word == "OFFSET":
+            if joint.offset or len(words) != 3:
+                raise FileFormatError(f"{where}: an OFFSET has three numbers, once for each joint")
+            joint.offset = tuple(_number(value, where) for value in words)
+            return
+        found = [CHANNEL.fullmatch(value) for value in words[1:]]
+        if not words or joint.channels or words[0] != str(len(found)) or None in found:
+            raise FileFormatError(
+                f"{where}: CHANNELS are a count and as many names, such as 3 Zrotation Xrotation Yrotation"
+            )
+        joint.channels = [(match[1].upper(), match[2].lower()) for match in found if match]
+        if len(set(joint.channels)) != len(joint.channels):
+            raise FileFormatError(f"{where}: a channel stands there twice")
+
+
+def _counted(name: str, lines: list[tuple[int, str]], at: int, pattern: str, word: str) -> tuple[str, int]:
+    if at >= len(lines):
+        raise FileFormatError(f"{name}, line {lines[-1][0]}: the file is cut off; there is no {word}")
+    number, line = lines[at]
+    match = re.fullmatch(pattern, line, re.IGNORECASE)
+    if match is None:
+        raise FileFormatError(f"{name}, line {number}: {one_line(line, 40)!r} stands where {word} is due")
+    return match[1], at + 1
+
+
+def _whole(word: str, where: str) -> int:
+    if not re.fullmatch(r"\d{1,9}", word):
+        raise FileFormatError(f"{where}: {one_line(word, 20)!r} is no number of frames")
+    return int(word)
+
+
+def _number(word: str, where: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        raise FileFormatError(f"{where}: {one_line(word, 20)!r} is no number") from None
+    if not abs(value) <= LARGEST:
+        raise FileFormatError(f"{where}: {one_line(word, 20)} is not finite or beyond {LARGEST:g}")
+    return value

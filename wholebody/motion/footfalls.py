@@ -1,0 +1,130 @@
+"""Feet that stand: when, and where the floor is."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array, Mask
+from wholebody.motion.roles import Roles
+from wholebody.motion.skeleton import SkeletonMotion
+
+SLOW = 0.25
+"""Metres a second: a foot that is slower may stand."""
+
+LOW = 0.05
+"""Metres above its height when it stands: a foot that is lower may stand."""
+
+SHORTEST = 0.1
+"""Seconds: a foot that is slow and low for less time is not held."""
+
+BLEND = 0.15
+"""Seconds before and after a foot stands, over which it goes from its own way to where it stands."""
+
+
+class Footfalls(NamedTuple):
+    """When parts of the feet stand.
+
+    Attributes:
+        stands: role to (n,) whether it stands.
+        heights: role to its height while it stands, metres.
+    """
+
+    stands: dict[str, Mask]
+    heights: dict[str, float]
+
+
+def footfalls(motion: SkeletonMotion, roles: Roles) -> Footfalls:
+    """When the ankles and toes of a skeleton stand."""
+    stands, heights = {}, {}
+    for part in ("ankle", "toe"):
+        pair = {
+            f"{side}_{part}": motion.names.index(roles.joints[f"{side}_{part}"])
+            for side in ("left", "right")
+            if f"{side}_{part}" in roles.joints
+        }
+        places = {role: motion.positions[:, joint] for role, joint in pair.items()}
+        speeds = {role: _speed(at, motion.dt) for role, at in places.items()}
+        slow = [at[speeds[role] < SLOW, 2] for role, at in places.items()]
+        low = np.concatenate(slow) if slow else np.zeros(0)
+        if not len(low):
+            continue
+        height = float(np.percentile(low, 10))
+        for role, at in places.items():
+            heights[role] = height
+            stands[role] = _longer((speeds[role] < SLOW) & (at[:, 2] < height + LOW), round(SHORTEST / motion.dt))
+    return Footfalls(stands, heights)
+
+
+def held(
+    points: dict[str, Array], steps: Footfalls, places: dict[str, Array], lowest: float, dt: float
+) -> dict[str, Array]:
+    """The goals of points with feet that stand at one place each, at the height at which the figure's stand.
+
+    Before and after it stands, a foot goes over from its own way to that place and back.
+
+    Args:
+        points: role to (n, 3), metres.
+        steps: when the feet stand.
+        places: role to (3,) place in the figure's neutral posture, which stands.
+        lowest: height of the figure's lowest point in it.
+        dt: seconds from frame to frame.
+    """
+    found = dict(points)
+    for part in ("toe", "ankle"):
+        for side in ("left", "right"):
+            role, toe = f"{side}_{part}", f"{side}_toe"
+            if role not in steps.stands or role not in points:
+                continue
+            corrections = []
+            for first, last in runs(steps.stands[role]):
+                frames = slice(first, last)
+                place = points[role][frames].mean(axis=0)
+                if part == "ankle" and toe in steps.stands and steps.stands[toe][frames].all():
+                    ahead = found[toe][frames].mean(axis=0)  # the toes stand already: keep the length of the foot
+                    place = ahead + (points[role][frames] - points[toe][frames]).mean(axis=0)
+                    flat = place[:2] - ahead[:2]
+                    rise = places[role][2] - places[toe][2]
+                    length = np.linalg.norm(places[role] - places[toe])
+                    place[:2] = ahead[:2] + flat / np.linalg.norm(flat) * np.sqrt(max(length**2 - rise**2, 0.0))
+                place[2] = places[role][2] - lowest
+                corrections.append((first, last, place))
+            found[role] = _blended(points[role], corrections, max(1, round(BLEND / dt)))
+    return found
+
+
+def _blended(way: Array, places: list[tuple[int, int, Array]], over: int) -> Array:
+    """A way (n, 3) that rests at places over some frames each, and goes over to and from them."""
+    frames = np.arange(len(way))
+    total, weights = np.zeros_like(way), np.zeros(len(way))
+    for first, last, place in places:
+        away = np.maximum(first - frames, frames - (last - 1))
+        share = 0.5 + 0.5 * np.cos(np.pi * np.clip(away / over, 0.0, 1.0))
+        near = np.clip(frames, first, last - 1)
+        total += share[:, None] * np.where((away > 0)[:, None], place - way[near], place - way)
+        weights += share
+    found: Array = way + total / np.maximum(weights, 1.0)[:, None]
+    return found
+
+
+def runs(mask: Mask) -> list[tuple[int, int]]:
+    """First frame of each run, and the frame after its last one."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _speed(places: Array, dt: float) -> Array:
+    if len(places) < 2:
+        return np.zeros(len(places))
+    found: Array = np.linalg.norm(np.gradient(places, dt, axis=0), axis=1)
+    return found
+
+
+def _longer(mask: Mask, least: int) -> Mask:
+    """The mask without runs that are shorter."""
+    kept = np.zeros_like(mask)
+    for first, last in runs(mask):
+        if last - first >= max(1, least):
+            kept[first:last] = True
+    return kept

@@ -1,0 +1,297 @@
+"""Torques of a clip: inverse dynamics, forces of the ground on feet that stand, centre of pressure, strength."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from scipy.signal import butter, sosfiltfilt
+
+from wholebody import checks
+from wholebody.arrays import Array, Mask
+from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
+from wholebody.motion.clip import Clip
+from wholebody.motion.feet import foot_points, paths, standing
+from wholebody.motion.ground_forces import ground_forces
+from wholebody.motion.strength import Strength
+from wholebody.tasks.support import low_points
+
+ROOT_SIZE = 6
+FEET = ("left_foot", "right_foot")
+CUTOFF = 6.0
+"""Hz: noise of recordings lies above, most of walking below (D. A. Winter, "Biomechanics and motor control of human
+movement", chapter 2.2.4: 4 to 6 Hz for walking)."""
+
+ORDER = 2
+"""Of the Butterworth filter; it runs forward and backward, so without delay and with twice this order (Winter)."""
+
+SOLE = 0.02
+"""Metres above a sole's lowest point up to which its corners bear force: soles are rounded, recordings uneven."""
+
+SPREAD_CORNERS = 12
+"""Most points of one foot: the outermost ones in as many directions. Fewer cut off the ends of a rounded sole."""
+
+
+@dataclass(frozen=True, eq=False)
+class Torques:
+    """Torques of a clip, frame by frame; nothing in it is NaN.
+
+    Attributes:
+        figure: the figure.
+        dt: seconds from frame to frame.
+        torque: (n, nv) torque of each joint, N m (force of sliding joints, N), after the ground's forces; positive
+            towards positive angles. The six columns of a free root hold what is missing (see there).
+        feet: names of the feet.
+        force: (n, feet, 3) force of the ground on each foot, N, in the world. It acts on the foot's segment; the
+            joint of the toes bears nothing.
+        moment: (n, feet, 3) moment of the ground on each foot about its centre of pressure, N m, in the world.
+        pressure: (n, feet, 3) centre of pressure of each foot, metres; zero where the foot bears nothing.
+        center_of_pressure: (n, 3) of both feet together, metres; zero where nothing bears.
+        supported: (n,) whether a foot stands in the frame.
+        missing: (n, 6) what the ground cannot give of the wrench that the motion needs: force, N, and moment about the
+            centre of mass, N m, in the world. Zero for a motion that is possible on these feet.
+        lower: (nv,) least torque of each joint, N m; -inf without a published strength.
+        upper: (nv,) largest torque of each joint, N m; inf without a published strength.
+    """
+
+    figure: Figure
+    dt: float
+    torque: Array = field(repr=False)
+    feet: tuple[str, ...]
+    force: Array = field(repr=False)
+    moment: Array = field(repr=False)
+    pressure: Array = field(repr=False)
+    center_of_pressure: Array = field(repr=False)
+    supported: Mask = field(repr=False)
+    missing: Array = field(repr=False)
+    lower: Array = field(repr=False)
+    upper: Array = field(repr=False)
+
+    @property
+    def share(self) -> Array:
+        """(n, nv) torque as a share of the strength in its direction; more than 1 is more than the person can."""
+        limit = np.where(self.torque >= 0.0, self.upper, -self.lower)
+        found: Array = np.abs(self.torque) / limit
+        return found
+
+    @property
+    def beyond(self) -> Mask:
+        """(n,) frames in which a joint needs more than its strength."""
+        return np.asarray((self.share > 1.0).any(axis=1))
+
+    def largest(self) -> dict[str, float]:
+        """Largest absolute torque of each joint over the clip, N m, by name."""
+        peaks = np.abs(self.torque).max(axis=0)
+        found = {}
+        for name in self.figure.joints:
+            joint = self.figure.model.joints[self.figure.joint_id(name)]
+            found[name] = float(peaks[joint.idx_v : joint.idx_v + joint.nv].max())
+        return found
+
+    def __str__(self) -> str:
+        """Three lines: the joint nearest to its strength, what the ground cannot give, and how many frames stand."""
+        share = self.share
+        frame, column = (int(k) for k in np.unravel_index(np.argmax(share), share.shape))
+        names = {self.figure.model.joints[self.figure.joint_id(name)].idx_v: name for name in self.figure.joints}
+        first = "no joint has a published strength"
+        if np.isfinite(self.lower).any():
+            first = (
+                f"{names[column]} needs {abs(self.torque[frame, column]):.0f} N m, {share[frame, column]:.0%} of its "
+                f"strength, at {frame * self.dt:.2f} s; {int(self.beyond.sum())} of {len(self.torque)} frames need "
+                "more than the strength of a joint"
+            )
+        force, moment = (np.linalg.norm(part, axis=1) for part in (self.missing[:, :3], self.missing[:, 3:]))
+        return (
+            f"{first}\nthe ground cannot give up to {force.max():.0f} N and {moment.max():.0f} N m (median "
+            f"{np.median(force):.0f} N, {np.median(moment):.0f} N m)\na foot stands in {int(self.supported.sum())} of "
+            f"{len(self.torque)} frames"
+        )
+
+
+def torques(
+    clip: Clip,
+    *,
+    feet: Sequence[str] = FEET,
+    strength: Strength | None = None,
+    friction: float = 0.8,
+    cutoff: float | None = CUTOFF,
+) -> Torques:
+    """Torques of a clip by inverse dynamics (recursive Newton-Euler, Featherstone 2008, chapter 5; `pin.rnea`).
+
+    A figure with a free root stands on feet: the wrench that its motion needs at the root is split over the corners
+    of the soles of the feet that stand, on level ground and with friction, and acts on the joints from there. In flight
+    the ground gives nothing.
+
+    Args:
+        clip: the motion.
+        feet: segments that may stand; the figure's own of these. A foot stands while its heel, ball or tip of the toes
+            is low and slow; without frames of such names, while its own frame is.
+        strength: of the person, for `lower`, `upper` and `share`; a man of median strength if left out.
+        friction: coefficient of friction of the ground.
+        cutoff: Hz of the low-pass filter (Butterworth, zero lag) that takes the noise of recordings out before
+            differences amplify it; None for none. It is not used where the frame rate is less than four times of it.
+
+    Raises:
+        UnknownNameError: the figure has no such foot.
+        InputError: something else than a clip, a value out of range, or a figure without mass or feet.
+    """
+    clip = checks.instance(clip, Clip, "torques: clip", "read one with wb.read_clip(path, figure)")
+    checks.number(friction, "torques: friction", 1e-3, 100.0)
+    if cutoff is not None:
+        checks.number(cutoff, "torques: cutoff", 1e-3, 1e6, "Hz")
+    strength = (
+        Strength()
+        if strength is None
+        else checks.instance(strength, Strength, "torques: strength", "give wb.Strength(percentile=50, sex='female')")
+    )
+    figure = clip.figure
+    if feet is FEET:
+        feet = [name for name in FEET if name in figure.segments]
+    feet = checks.listed(feet, "torques: feet", "['left_foot', 'right_foot']")
+    for name in feet:
+        figure.frame_id(name)
+    if not sum(inertia.mass for inertia in figure.model.inertias[1:]) > 0.0:
+        raise InputError(f"torques: {figure.name} has no mass; give its segments masses")
+    moved = smoothed(clip, cutoff)
+    v, a = moved.velocities(), moved.accelerations()
+    free = figure.root == "free"
+    stands = _stands(clip, feet) if free else {}
+    soles = _Soles(figure, tuple(stands))
+    count, nv = len(clip), figure.model.nv
+    torque, missing = np.zeros((count, nv)), np.zeros((count, ROOT_SIZE))
+    force, moment, pressure = (np.zeros((count, len(stands), 3)) for _ in range(3))
+    both = np.zeros((count, 3))
+    data = figure.model.createData()
+    for k in range(count):
+        torque[k] = pin.rnea(figure.model, data, moved.q[k], v[k], a[k])
+        if not free:
+            continue
+        pin.computeJointJacobians(figure.model, data, moved.q[k])
+        center = np.array(pin.centerOfMass(figure.model, data, moved.q[k]))
+        needed = data.oMi[1].act(pin.Force(torque[k, :ROOT_SIZE])).vector
+        needed[3:] -= np.cross(center, needed[:3])
+        points, owner = soles.points(data, [bool(stands[name][k]) for name in stands])
+        found = ground_forces(needed, center, points, friction)
+        missing[k] = found.missing
+        for foot in range(len(stands)):
+            mine = owner == foot
+            force[k, foot] = found.forces[mine].sum(axis=0)
+            pressure[k, foot] = _pressure(found.forces[mine], points[mine])
+            jacobian = pin.getJointJacobian(figure.model, data, soles.joints[foot], pin.ReferenceFrame.WORLD)
+            turning = np.cross(points[mine], found.forces[mine]).sum(axis=0)
+            moment[k, foot] = turning - np.cross(pressure[k, foot], force[k, foot])
+            torque[k] -= jacobian.T @ np.concatenate([force[k, foot], turning])
+        both[k] = _pressure(found.forces, points)
+    lower, upper = strength.limits(figure)
+    supported: Mask = np.zeros(count, dtype=bool)
+    for marks in stands.values():
+        supported[marks] = True
+    names = tuple(stands)
+    return Torques(figure, clip.dt, torque, names, force, moment, pressure, both, supported, missing, lower, upper)
+
+
+def smoothed(clip: Clip, cutoff: float | None = CUTOFF) -> Clip:
+    """The clip without what is faster than a cutoff frequency, Hz: Butterworth, forward and backward (Winter).
+
+    Postures are filtered value by value; quaternions are made continuous before and of unit length after. Ends are
+    extended by reflection through the end point. A clip whose frame rate is less than four times the cutoff, or of one
+    frame, stays as it is.
+    """
+    rate = 1.0 / clip.dt
+    if cutoff is None or rate < 4.0 * cutoff:
+        return clip
+    sections = butter(ORDER, cutoff, fs=rate, output="sos")
+    reach = min(len(clip) - 1, int(np.ceil(3.0 * rate / cutoff)))
+    if reach < 1:
+        return clip
+    q = _continuous(clip)
+    return clip.with_q(_unit(clip.figure, sosfiltfilt(sections, q, axis=0, padtype="odd", padlen=reach)))
+
+
+def _continuous(clip: Clip) -> Array:
+    """Postures whose quaternions do not change sign from frame to frame."""
+    q: Array = clip.q.copy()
+    for joint in clip.figure.model.joints:
+        if joint.nq in (4, 7) and joint.nv in (3, 6):
+            part = q[:, joint.idx_q + joint.nq - 4 : joint.idx_q + joint.nq]
+            turns = np.sign(np.einsum("ij,ij->i", part[1:], part[:-1]))
+            part[1:] *= np.cumprod(np.where(turns < 0.0, -1.0, 1.0))[:, None]
+    return q
+
+
+def _unit(figure: Figure, q: Array) -> Array:
+    return np.array([pin.normalize(figure.model, posture) for posture in q])
+
+
+def _pressure(forces: Array, points: Array) -> Array:
+    """Centre of pressure (3,) of forces on points: weighted by their vertical components; zero without load."""
+    load = float(forces[:, 2].sum())
+    if load <= 0.0:
+        return np.zeros(3)
+    found: Array = forces[:, 2] @ points / load
+    return found
+
+
+def _stands(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:
+    """In which frames (n,) each foot stands."""
+    figure = clip.figure
+    found: dict[str, Mask] = {}
+    for name in feet:
+        joint = figure.model.frames[figure.frame_id(name)].parentJoint
+        points = tuple(
+            point
+            for point in foot_points(figure)
+            if joint in figure.model.supports[figure.model.frames[figure.frame_id(point)].parentJoint]
+        )
+        places = paths(figure, clip.q, points or (name,))
+        found[name] = np.any([standing(path, clip.dt) for path in places.transpose(1, 0, 2)], axis=0)
+    if not found:
+        raise InputError(f"torques: {figure.name} has no segments {' or '.join(FEET)}; name its feet with feet=[...]")
+    return found
+
+
+class _Soles:
+    """Points of feet that bear force: the lowest corners of their pieces, toes included."""
+
+    def __init__(self, figure: Figure, feet: tuple[str, ...]) -> None:
+        self._figure = figure
+        self.joints = []
+        self._pieces: list[list[Any]] = []
+        for foot in feet:
+            joint = figure.model.frames[figure.frame_id(foot)].parentJoint
+            pieces = [
+                piece for piece in figure.geometry.geometryObjects if joint in figure.model.supports[piece.parentJoint]
+            ]
+            if joint == 0 or not pieces:
+                raise InputError(f"torques: {foot} has no pieces to stand on; name segments with geometry as feet")
+            self.joints.append(joint)
+            self._pieces.append(pieces)
+
+    def points(self, data: pin.Data, stand: list[bool]) -> tuple[Array, Any]:
+        """Points (n, 3) in the world of the feet that stand, and the number of each one's foot (n,)."""
+        points, owner = [np.zeros((0, 3))], [np.zeros(0, dtype=int)]
+        for foot, stands in enumerate(stand):
+            if not stands:
+                continue
+            lows = np.vstack(
+                [
+                    low_points(piece.geometry, data.oMi[piece.parentJoint] * piece.placement)
+                    for piece in self._pieces[foot]
+                ]
+            )
+            lows = _outermost(lows[lows[:, 2] <= lows[:, 2].min() + SOLE])
+            points.append(lows)
+            owner.append(np.full(len(lows), foot))
+        return np.vstack(points), np.concatenate(owner)
+
+
+def _outermost(points: Array) -> Array:
+    """The points that are farthest in the horizontal plane in evenly spread directions."""
+    around = 2.0 * np.pi * np.arange(SPREAD_CORNERS) / SPREAD_CORNERS
+    far = np.argmax(points[:, :2] @ np.array([np.cos(around), np.sin(around)]), axis=0)
+    found: Array = points[np.unique(far)]
+    return found
