@@ -9,6 +9,7 @@ import pytest
 import wholebody as wb
 from tests.reference.linearisation import ReferenceLineariser
 from wholebody.tasks.base import Goal
+from wholebody.term_plan import make_plan
 
 
 class Squared(Goal):
@@ -220,6 +221,23 @@ def test_the_compiled_pass_is_the_plain_one_entry_by_entry(problem):
     assert rows > 30000
 
 
+def test_reach_cones_roots_and_heights_are_in_the_plan(problem):
+    """No term of the package is evaluated by its own methods, and near the target of a root its series are exact."""
+    goal = wb.Posture("sitting")
+    asked = wb.Problem(problem.scene, goals=[goal], constraints=[wb.ReachCones()], measures=[wb.PotentialEnergy(0.01)])
+    workspace = asked.workspace()
+    plan = make_plan(
+        problem.scene.figure.limits, asked.goals, asked.constraints, asked.bounds, asked.measures, None, workspace.state
+    )
+    assert plan.others == () == plan.other_measures
+    lineariser, plain = asked.lineariser(workspace), reference(asked, asked.workspace())
+    rng, target = np.random.default_rng(4), problem.scene.figure.posture("sitting")
+    for size in (0.0, 1e-9, 1e-5, 1.1e-4, 1e-2, 1.0, 2.5):
+        way = rng.normal(size=55)
+        q = pin.integrate(problem.scene.model, target, size * way / np.linalg.norm(way[3:6]))
+        assert_same(lineariser.at(q, 0.0), plain.at(q, 0.0))
+
+
 def test_goals_that_move_keep_the_plan_and_other_goals_renew_it(problem):
     """Targets alone are written anew; another class, frame or number of goals is another plan."""
     q = posture(problem, 5)
@@ -259,10 +277,11 @@ def test_joints_that_follow_others_and_round_joints(tmp_path):
         figure = wb.load(robot, root=root)
         scene = wb.Scene(figure)
         scene.add(wb.Sphere(0.1), name="ball", at=(0.1, 0.3, 0.9))
+        wanted = pin.integrate(figure.model, figure.neutral, 0.8 * np.ones(figure.model.nv))
         asked = wb.Problem(
             scene,
-            goals=[wb.Frame("l4", (0.1, 0.2, 0.8)), wb.CenterOfMass((0.1, 0.0, 0.4))],
-            measures=[wb.Effort(), wb.Displacement(), wb.Discomfort()],
+            goals=[wb.Frame("l4", (0.1, 0.2, 0.8)), wb.CenterOfMass((0.1, 0.0, 0.4)), wb.Posture(wanted)],
+            measures=[wb.Effort(), wb.Displacement(), wb.Discomfort(), wb.PotentialEnergy(0.3)],
         )
         lineariser, plain = asked.lineariser(asked.workspace()), reference(asked, asked.workspace())
         rng = np.random.default_rng(1)

@@ -24,6 +24,7 @@ import wholebody as wb
 from wholebody import tracking
 from wholebody.figures.state import State
 from wholebody.motion import measures
+from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
 from wholebody.view import Viewer
 from wholebody.view.parts import Part, Parts
 from wholebody.view.timeline import timeline
@@ -506,12 +507,28 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
     avoided = {"clip": clip, "scene": wb.Scene(arm), "constraints": [], "progress": lambda told: None}
     yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
-    for method in (wb.Trajectory, wb.PerFrame, wb.Fade):
+    for method in (wb.Trajectory, wb.PerFrame, wb.Fade, wb.Bisection):
         yield f"{method.__name__}.avoid", Call(method().avoid, avoided)
     settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "solver": "osqp", "iterations": 10}
     yield "Trajectory", Call(wb.Trajectory, settings)
     yield "PerFrame", Call(wb.PerFrame, {"clearance": 0.01, "backward": True})
     yield "Fade", Call(wb.Fade, {"clearance": 0.01, "fade": 0.2, "rounds": 2})
+    bisection = {
+        "evaluation": (0,), "buffer": 20.0, "least": 2, "interpolation": "linear", "planes": ("tool",), "frozen": (),
+        "clearance": 0.01, "method": "qp",
+    }  # fmt: skip
+    yield "Bisection", Call(wb.Bisection, bisection)
+    worn = {"name": "bag", "shape": wb.Sphere(0.1), "to": "link2", "at": at, "rests_on": ("link1",), "color": None}
+    yield "Equipment", Call(wb.Equipment, worn, lambda made: made.attach(wb.Scene(arm)))
+    bag = wb.Equipment("bag", wb.Box((0.1, 0.1, 0.1)), "link2")
+    yield "Equipment.filled", Call(bag.filled, {"count": 1, "envelope": False})
+    yield "Equipment.attach", Call(lambda scene: bag.attach(scene), {"scene": wb.Scene(arm)})
+    put = {"shape": wb.Sphere(0.1), "figure": hand, "name": "bag", "to": "left_hand", "side": "back"}
+    put |= {"height": 0.0, "sideways": 0.0, "color": None}
+    yield "Equipment.worn", Call(wb.Equipment.worn, put)
+    yield "equipment", Call(wb.equipment, {"name": "pack", "figure": hand})
+    yield "fill_with_spheres", Call(fill_with_spheres, {"shape": wb.Sphere(0.1), "count": 1, "envelope": False})
+    yield "Spheres", Call(Spheres, {"centers": [[0.0, 0.0, 0.0]], "radii": [0.1]})
     stance = {"feet": ["link1"], "speed": 0.1, "height": 0.05, "least": 0.1}
     yield "StanceFeet", Call(wb.StanceFeet, stance, lambda made: made.names(arm))
     yield "StanceFeet.names", Call(wb.StanceFeet(["link1"]).names, {"figure": arm})

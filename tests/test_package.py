@@ -32,6 +32,7 @@ ROOMS = (
         "tasks",
         "term_plan",
         "residual_kernel",
+        "coordinate_kernel",
         "term_kernel",
         "linearisation",
         "problem",

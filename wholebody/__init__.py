@@ -36,11 +36,14 @@ if TYPE_CHECKING:
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
     from wholebody.motion.avoidance import AvoidanceReport, Avoided, avoid
+    from wholebody.motion.bisection.method import Bisection
     from wholebody.motion.checking import ClipCheck, check
     from wholebody.motion.clip import Clip
+    from wholebody.motion.equipment import Equipment
     from wholebody.motion.fade import Fade
     from wholebody.motion.per_frame import PerFrame
     from wholebody.motion.reading import read_clip, read_skeleton
+    from wholebody.motion.ready_equipment import equipment
     from wholebody.motion.retargeting import retarget
     from wholebody.motion.skeleton import SkeletonMotion
     from wholebody.motion.stance import StanceFeet
@@ -88,6 +91,7 @@ __all__ = [
     "Avoided",
     "Axis",
     "Balance",
+    "Bisection",
     "Bound",
     "Box",
     "Capsule",
@@ -101,6 +105,7 @@ __all__ = [
     "Drag",
     "Effort",
     "Ellipsoid",
+    "Equipment",
     "Fade",
     "Figure",
     "FileFormatError",
@@ -143,6 +148,7 @@ __all__ = [
     "assess",
     "avoid",
     "check",
+    "equipment",
     "follow_path",
     "load",
     "read_clip",
@@ -169,7 +175,10 @@ _MODULES = {
     "wholebody.methods.solve": "solve",
     "wholebody.motion.avoidance": "AvoidanceReport Avoided avoid",
     "wholebody.motion.checking": "ClipCheck check",
+    "wholebody.motion.bisection.method": "Bisection",
     "wholebody.motion.clip": "Clip",
+    "wholebody.motion.equipment": "Equipment",
+    "wholebody.motion.ready_equipment": "equipment",
     "wholebody.motion.reading": "read_clip read_skeleton",
     "wholebody.motion.retargeting": "retarget",
     "wholebody.motion.skeleton": "SkeletonMotion",

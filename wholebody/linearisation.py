@@ -21,8 +21,11 @@ from wholebody.figures.state import State, Wrench
 from wholebody.geometry.contact_rows import MOST_ENDS
 from wholebody.geometry.proximity import Contacts
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+from wholebody.tasks.bounds import StepLimit
 from wholebody.term_plan import OtherTerm, TermPlan, checked_rows, make_plan
 from wholebody.workspace import Workspace
+
+MORE = 1e-3  # m: that pairs may come nearer than their bound; for postures that are put back into their limits first
 
 
 class Linearisation(NamedTuple):
@@ -134,6 +137,7 @@ class Lineariser:
         self._plan = self._planned(goals)
         self._passing: Passing | None = None
         self._grow(64)
+        self._approach = self._largest_approach()
         self.take(goals, clearances)
 
     def take(self, goals: Sequence[Goal], clearances: Array) -> None:
@@ -153,6 +157,7 @@ class Lineariser:
                 self._plan = again
         self.goals, self.clearances = goals, clearances
         self._largest_clearance = float(np.maximum.reduce(clearances)) if len(clearances) else 0.0
+        self._most = None if self._approach is None else clearances + self._approach
 
     def goal_rows(self) -> list[int]:
         """How many rows each goal has."""
@@ -170,6 +175,8 @@ class Lineariser:
 
     def at(self, q: Array, within: float) -> Linearisation:
         """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance.
+
+        Pairs that cannot come as near as their clearance are left out, where speeds are bounded and `dt` is given.
 
         Raises:
             InputError: q is no posture, or a term of one's own has another number of rows than at the start.
@@ -215,7 +222,7 @@ class Lineariser:
     def _contacts(self, q: Array, within: float) -> tuple[Contacts, Array, int]:
         """Contacts at a posture, the clearance asked of each, and how many rows were written of them."""
         workspace = self.workspace
-        contacts = workspace.near(q, within + self._largest_clearance)
+        contacts = workspace.near(q, within + self._largest_clearance, self._most)
         clearance = self.clearances[contacts.number]
         if len(clearance) * (1 + MOST_ENDS) > len(self._gap):
             self._grow(2 * len(clearance))
@@ -240,6 +247,14 @@ class Lineariser:
         plan = make_plan(self._limits, goals, self.constraints, self.bounds, self.measures, self.dt, self.state)
         self._term_wrench = np.empty((plan.goal_rows + plan.value_rows, 6))
         return plan
+
+    def _largest_approach(self) -> Array | None:
+        """Most by which every pair (pairs,) can come nearer in a step; None where speeds are not bounded."""
+        limits = [bound for bound in self.bounds if type(bound) is StepLimit]
+        if self.dt is None or not limits:
+            return None
+        most = np.min([bound.bounds(self.state, self.dt)[1] for bound in limits], axis=0)
+        return self.workspace.largest_approach(most) + MORE
 
     def _grow(self, contacts: int) -> None:
         """Make room for the rows of so many contacts."""

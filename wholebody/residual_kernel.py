@@ -1,4 +1,4 @@
-"""Errors of frames, planes and axes and their wrenches, as compiled loops: see `term_plan`.
+"""Errors of frames, planes, axes and reach cones with their wrenches, as compiled loops: see `term_plan`.
 
 Each function fills the rows of its table in `wrench` (rows, 6) and `value` (rows,), which are zero before.
 """
@@ -9,6 +9,8 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.compiled import compiled
+from wholebody.figures.reach_cones import PARALLEL
+from wholebody.figures.reach_cones import TOUCHING as ON_EDGE
 from wholebody.tasks.axis import NO_ANGLE, STEEPEST, TOUCHING
 from wholebody.term_plan import Integers
 
@@ -206,3 +208,97 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
                 for j in range(3):
                     k, m = (j + 1) % 3, (j + 2) % 3
                     wrench[row + r, 3 + j] -= wrench[row + r, k] * place[m] - wrench[row + r, m] * place[k]
+
+
+@compiled(error_model="numpy")
+def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench: Array, value: Array) -> None:
+    """See `tasks.ReachCones` and `figures.reach_cones.ReachCone.signed_angle`."""
+    turn, world, local, outward = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+    for e in range(len(tables)):
+        row, limb, reference = entries[e, 0], joints[entries[e, 1]], joints[entries[e, 2]]
+        for i in range(3):
+            world[i] = limb[0, i] * tables[e, 0] + limb[1, i] * tables[e, 1] + limb[2, i] * tables[e, 2]
+            for j in range(3):
+                turn[i, j] = 0.0
+                for k in range(3):
+                    turn[i, j] += reference[k, i] * tables[e, 3 + 3 * j + k]
+        for j in range(3):
+            local[j] = turn[0, j] * world[0] + turn[1, j] * world[1] + turn[2, j] * world[2]
+        value[row] = signed_angle(edges[entries[e, 4] : entries[e, 4] + entries[e, 3]], local, outward)
+        for i in range(3):
+            local[i] = turn[i, 0] * outward[0] + turn[i, 1] * outward[1] + turn[i, 2] * outward[2]
+        # the direction turns as w x d, so the angle changes by g . (w x d) = w . (d x g)
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            wrench[row, 3 + i] = world[j] * local[k] - world[k] * local[j]
+
+
+@compiled()
+def _dot(edge: Array, part: int, direction: Array) -> float:
+    """A plane of an edge times a direction (3,)."""
+    product: float = (
+        edge[3 * part] * direction[0] + edge[3 * part + 1] * direction[1] + edge[3 * part + 2] * direction[2]
+    )
+    return product
+
+
+@compiled(error_model="numpy")
+def signed_angle(edges: Array, direction: Array, gradient: Array) -> float:
+    """Angle of a unit direction (3,) to the nearest edge (k, 15) of a cone, positive inside; writes its gradient."""
+    count = len(edges)
+    nearest, best, beside, wedge = 0, -2.0, False, -1
+    for i in range(count):
+        after = edges[(i + 1) % count]
+        height = _dot(edges[i], 0, direction)
+        within = _dot(edges[i], 1, direction) >= 0.0 and _dot(edges[i], 2, direction) >= 0.0
+        nearness = max(_dot(edges[i], 3, direction), _dot(after, 3, direction))
+        if within:
+            nearness = np.sqrt(max(1.0 - height * height, 0.0))
+        if nearness > best:
+            nearest, best, beside = i, nearness, within
+        if wedge < 0 and _dot(edges[i], 4, direction) >= 0.0 and _dot(after, 4, direction) < 0.0:
+            wedge = i
+    edge, after = edges[nearest], edges[(nearest + 1) % count]
+    height = _dot(edge, 0, direction)
+    place = gradient
+    if beside and best > PARALLEL:
+        length = 0.0
+        for k in range(3):
+            place[k] = direction[k] - height * edge[k]
+            length += place[k] * place[k]
+        for k in range(3):
+            place[k] /= np.sqrt(length)
+    else:
+        corner = after if _dot(after, 3, direction) > _dot(edge, 3, direction) else edge
+        for k in range(3):
+            place[k] = corner[9 + k]
+    sign = 1.0 if _dot(edges[max(wedge, 0)], 0, direction) >= 0.0 else -1.0
+    cosine = direction[0] * place[0] + direction[1] * place[1] + direction[2] * place[2]
+    square = 0.0
+    for k in range(3):
+        gradient[k] = cosine * direction[k] - place[k]
+        square += gradient[k] * gradient[k]
+    sine = np.sqrt(square)
+    if sine > ON_EDGE:
+        for k in range(3):
+            gradient[k] *= sign / sine
+    else:
+        _inward(edges, direction, gradient)
+    angle: float = sign * np.arctan2(sine, cosine)
+    return angle
+
+
+@compiled(error_model="numpy")
+def _inward(edges: Array, direction: Array, gradient: Array) -> None:
+    """Direction into the cone at a place on its edge."""
+    nearest, least = 0, np.inf
+    for i in range(len(edges)):
+        height = abs(_dot(edges[i], 0, direction))
+        if height < least:
+            nearest, least = i, height
+    height, square = _dot(edges[nearest], 0, direction), 0.0
+    for k in range(3):
+        gradient[k] = edges[nearest, k] - height * direction[k]
+        square += gradient[k] * gradient[k]
+    for k in range(3):
+        gradient[k] /= np.sqrt(square)

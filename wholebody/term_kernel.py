@@ -7,21 +7,27 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.compiled import compiled
-from wholebody.residual_kernel import axis_errors, planes, residuals
+from wholebody.coordinate_kernel import coordinates, heights, roots, turns
+from wholebody.residual_kernel import axis_errors, cones, planes, residuals
 from wholebody.tasks.discomfort import POWER, STEEPNESS
 from wholebody.term_plan import (
     AXIS,
     BODY,
     BOX,
     COLUMN,
+    CONE,
     COORDINATE,
     CURVATURE,
     DISCOMFORT,
     DISTANCE,
+    EDGE,
+    HEIGHT,
     LIMIT,
     MASS_CENTER,
     PLANE,
     RESIDUAL,
+    ROOT,
+    TURN,
     Integers,
 )
 
@@ -83,10 +89,14 @@ def linearise(
     residuals(_floats(floats, layout, RESIDUAL), _integers(integers, layout, RESIDUAL), joints, wrench, value)
     planes(_floats(floats, layout, PLANE), _integers(integers, layout, PLANE), joints, wrench, value)
     axis_errors(_floats(floats, layout, AXIS), _integers(integers, layout, AXIS), joints, wrench, value)
-    for table, rows in ((RESIDUAL, 0), (PLANE, 1), (AXIS, 2)):
+    cones(
+        _floats(floats, layout, CONE), _integers(integers, layout, CONE), _floats(floats, layout, EDGE), joints, wrench,
+        value,
+    )  # fmt: skip
+    for table, rows in ((RESIDUAL, 0), (PLANE, 1), (AXIS, 2), (CONE, 1)):
         entries = _integers(integers, layout, table)
         for e in range(len(entries)):
-            against = entries[e, 2] if table == RESIDUAL else 0
+            against = entries[e, 2] if table in (RESIDUAL, CONE) else 0
             count = 3 * (entries[e, 3] + entries[e, 4]) if table == RESIDUAL else rows
             for r in range(entries[e, 0], entries[e, 0] + count):
                 _row(wrench[r], entries[e, 1], against, columns, support, column, jacobian[r])
@@ -99,10 +109,11 @@ def linearise(
             centers, _integers(integers, layout, MASS_CENTER), _floats(floats, layout, BODY),
             _integers(integers, layout, BODY), column, joints, columns, value, jacobian,
         )  # fmt: skip
-    targets, places = _floats(floats, layout, COORDINATE), _integers(integers, layout, COORDINATE)
-    for e in range(len(targets)):
-        value[places[e, 0]] = q[places[e, 1]] - targets[e, 0]
-        jacobian[places[e, 0], places[e, 2]] = 1.0
+    coordinates(
+        _floats(floats, layout, COORDINATE), _integers(integers, layout, COORDINATE), q, value, jacobian
+    )  # fmt: skip
+    turns(_floats(floats, layout, TURN), _integers(integers, layout, TURN), q, value, jacobian)
+    roots(_floats(floats, layout, ROOT), _integers(integers, layout, ROOT), q, value, jacobian)
     _box(_floats(floats, layout, LIMIT), _integers(integers, layout, LIMIT), _floats(floats, layout, BOX), q, box)
     constant = _floats(floats, layout, CURVATURE)
     for v in range(nv):
@@ -112,6 +123,9 @@ def linearise(
     _measures(
         _floats(floats, layout, DISTANCE), _integers(integers, layout, DISTANCE), _floats(floats, layout, DISCOMFORT),
         _integers(integers, layout, DISCOMFORT), q, measure,
+    )  # fmt: skip
+    heights(
+        _floats(floats, layout, HEIGHT), _integers(integers, layout, HEIGHT), joints, columns, support, column, measure
     )  # fmt: skip
 
 

@@ -22,8 +22,11 @@ from wholebody.tasks.distance import LEAST_CURVATURE
 from wholebody.tasks.inputs import WORLD, Place
 from wholebody.tasks.residuals import PlacementResidual
 
-RESIDUAL, PLANE, AXIS, MASS_CENTER, COORDINATE, DISTANCE, DISCOMFORT, BOX, LIMIT, BODY, CURVATURE, COLUMN = range(12)
-"""The tables of a plan, by what a row of them stands for."""
+RESIDUAL, PLANE, AXIS, MASS_CENTER, COORDINATE, TURN, ROOT, CONE = range(8)
+"""The tables of goals and constraints, by what a row of them stands for."""
+
+DISTANCE, DISCOMFORT, HEIGHT, BOX, LIMIT, BODY, CURVATURE, COLUMN, EDGE = range(8, 17)
+"""The other tables of a plan: of measures, of bounds, of the model, and of the edges of reach cones."""
 
 WIDTHS = {
     RESIDUAL: (36, 6),  # place in the joint (12), base in its joint (12), target (3), rotation back from it (9)
@@ -31,16 +34,22 @@ WIDTHS = {
     AXIS: (24, 3),  # place in the joint (12), basis (9), target (3)
     MASS_CENTER: (4, 1),  # direction (3), offset
     COORDINATE: (1, 3),  # target
+    TURN: (2, 3),  # cosine and sine of the target
+    ROOT: (12, 3),  # target
+    CONE: (12, 5),  # axis of the limb in its joint (3), rotation of the reference in its joint (9)
 }
 """Floats and integers of a goal or constraint in its table. The first integer is its first row, then:
 
 RESIDUAL: joint, joint of the base, whether the place and the rotation count, whether there is a base other than the
-world; PLANE: joint; AXIS: joint, whether the target is a place; COORDINATE: place in the posture and in the tangent.
+world; PLANE: joint; AXIS: joint, whether the target is a place; COORDINATE, TURN, ROOT: place in the posture and in the
+tangent; CONE: joint, joint of the reference, how many edges, the first of them.
 """
 
 Integers: TypeAlias = NDArray[np.int64]
 Row: TypeAlias = tuple[tuple[int, ...], Array]
 """Integers and floats of a row of a table."""
+
+_NO_EDGES: Array = np.zeros((0, 15))
 
 
 class Entry(NamedTuple):
@@ -51,12 +60,14 @@ class Entry(NamedTuple):
         integers: its integers without the first.
         floats: its floats.
         rows: how many rows of the Jacobian it makes.
+        edges: (k, 15) planes of the edges of a reach cone, see `ReachCone.planes`; each edge is a row.
     """
 
     table: int
     integers: tuple[int, ...]
     floats: Array
     rows: int
+    edges: Array = _NO_EDGES
 
 
 class OtherTerm(NamedTuple):
@@ -156,7 +167,7 @@ def make_plan(
         state: tells how many rows terms of other classes have; stays where it is.
     """
     model = state.model
-    parts: dict[int, list[Row]] = {table: [] for table in range(COLUMN + 1)}
+    parts: dict[int, list[Row]] = {table: [] for table in range(EDGE + 1)}
     others: list[OtherTerm] = []
     row = 0
 
@@ -168,7 +179,11 @@ def make_plan(
             row += others[-1].rows
             return None
         for entry in entries:
-            parts[entry.table].append(((row, *entry.integers), entry.floats))
+            numbers = (row, *entry.integers)
+            if entry.table == CONE:
+                numbers += (len(entry.edges), len(parts[EDGE]))
+                parts[EDGE] += [((0,), edge) for edge in entry.edges]
+            parts[entry.table].append((numbers, entry.floats))
             row += entry.rows
         return entries
 
@@ -276,13 +291,35 @@ def _balance(term: tasks.Balance, model: pin.Model) -> list[Entry]:
 
 
 def _posture(term: tasks.Posture, model: pin.Model) -> list[Entry] | None:
-    places = coordinates(model)[term.dofs]
-    if (places < 0).any():
-        return None
-    return [
-        Entry(COORDINATE, (int(q), int(v)), term.resolved_target[q : q + 1], 1)
-        for q, v in zip(places, term.dofs, strict=True)
-    ]
+    entries: list[Entry] = []
+    dofs, target = term.dofs.tolist(), term.resolved_target
+    for joint in list(model.joints)[1:]:
+        q, v = int(joint.idx_q), int(joint.idx_v)
+        mine = [dof for dof in dofs if v <= dof < v + joint.nv]
+        if not mine:
+            continue
+        if joint.nq == joint.nv:
+            shifts = [dof - v for dof in mine]
+            entries += [Entry(COORDINATE, (q + k, v + k), target[q + k : q + k + 1], 1) for k in shifts]
+        elif (joint.nq, joint.nv) == (2, 1):
+            entries.append(Entry(TURN, (q, v), target[q : q + 2], 1))
+        elif joint.nq == 7 and len(mine) == 6:
+            entries.append(Entry(ROOT, (q, v), _placement(pin.XYZQUATToSE3(target[q : q + 7])), 6))
+        else:
+            return None
+    in_order = [entry.integers[1] + k for entry in entries for k in range(entry.rows)] == dofs
+    return entries if in_order else None
+
+
+def _cones(term: tasks.ReachCones, model: pin.Model) -> list[Entry]:
+    entries = []
+    for limb in term.limbs:
+        axis = _in_joint(limb.limb, model).rotation @ limb.axis
+        reference = _in_joint(limb.reference, model).rotation
+        edges = np.hstack(limb.cone.planes.reshape(5, -1, 3))
+        floats = np.concatenate([axis, reference.T.ravel()])
+        entries.append(Entry(CONE, (limb.limb.joint, limb.reference.joint), floats, 1, edges))
+    return entries
 
 
 _WRITERS: dict[type, Callable[[Any, pin.Model], list[Entry] | None]] = {
@@ -296,6 +333,7 @@ _WRITERS: dict[type, Callable[[Any, pin.Model], list[Entry] | None]] = {
     tasks.CenterOfMass: _mass_center,
     tasks.Balance: _balance,
     tasks.Posture: _posture,
+    tasks.ReachCones: _cones,
 }
 
 
@@ -335,6 +373,13 @@ def _measures(
             columns = np.column_stack([joints.neutral, joints.weights, joints.limits.T, joints.phase.T])
             for q, v, floats in zip(joints.idx_q.tolist(), joints.idx_v.tolist(), columns, strict=True):
                 parts[DISCOMFORT].append(((q, v), np.array([term.weight, *floats])))
+        elif type(term) is tasks.PotentialEnergy:
+            curvature += term.weight * LEAST_CURVATURE
+            masses = term.masses
+            for joint, centre, weight, height in zip(
+                masses.joints.tolist(), masses.centres, masses.weights, masses.heights, strict=True
+            ):
+                parts[HEIGHT].append(((joint,), np.array([*centre, term.weight * weight, height])))
         else:
             others.append(term)
     return tuple(others), curvature

@@ -6,11 +6,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.geometry.continuous.approach import largest_approach
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene_geometry import SceneGeometry
 
@@ -69,9 +71,19 @@ class Workspace:
             self._sweep = Sweep(self.model, self.geometry)
         return self._sweep
 
-    def near(self, q: Array, within: float) -> Contacts:
-        """Every pair nearer than `within` metres at the posture q, shape (nq,), in the order of the pairs."""
-        return self.proximity.query(self.state.update(q), within)
+    def near(self, q: Array, within: float, most: Array | None = None) -> Contacts:
+        """Every pair nearer than `within` metres at the posture q, shape (nq,); see `Proximity.query`."""
+        return self.proximity.query(self.state.update(q), within, most)
+
+    def largest_approach(self, most: Array) -> Array:
+        """Most by which the distance of every pair (pairs,) can fall while no freedom moves more than `most` (nv,).
+
+        Things that are carried may be placed anew at any time; nothing is known of them.
+        """
+        centres = np.array([np.linalg.norm(piece.placement.translation) for piece in self.geometry.geometryObjects])
+        for pieces in self._built.pieces_of.values():
+            centres[[index for index, _ in pieces]] = np.inf
+        return largest_approach(self.table, centres, most)
 
     def placements(self, q: Array) -> Array:
         """Where all pieces are at the posture q, shape (nq,); see `Contacts.placements`."""

@@ -6,6 +6,7 @@ import importlib.util
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
@@ -67,6 +68,24 @@ def test_mujoco_reads_the_person() -> None:
         data.joint(joint).qpos = value
     mujoco.mj_forward(model, data)
     assert np.isfinite(data.qacc).all()
+
+
+@pytest.mark.parametrize("name", ["human", "avatar", "hand"])
+def test_mujoco_has_the_same_joints_and_places(name: str) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    figure = wb.load(name)
+    model = mujoco.MjModel.from_xml_path(str(urdf_path(name)))
+    assert model.nv == figure.model.nv - 6
+    data, rng = mujoco.MjData(model), np.random.default_rng(3)
+    q = figure.clamp(pin.integrate(figure.model, figure.neutral, 0.3 * rng.normal(size=figure.model.nv)))
+    q[:7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # what the root carries is a part of MuJoCo's world
+    for joint, value in figure.joint_values(q).items():
+        data.joint(joint).qpos = value
+    mujoco.mj_forward(model, data)
+    state = wb.Scene(figure).state(q)
+    for number in range(1, model.nbody):
+        ours = state.frame(figure.frame_id(model.body(number).name)).translation
+        assert data.body(number).xpos == pytest.approx(ours, abs=1e-6)
 
 
 WRONG = {

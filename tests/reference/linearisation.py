@@ -20,7 +20,7 @@ class ReferenceLineariser(Lineariser):
     def at(self, q: Array, within: float) -> Linearisation:
         """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance."""
         state, workspace = self.state, self.workspace
-        contacts = workspace.near(q, within + self._largest_clearance)
+        contacts = workspace.near(q, within + self._largest_clearance, self._most)
         clearance = self.clearances[contacts.number]
         rows = ReferenceRowBuilder(workspace.table).rows(contacts, clearance)
 

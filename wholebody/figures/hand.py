@@ -23,7 +23,7 @@ from wholebody.figures.description import Articulated, Chain, Description, Exclu
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.figure import Figure
 
-MESH = "meshes/ellipsoid.stl"
+MESH = "meshes/ellipsoid.obj"
 """The unit polyhedron that the URDF scales to each part."""
 
 FINGERS = {"thumb": ("pp", "dp"), **dict.fromkeys(("index", "middle", "ring", "little"), ("pp", "mp", "dp"))}

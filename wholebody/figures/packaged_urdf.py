@@ -75,7 +75,7 @@ def packaged_files() -> dict[str, str]:
         "human.urdf": urdf_text(human_spec(), extension_text(human_figure())),
         "avatar.urdf": urdf_text(avatar_spec(), extension_text(avatar_figure())),
         "hand.urdf": urdf_text(hand_spec(), extension_text(hand_figure())),
-        MESH: ellipsoid_stl(),
+        MESH: ellipsoid_obj(),
     }
 
 
@@ -85,17 +85,14 @@ def write_packaged(folder: str | os.PathLike[str]) -> None:
         _write(Path(folder) / name, text)
 
 
-def ellipsoid_stl() -> str:
-    """Return the unit polyhedron of the hand's parts as an ASCII STL."""
+def ellipsoid_obj() -> str:
+    """Return the unit polyhedron of the hand's parts as an OBJ; of STL files MuJoCo reads binary ones only."""
     from wholebody.figures import hulls
 
     vertices, triangles = hulls.unit_sphere()
-    lines = ["solid ellipsoid"]
-    for triangle in triangles:
-        lines += ["facet normal 0 0 0", "outer loop"]
-        lines += [f"vertex {' '.join(f'{value + 0.0:.12g}' for value in vertices[k].round(15))}" for k in triangle]
-        lines += ["endloop", "endfacet"]
-    return "\n".join([*lines, "endsolid ellipsoid"]) + "\n"
+    lines = [f"v {' '.join(f'{value + 0.0:.12g}' for value in vertex)}" for vertex in vertices.round(15)]
+    lines += [f"f {' '.join(str(k + 1) for k in triangle)}" for triangle in triangles.tolist()]
+    return "\n".join(lines) + "\n"
 
 
 def _write(path: Path, text: str) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 
-_PARALLEL = 1e-12
+PARALLEL = 1e-12  # shorter than this a projection onto the plane of an edge has no direction
 TOUCHING = 1e-9  # rad: a direction nearer to an edge than this is on it
 
 
@@ -27,6 +27,8 @@ class ReachCone:
     Attributes:
         vertices: (k, 3) unit corners, counter-clockwise seen from outside the sphere.
         visible: (3,) unit direction inside, from which every edge is seen.
+        planes: (5 k, 3) of the k edges, in this order: their boundary normals, the normals at their first and at their
+            last corner, between which a direction is beside the edge, their first corners, and the normals S.
     """
 
     def __init__(self, vertices: Any, visible: Any) -> None:
@@ -55,7 +57,7 @@ class ReachCone:
         self._slices = np.cross(self.visible, self.vertices)
         self._following = following
         across = (np.cross(self.boundaries, self.vertices), np.cross(following, self.boundaries))
-        self._table = np.vstack([self.boundaries, *across, self.vertices, self._slices])
+        self.planes: Array = np.vstack([self.boundaries, *across, self.vertices, self._slices])
 
     def contains(self, direction: Any) -> Any:
         """Whether directions are inside, on the edge included: bool, or (n,) bools."""
@@ -100,13 +102,13 @@ class ReachCone:
     def _signed_angle_of_one(self, direction: Array) -> tuple[float, Array]:
         """The same for one direction in a quarter of the time: constraints evaluate one limb at a time."""
         count = len(self.vertices)
-        height, before, after, corner, side = (self._table @ direction).reshape(5, count)
+        height, before, after, corner, side = (self.planes @ direction).reshape(5, count)
         within = (before >= 0.0) & (after >= 0.0)
         on_circle = np.sqrt(np.maximum(1.0 - height * height, 0.0))
         nearness = np.where(within, on_circle, np.maximum(corner, np.roll(corner, -1)))
         edge = int(nearness.argmax())
         following = (edge + 1) % count
-        if within[edge] and on_circle[edge] > _PARALLEL:
+        if within[edge] and on_circle[edge] > PARALLEL:
             nearest = direction - height[edge] * self.boundaries[edge]
             nearest /= sqrt(nearest @ nearest)
         else:
@@ -137,7 +139,7 @@ class ReachCone:
         height = rows @ normal.T
         on_circle = rows[:, None, :] - height[:, :, None] * normal
         length = np.linalg.norm(on_circle, axis=2, keepdims=True)
-        on_circle = np.where(length > _PARALLEL, on_circle / np.maximum(length, _PARALLEL), start)
+        on_circle = np.where(length > PARALLEL, on_circle / np.maximum(length, PARALLEL), start)
         within = (np.einsum("nki,ki->nk", on_circle, np.cross(normal, start)) >= 0.0) & (
             np.einsum("nki,ki->nk", on_circle, np.cross(end, normal)) >= 0.0
         )

@@ -27,7 +27,7 @@ def snap_normals(
     accuracy: float,
 ) -> None:
     """Put the exact normal of a face where coal's is that normal but for rounding; `normal` is changed in place."""
-    direction = np.empty(3)
+    direction, turned = np.empty(3), np.empty(3)
     for c in wide:
         found = False
         for side in range(2):
@@ -35,36 +35,36 @@ def snap_normals(
             if found or radius[own] > 0.0 or point_count[other] == 0:
                 continue
             sign = 1.0 if side == 0 else -1.0
+            _to_frame(placement[own], normal[c], sign, turned)
             for f in range(face_start[own], face_start[own] + face_count[own]):
+                if faces[f, 0] * turned[0] + faces[f, 1] * turned[1] + faces[f, 2] * turned[2] < near:
+                    continue
+                base = faces[f, 3]
                 for k in range(3):
                     direction[k] = (
                         faces[f, 0] * placement[own, 0, k]
                         + faces[f, 1] * placement[own, 1, k]
                         + faces[f, 2] * placement[own, 2, k]
                     )
-                along = direction[0] * normal[c, 0] + direction[1] * normal[c, 1] + direction[2] * normal[c, 2]
-                if sign * along < near:
-                    continue
-                base = (
-                    faces[f, 3]
-                    + direction[0] * placement[own, 3, 0]
-                    + direction[1] * placement[own, 3, 1]
-                    + direction[2] * placement[own, 3, 2]
-                )
+                    base += direction[k] * (placement[own, 3, k] - placement[other, 3, k])
+                _to_frame(placement[other], direction, 1.0, turned)
                 least = np.inf
-                for number in range(point_start[other], point_start[other] + point_count[other]):
-                    height = -base
-                    for k in range(3):
-                        place = placement[other, 3, k]
-                        for i in range(3):
-                            place += points[number, i] * placement[other, i, k]
-                        height += direction[k] * place
+                for p in range(point_start[other], point_start[other] + point_count[other]):
+                    height = points[p, 0] * turned[0] + points[p, 1] * turned[1] + points[p, 2] * turned[2]
                     least = min(least, height)
-                if least - radius[other] >= distance[c] - accuracy:
+                if least - base - radius[other] >= distance[c] - accuracy:
                     for k in range(3):
                         normal[c, k] = sign * direction[k]
                     found = True
                     break
+                _to_frame(placement[own], normal[c], sign, turned)
+
+
+@compiled()
+def _to_frame(placement: Array, vector: Array, sign: float, turned: Array) -> None:
+    """Write a vector (3,) of the world, times a sign, in the axes of a piece."""
+    for i in range(3):
+        turned[i] = sign * (placement[i, 0] * vector[0] + placement[i, 1] * vector[1] + placement[i, 2] * vector[2])
 
 
 @compiled()
@@ -95,14 +95,18 @@ def patch_ends(
     Returns:
         Contact (m,), point (m, 3) and gap (m,) of each row.
     """
-    most = 0
+    most, most_points = 0, 0
     for c in wide:
         most += point_count[pair[c, 0]] + point_count[pair[c, 1]]
+        most_points = max(most_points, point_count[pair[c, 0]], point_count[pair[c, 1]])
     contact = np.empty(most, dtype=np.intp)
     place = np.empty((most, 3))
     gap = np.empty(most)
+    # of the points of one side that are in the band
+    drop, length, worst = np.empty(most_points), np.empty(most_points), np.empty(most_points)
+    lever, along = np.empty((3, most_points)), np.empty((3, most_points))
     filled = 0
-    base, along, lever = np.empty(3), np.empty(3), np.empty(3)
+    base, down, shift = np.empty(3), np.empty(3), np.empty(3)
     for c in wide:
         first_begun, first_whole = filled, False
         for side in range(2):
@@ -112,75 +116,79 @@ def patch_ends(
             facing = point_b[c] if side == 0 else point_a[c]
             begun = filled
             whole = True
-            seen = False
             half_width = np.sqrt(2.0 * radius[other] * inset)
-            for i in range(3):
-                base[i] = 0.0
-                for k in range(3):
-                    base[i] += placement[other, i, k] * (
-                        facing[k] + inset * sign * normal[c, k] - placement[other, 3, k]
-                    )
+            above = 0.0
+            for k in range(3):
+                shift[k] = facing[k] + inset * sign * normal[c, k] - placement[other, 3, k]
+                above += (placement[own, 3, k] - witness[k]) * sign * normal[c, k]
+            _to_frame(placement[other], shift, 1.0, base)
+            _to_frame(placement[own], normal[c], sign, down)
+            count = 0
+            longest = 0.0
             for number in range(point_start[own], point_start[own] + point_count[own]):
-                height = 0.0
-                for k in range(3):
-                    lever[k] = placement[own, 3, k] - witness[k]
-                    for i in range(3):
-                        lever[k] += points[number, i] * placement[own, i, k]
-                    height += lever[k] * sign * normal[c, k]
-                drop = -height - radius[own]
-                if drop >= band:
+                height = above + points[number, 0] * down[0] + points[number, 1] * down[1] + points[number, 2] * down[2]
+                if -height - radius[own] >= band:
                     continue
-                seen = True
-                drop = max(drop, 0.0)
-                length = 0.0
+                drop[count] = max(-height - radius[own], 0.0)
+                square = 0.0
                 for k in range(3):
-                    lever[k] -= height * sign * normal[c, k]
-                    length += lever[k] * lever[k]
-                length = np.sqrt(length)
-                for i in range(3):
-                    along[i] = 0.0
-                    for k in range(3):
-                        along[i] += placement[other, i, k] * lever[k]
-                reach = 1.0
-                for f in range(face_start[other], face_start[other] + face_count[other]):
-                    climb = faces[f, 0] * along[0] + faces[f, 1] * along[1] + faces[f, 2] * along[2]
-                    if climb > 1e-12:
-                        room = faces[f, 3] - (faces[f, 0] * base[0] + faces[f, 1] * base[1] + faces[f, 2] * base[2])
-                        reach = min(reach, max(room, 0.0) / climb)
+                    step = placement[own, 3, k] - witness[k] - height * sign * normal[c, k]
+                    for i in range(3):
+                        step += points[number, i] * placement[own, i, k]
+                    lever[k, count] = step
+                    square += step * step
+                length[count] = np.sqrt(square)
+                longest = max(longest, length[count])
+                worst[count] = 1.0
+                count += 1
+            for i in range(3):
+                for e in range(count):
+                    along[i, e] = (
+                        placement[other, i, 0] * lever[0, e]
+                        + placement[other, i, 1] * lever[1, e]
+                        + placement[other, i, 2] * lever[2, e]
+                    )
+            for f in range(face_start[other], face_start[other] + face_count[other] if count else 0):
+                x, y, z = faces[f, 0], faces[f, 1], faces[f, 2]
+                room = faces[f, 3] - x * base[0] - y * base[1] - z * base[2]
+                if room < longest:  # else no lever leads out of this face
+                    share = 1.0 / max(room, 1e-12)
+                    for e in range(count):
+                        climb = share * (x * along[0, e] + y * along[1, e] + z * along[2, e])
+                        if climb > worst[e]:
+                            worst[e] = climb
+            for e in range(count):
+                reach = 1.0 / worst[e]
                 sag = 0.0
                 if is_capsule[other]:
-                    down0, down1, down2 = 0.0, 0.0, 0.0
-                    for k in range(3):
-                        down0 += placement[other, 0, k] * sign * normal[c, k]
-                        down1 += placement[other, 1, k] * sign * normal[c, k]
-                        down2 += placement[other, 2, k] * sign * normal[c, k]
-                    across0 = axis[other, 1] * down2 - axis[other, 2] * down1
-                    across1 = axis[other, 2] * down0 - axis[other, 0] * down2
-                    across2 = axis[other, 0] * down1 - axis[other, 1] * down0
+                    _to_frame(placement[other], normal[c], sign, shift)
+                    across0 = axis[other, 1] * shift[2] - axis[other, 2] * shift[1]
+                    across1 = axis[other, 2] * shift[0] - axis[other, 0] * shift[2]
+                    across2 = axis[other, 0] * shift[1] - axis[other, 1] * shift[0]
                     norm = max(np.sqrt(across0 * across0 + across1 * across1 + across2 * across2), 1e-9)
-                    offset = abs(across0 * along[0] + across1 * along[1] + across2 * along[2]) / norm
+                    offset = abs(across0 * along[0, e] + across1 * along[1, e] + across2 * along[2, e]) / norm
                     if offset > half_width:
                         reach = min(reach, half_width / max(offset, 1e-12))
                     sag = (reach * offset) ** 2 / (2.0 * radius[other])
                 if reach < 1.0:
                     whole = False
-                if length * reach > shortest:
+                if length[e] * reach > shortest:
                     contact[filled] = c
                     for k in range(3):
-                        place[filled, k] = witness[k] + reach * lever[k]
-                    gap[filled] = distance[c] + reach * drop + sag
+                        place[filled, k] = witness[k] + reach * lever[k, e]
+                    gap[filled] = distance[c] + reach * drop[e] + sag
                     filled += 1
             if side == 0:
-                first_whole = whole and seen
+                first_whole = whole and count > 0
                 if first_whole:
                     break  # this side is the patch: the other side's points add nothing
-            elif whole and seen:
-                count = filled - begun
-                for row in range(count):
+            elif whole and count > 0:
+                rows = filled - begun
+                for row in range(rows):
                     contact[first_begun + row] = contact[begun + row]
                     place[first_begun + row] = place[begun + row]
                     gap[first_begun + row] = gap[begun + row]
-                filled = first_begun + count
+                filled = first_begun + rows
         if filled - first_begun > most_ends:
             _farthest_first(place[first_begun:filled], gap[first_begun:filled], point_a[c], most_ends)
             filled = first_begun + most_ends

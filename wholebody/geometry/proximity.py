@@ -144,6 +144,7 @@ class Proximity:
         self._index = np.zeros(pairs, dtype=np.intp)
         self._marked, self._count = np.zeros(0 if self._singly else pairs, dtype=np.intp), 0
         self._travelled, self._bound = np.zeros(count), np.full(pairs, -np.inf)
+        self._endless = np.full(pairs, np.inf)
         self._last, self._extent = np.zeros((count, 4, 3)), np.zeros((count, 3))
         self._lay_views()
 
@@ -173,25 +174,26 @@ class Proximity:
             return np.array(self._placements)
         return np.array([[*M.rotation.T, M.translation] for M in self.results.oMg], dtype=float).reshape(-1, 4, 3)
 
-    def query(self, state: Kinematics, within: float) -> Contacts:
+    def query(self, state: Kinematics, within: float, most: Array | None = None) -> Contacts:
         """Every pair nearer than `within` metres with the joints as in `state`, in the order of the pairs.
 
-        Pairs farther apart are left out; nothing else is. Results of pairs that were culled are never read: coal
-        leaves old numbers in them.
+        With `most`, shape (pairs,), a pair that is as far apart as its entry [m] is left out too. Nothing else is left
+        out. Results of pairs that were culled are never read: coal leaves old numbers in them.
         """
         began = time.perf_counter()
         placements = self.placements(state)
-        index = self._asked(placements, within)
-        contacts = self._gather(placements, index, within)
+        most = self._endless if most is None else most
+        index = self._asked(placements, within, most)
+        contacts = self._gather(placements, index, within, most)
         self.seconds += time.perf_counter() - began
         return contacts
 
-    def _asked(self, placements: Array, within: float) -> Indices:
+    def _asked(self, placements: Array, within: float, most: Array) -> Indices:
         """Compute with coal the distances of all pairs that can be nearer than `within`; their indices."""
         table, kernel = self.table, self._kernel
         count, others = kernel.look(
             placements, self._last, table.pairs, table.reach, table.half, self._travelled, self._bound, self._extent,
-            within, self._index, self._active, self._marked, self._count,
+            within, most, self._index, self._active, self._marked, self._count,
         )  # fmt: skip
         index = self._index[:count]
         self.asked += count
@@ -207,7 +209,7 @@ class Proximity:
         pin.computeDistances(self.geometry, self.results)
         return index
 
-    def _gather(self, placements: Array, index: Indices, within: float) -> Contacts:
+    def _gather(self, placements: Array, index: Indices, within: float, most: Array) -> Contacts:
         results, known = self._distances, self.table
         if results is None:
             results = np.zeros((len(known.pairs), 10))
@@ -217,7 +219,7 @@ class Proximity:
         number, pair = np.empty(len(index), dtype=np.intp), np.empty((len(index), 2), dtype=np.intp)
         count, broken = self._kernel.gather(
             results, index, known.pairs, known.points_meet, self._travelled, self._bound, 10.0 * COAL_ACCURACY, within,
-            table, number, pair,
+            most, table, number, pair,
         )  # fmt: skip
         table, number, pair = table[:count], number[:count], pair[:count]
         if broken:
@@ -248,11 +250,11 @@ def compiled_kernel() -> Any:
     placement, one, none = np.zeros((1, 4, 3)), np.zeros(1), np.zeros(0)
     index, pairs = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
     proximity_kernel.look(
-        placement, placement.copy(), pairs, one, np.zeros((1, 3)), one.copy(), none, np.zeros((1, 3)), 0.0, index,
+        placement, placement.copy(), pairs, one, np.zeros((1, 3)), one.copy(), none, np.zeros((1, 3)), 0.0, none, index,
         np.zeros((2, 2), dtype=bool, order="F"), index, 0,
     )  # fmt: skip
     proximity_kernel.gather(
-        np.zeros((0, 20))[:, :10], index, pairs, none, one, none, 0.0, 0.0, np.zeros((0, 10)), index,
+        np.zeros((0, 20))[:, :10], index, pairs, none, one, none, 0.0, 0.0, none, np.zeros((0, 10)), index,
         pairs,
     )  # fmt: skip
     return proximity_kernel

@@ -48,11 +48,12 @@ def cull(
     bound: Array,
     extent: Array,
     within: float,
+    most: Array,
     index: Indices,
 ) -> int:
     """Pairs that may be nearer than `within`, in the order of the pairs: their places go to the front of `index`.
 
-    A pair is left out where one of three lower bounds of its signed distance is not below `within`: the bound when it
+    A pair is left out where one of three lower bounds of its signed distance is not below that: the bound when it
     was last looked at, less what both pieces have moved since; the gap between spheres about the pieces; the gap
     between boxes along the world's axes about them. All three bound the distance in penetration too.
 
@@ -66,6 +67,7 @@ def cull(
             renewed for pairs that the spheres or boxes leave out.
         extent: (n, 3) room for the sizes of the boxes.
         within: metres.
+        most: (pairs,) for one pair each, in place of `within` where it is less.
         index: (pairs,) room for the answer.
 
     Returns:
@@ -81,7 +83,8 @@ def cull(
     for p in range(len(pairs)):
         a, b = pairs[p, 0], pairs[p, 1]
         way = travelled[a] + travelled[b]
-        if bound[p] - way >= within:
+        near = min(within, most[p])
+        if bound[p] - way >= near:
             continue
         square = 0.0
         boxes = -np.inf
@@ -90,7 +93,7 @@ def cull(
             square += apart * apart
             boxes = max(boxes, apart - extent[a, k] - extent[b, k])
         gap = max(boxes, np.sqrt(square) - reach[a] - reach[b])
-        if gap >= within:
+        if gap >= near:
             bound[p] = gap + way
             continue
         index[count] = p
@@ -108,6 +111,7 @@ def gather(
     bound: Array,
     accuracy: float,
     within: float,
+    most: Array,
     table: Array,
     number: Indices,
     pair: Indices,
@@ -123,6 +127,7 @@ def gather(
         bound: (pairs,) see `cull`; renewed.
         accuracy: metres to which a distance is known, and share of it.
         within: metres.
+        most: (pairs,) see `cull`.
         table: (k, 10) room for distance, normal and nearest points.
         number: (k,) room for the places of the pairs.
         pair: (k, 2) room for their pieces.
@@ -136,7 +141,7 @@ def gather(
         a, b = pairs[p, 0], pairs[p, 1]
         distance = results[p, 0]
         bound[p] = distance - accuracy * (1.0 + abs(distance)) + travelled[a] + travelled[b]
-        if not distance < within:
+        if not distance < min(within, most[p]):
             continue
         for k in range(10):
             table[count, k] = results[p, k]
@@ -180,6 +185,7 @@ def look(
     bound: Array,
     extent: Array,
     within: float,
+    most: Array,
     index: Indices,
     active: NDArray[np.bool_],
     marked: Indices,
@@ -191,5 +197,5 @@ def look(
         How many pairs may be near, and whether they are others than those that were marked.
     """
     travel(placement, last, reach, travelled)
-    count = cull(placement, pairs, reach, half, travelled, bound, extent, within, index)
+    count = cull(placement, pairs, reach, half, travelled, bound, extent, within, most, index)
     return count, len(marked) > 0 and count > 0 and mark(active, pairs, marked, before, index, count)

@@ -10,7 +10,7 @@ from wholebody.arrays import Array, Mask
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import SkeletonMotion
 
-SLOW = 0.25
+SLOW = 0.15
 """Metres a second: a foot that is slower may stand."""
 
 LOW = 0.05
@@ -21,6 +21,9 @@ SHORTEST = 0.1
 
 BLEND = 0.15
 """Seconds before and after a foot stands, over which it goes from its own way to where it stands."""
+
+DRIFT = 0.03
+"""Metres by which a foot that stands may move in the recording: a foot that moves more has made a step."""
 
 
 class Footfalls(NamedTuple):
@@ -53,7 +56,11 @@ def footfalls(motion: SkeletonMotion, roles: Roles) -> Footfalls:
         height = float(np.percentile(low, 10))
         for role, at in places.items():
             heights[role] = height
-            stands[role] = _longer((speeds[role] < SLOW) & (at[:, 2] < height + LOW), round(SHORTEST / motion.dt))
+            still = _apart(at, (speeds[role] < SLOW) & (at[:, 2] < height + LOW))
+            stands[role] = _longer(still, round(SHORTEST / motion.dt))
+    for side in ("left", "right"):  # a heel stands only while the toes do, so that both keep the length of the foot
+        if {f"{side}_toe", f"{side}_ankle"} <= stands.keys():
+            stands[f"{side}_ankle"] &= stands[f"{side}_toe"]
     return Footfalls(stands, heights)
 
 
@@ -119,6 +126,20 @@ def _speed(places: Array, dt: float) -> Array:
         return np.zeros(len(places))
     found: Array = np.linalg.norm(np.gradient(places, dt, axis=0), axis=1)
     return found
+
+
+def _apart(places: Array, mask: Mask) -> Mask:
+    """The mask without the fastest frame of each run over which a foot goes on, so that it stands at several places."""
+    kept: Mask = np.array(mask)
+    waiting = runs(kept)
+    speeds = np.linalg.norm(np.gradient(places, axis=0), axis=1) if len(places) > 1 else np.zeros(len(places))
+    while waiting:
+        first, last = waiting.pop()
+        if last - first > 2 and np.linalg.norm(np.ptp(places[first:last], axis=0)) > DRIFT:
+            cut = first + 1 + int(speeds[first + 1 : last - 1].argmax())
+            kept[cut] = False
+            waiting += [(first, cut), (cut + 1, last)]
+    return kept
 
 
 def _longer(mask: Mask, least: int) -> Mask:

@@ -128,11 +128,41 @@ class Fitter:
         found: Array = np.einsum("cki,ci->ck", joints[self._base_joints][:, :3], worlds)
         return np.asarray(np.einsum("ckj,ck->cj", self._base_turns, found))
 
-    def cost(self, q: Array, goals: Goals) -> float:
-        """Half the sum of the squared weighted errors."""
+    def cost(self, q: Array, goals: Goals, cones: float = 0.0) -> float:
+        """Half the sum of the squared weighted errors.
+
+        Args:
+            q: (nq,).
+            goals: what is to be reached.
+            cones: weight of the angles by which limbs are outside of their reach cones, metres per radian.
+        """
         self._state.update(q)
         errors, posture = self._errors(q, goals)
-        return 0.5 * float(errors @ errors + posture @ posture)
+        cost = 0.5 * float(errors @ errors + posture @ posture)
+        if cones and self._cones:
+            cost += 0.5 * float(((cones * np.minimum(self._angles() - CONE_MARGIN, 0.0)) ** 2).sum())
+        return cost
+
+    def quadratic(self, q: Array, goals: Goals, cones: float = 0.0) -> tuple[Array, Array, float]:
+        """Gradient (nv,) and Gauss-Newton matrix (nv, nv) of the cost, and the cost."""
+        gradient, hessian = self._quadratic(q, goals)
+        errors, posture = self._errors(q, goals)
+        cost = 0.5 * float(errors @ errors + posture @ posture)
+        if cones and self._cones:
+            short = cones * np.minimum(self._angles() - CONE_MARGIN, 0.0)
+            if short.any():
+                rows = cones * self._cone_rows()[short < 0.0]
+                short = short[short < 0.0]
+                gradient, hessian = gradient + rows.T @ short, hessian + rows.T @ rows
+                cost += 0.5 * float(short @ short)
+        return gradient, hessian, cost
+
+    def bounds(self, q: Array) -> tuple[Array, Array]:
+        """Least and greatest step (nv,) within the limits, and not too long for the linearisation."""
+        lower, upper = self.figure.tangent_bounds(q)
+        lower, upper = np.maximum(lower, -STEP), np.minimum(upper, STEP)
+        lower[: self._free], upper[: self._free] = -ROOT_STEP, ROOT_STEP
+        return lower, upper
 
     def fit(
         self, q: Array, goals: Goals, iterations: int, cones: bool = True, tolerance: float = 1e-3
@@ -218,10 +248,9 @@ class Fitter:
 
     def _program(self, q: Array, gradient: Array, hessian: Array, rows: Array, inside: Array) -> Array | None:
         """The step within the limits; None where there is none."""
-        lower, upper = self.figure.tangent_bounds(q)
+        lower, upper = self.bounds(q)
         low, high = np.empty(len(lower) + len(rows)), np.full(len(lower) + len(rows), 1e30)
-        low[: len(lower)], high[: len(lower)] = np.maximum(lower, -STEP), np.minimum(upper, STEP)
-        low[: self._free], high[: self._free] = -ROOT_STEP, ROOT_STEP
+        low[: len(lower)], high[: len(lower)] = lower, upper
         # A limb outside of its cone returns by half a step at a time; nearer to the edge it stays inside.
         low[len(lower) :] = np.minimum(CONE_MARGIN - inside, 0.5 * STEP)
         x, _, flag, _ = daqp.solve(hessian, gradient, rows, high, low, np.zeros(len(low), dtype=np.int32))

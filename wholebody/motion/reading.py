@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import logging
 import os
+from pathlib import Path
 
 from wholebody.checks import choice
 from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.files import read_frames
-from wholebody.motion.files.bvh import read_motion
+from wholebody.motion.files import amass, archive, bvh, bvh_writing, read_frames
 from wholebody.motion.retargeting import retarget
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion
 from wholebody.tracking.tracks import check_figure
-
-SKELETONS = (".bvh",)
-"""Endings of files that hold skeletons."""
 
 
 def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
     """Read a skeleton that moves, in metres with z up.
 
     Args:
-        path: a BVH file.
+        path: a BVH file, or an archive of AMASS (.npz).
         unit: "metres", "centimetres", "millimetres" or "inches"; recognised by the skeleton's size if left out.
         up: "y" or "z", the axis of the file that points up; recognised by the rest posture if left out.
 
@@ -41,13 +38,10 @@ def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: 
         choice(unit, UNITS, "read_skeleton: unit")
     if up is not None:
         choice(up, UP, "read_skeleton: up")
-    if path.suffix.lower() not in SKELETONS:
-        raise FileFormatError(
-            f"{one_line(path.name)}: a skeleton is read from {', '.join(SKELETONS)}; give such a file"
-        )
-    motion = read_motion(path, unit, up)
-    for note in motion.notes:
-        logging.getLogger(__name__).info("%s: %s", one_line(path.name), note)
+    motion = _skeleton(path, unit, up)
+    if motion is None:
+        raise FileFormatError(f"{one_line(path.name)}: is no skeleton; give a BVH file or an archive of AMASS (.npz)")
+    _say(motion, path)
     return motion
 
 
@@ -55,7 +49,8 @@ def read_clip(path: str | os.PathLike[str], figure: Figure) -> Clip:
     """Read a clip of a figure; the ending of the file's name says the format.
 
     Args:
-        path: a file that `Clip.write` wrote (.npz), or a skeleton that moves (.bvh), which is retargeted.
+        path: a clip of this figure that `Clip.write` wrote (.npz, .bvh), a table (.csv), a joint profile (.txt), or the
+            motion of another skeleton (.bvh, AMASS .npz), which is retargeted.
         figure: the figure of the postures.
 
     Raises:
@@ -65,10 +60,28 @@ def read_clip(path: str | os.PathLike[str], figure: Figure) -> Clip:
     """
     path = checked_path(path, "path")
     check_figure(figure, "read_clip")
-    if path.suffix.lower() in SKELETONS:
-        return retarget(read_skeleton(path), figure)
-    frames = read_frames(path, check_figure(figure, "read_clip"))
+    motion = _skeleton(path, None, None)
+    frames = read_frames(path, figure) if motion is None else bvh_writing.own(motion, figure)
+    if motion is not None and frames is None:
+        _say(motion, path)
+        return retarget(motion, figure)
+    assert frames is not None
     try:
         return Clip(figure, frames.q, frames.dt, frames.name)
     except InputError as error:
         raise FileFormatError(f"{path.name}: {error}") from None
+
+
+def _say(motion: SkeletonMotion, path: Path) -> None:
+    """Log what was recognised in a file."""
+    for note in motion.notes:
+        logging.getLogger(__name__).info("%s: %s", one_line(path.name), note)
+
+
+def _skeleton(path: Path, unit: str | None, up: str | None) -> SkeletonMotion | None:
+    """The skeleton of a file; None where the file holds none."""
+    if path.suffix.lower() == ".bvh":
+        return bvh.read_motion(path, unit, up)
+    if path.suffix.lower() == ".npz" and amass.is_amass(archive.read_arrays(path)):
+        return amass.read_motion(path)
+    return None

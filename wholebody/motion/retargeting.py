@@ -17,6 +17,7 @@ from wholebody.motion.posture_fit import Fitter, Goals
 from wholebody.motion.retarget_targets import Targets, targets
 from wholebody.motion.roles import Roles, matched
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
+from wholebody.motion.smooth_fit import smooth
 from wholebody.tracking.tracks import check_figure
 
 POINTS = {"hip": 1.0, "knee": 1.0, "ankle": 2.0, "toe": 1.0, "shoulder": 1.0, "elbow": 1.0, "wrist": 1.5, "hand": 0.5,
@@ -29,23 +30,17 @@ TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}
 STANDING = 30.0
 """Weight of the distance of a foot that stands."""
 
-POSTURE = 0.01
+POSTURE = 0.03
 """Weight of the difference of each joint from the neutral posture, metres per radian, for what no goal determines."""
 
-NEARBY = 0.02
-"""Weight of the difference from the neighbouring frames while smoothing, metres per radian."""
+NEARBY = 0.3
+"""Weight of the difference from the smooth posture where a limb is brought back into its reach cone."""
 
-OWN, FROM_NEIGHBOUR, SMOOTHING = 25, 6, 3
-"""Iterations of a frame alone, of one that begins at its neighbour's posture, and of one while smoothing."""
-
-ROUNDS = 4
-"""Rounds of smoothing."""
+OWN, FROM_NEIGHBOUR, ROUNDS = 25, 6, 4
+"""Iterations of a frame alone, of one that begins at its neighbour's posture, and of all frames at once."""
 
 JUMP = 0.05
 """Cost of a difference of one radian between neighbouring frames, beside the costs of both, square metres."""
-
-WINDOW = 0.1
-"""Seconds over which smoothing averages."""
 
 
 def retarget(
@@ -123,14 +118,9 @@ class _Retargeting:
         )
         forward, backward = self._chain(own, 1), self._chain(own, -1)
         q = self._chosen([own, forward, backward])
-        for _ in range(ROUNDS):
-            near = self._smoothed(q)
-            found = [
-                self.fitter.fit(q[k], self._goals(k, near[k]), SMOOTHING, cones=False)
-                for k in self._told(range(self.count))
-            ]
-            q = np.array([posture for posture, _ in self._kept(found, near)])
-        return q
+        q = smooth(self.fitter, q, self._goals, self.dt, ROUNDS, self._tell)
+        found = self._kept([(posture, 0.0) for posture in q], q)
+        return np.array([posture for posture, _ in found])
 
     def _kept(self, found: list[tuple[Array, float]], near: Array | None = None) -> list[tuple[Array, float]]:
         """The postures within reach cones: those outside are fitted again with them."""
@@ -140,10 +130,13 @@ class _Retargeting:
         return found
 
     def _told(self, frames: range) -> range:
+        self._tell()
+        return frames
+
+    def _tell(self) -> None:
         if self._progress is not None:
             self._done += 1
             self._progress(self._done / (ROUNDS + 3))
-        return frames
 
     def _start(self, frame: int) -> Array:
         """Where the descent of a frame alone begins: the neutral posture, with the pelvis as it is wanted."""
@@ -189,23 +182,6 @@ class _Retargeting:
             chosen[k] = q[kind, k]
             kind = int(came[k, kind])
         return chosen
-
-    def _smoothed(self, q: Array) -> Array:
-        """Mean postures over a window about each frame, on the manifold."""
-        half = max(1, round(WINDOW / self.dt))
-        weights = np.hanning(2 * half + 3)[1:-1]
-        tangents = np.zeros((2 * half + 1, self.count, self.model.nv))
-        for shift in range(-half, half + 1):
-            for k in range(self.count):
-                # Beyond an end the motion continues by its point reflection, so that what is linear stays so.
-                other = k + shift
-                if 0 <= other < self.count:
-                    tangents[shift + half, k] = pin.difference(self.model, q[k], q[other])
-                elif 0 <= k - shift < self.count:
-                    tangents[shift + half, k] = -pin.difference(self.model, q[k], q[k - shift])
-        mean = np.tensordot(weights / weights.sum(), tangents, axes=1)
-        found: Array = np.array([pin.integrate(self.model, *pair) for pair in zip(q, mean, strict=True)])
-        return found
 
 
 def _squared(model: pin.Model, first: Array, second: Array) -> float:

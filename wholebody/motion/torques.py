@@ -15,8 +15,9 @@ from wholebody.arrays import Array, Mask
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.feet import foot_points, paths, standing
+from wholebody.motion.feet import foot_points
 from wholebody.motion.ground_forces import ground_forces
+from wholebody.motion.stance import StanceFeet, standing
 from wholebody.motion.strength import Strength
 from wholebody.tasks.support import low_points
 
@@ -247,8 +248,8 @@ def _stands(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:
             for point in foot_points(figure)
             if joint in figure.model.supports[figure.model.frames[figure.frame_id(point)].parentJoint]
         )
-        places = paths(figure, clip.q, points or (name,))
-        found[name] = np.any([standing(path, clip.dt) for path in places.transpose(1, 0, 2)], axis=0)
+        marks = standing(figure, clip.q, clip.dt, StanceFeet(points or (name,)))
+        found[name] = np.any(list(marks.values()), axis=0)
     if not found:
         raise InputError(f"torques: {figure.name} has no segments {' or '.join(FEET)}; name its feet with feet=[...]")
     return found

@@ -18,7 +18,7 @@ GRAVITY = 9.80665
 """Standard acceleration of gravity [m/s^2] (CGPM 1901)."""
 
 
-class _Bodies(NamedTuple):
+class Masses(NamedTuple):
     """The masses: joint indices, the centre of each mass in its joint, squared weights, rest heights."""
 
     joints: NDArray[np.intp]
@@ -39,10 +39,11 @@ class PotentialEnergy(Measure):
 
     Attributes:
         weight: factor on the measure [1/J^2].
+        masses: of the segments, once resolved.
     """
 
     weight: float = 1.0
-    _bodies: _Bodies = field(init=False, repr=False)
+    masses: Masses = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the value."""
@@ -60,17 +61,17 @@ class PotentialEnergy(Measure):
         centres = tuple(np.array(model.inertias[int(k)].lever) for k in joints)
         weights = np.array([(model.inertias[int(k)].mass * GRAVITY) ** 2 for k in joints])
         heights = _centres(state, joints, centres)[:, 2]
-        return filled(self, _bodies=_Bodies(joints, centres, weights, heights, state.support[joints]))
+        return filled(self, masses=Masses(joints, centres, weights, heights, state.support[joints]))
 
     def value(self, state: State) -> float:
         """The measure [J^2]."""
-        bodies = self._bodies
+        bodies = self.masses
         rise = _centres(state, bodies.joints, bodies.centres)[:, 2] - bodies.heights
         return float(bodies.weights @ (rise * rise))
 
     def gradient(self, state: State) -> Array:
         """(nv,) derivative [J^2/rad and J^2/m]."""
-        bodies = self._bodies
+        bodies = self.masses
         centres = _centres(state, bodies.joints, bodies.centres)
         wrenches = _lifts(centres) * (2.0 * bodies.weights * (centres[:, 2] - bodies.heights))[:, None]
         # All descendants of a joint act on it: sum their wrenches first, then multiply by each of its columns.
@@ -79,7 +80,7 @@ class PotentialEnergy(Measure):
 
     def curvature(self, state: State) -> Array:
         """(nv,) diagonal of the Gauss-Newton matrix of the heights [J^2/rad^2 and J^2/m^2]."""
-        bodies = self._bodies
+        bodies = self.masses
         lifts = _lifts(_centres(state, bodies.joints, bodies.centres))
         rows = state.folded((lifts @ state.jacobian) * bodies.support)
         return np.asarray(2.0 * (bodies.weights @ (rows * rows)) + LEAST_CURVATURE)

@@ -124,7 +124,7 @@ def solve(
     numbers[5] = damping
     program(
         measure[0][:n], measure[1][:n], box[0], box[1], soft_values[0], soft_values[1], goals, violated, shift,
-        measures, True, numbers[:10], entries, target, least,
+        measures, numbers[4] > 0.0, numbers[:10], entries, target, least,
     )  # fmt: skip
     worst = 0.0
     for j in range(k):

@@ -7,6 +7,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.motion.avoider import Watch
+from wholebody.motion.bisection.path_planes import path_planes
 from wholebody.motion.bisection.prediction import Prediction, Predictor
 from wholebody.motion.bisection.recursion import Recursion
 from wholebody.scene import Scene
@@ -15,9 +16,9 @@ from wholebody.workspace import Workspace
 PLACES = 9  # postures of a gap at which the depth of a dip is measured
 ADDED = 5e-4  # m: what the margin of a pair gets beyond the depth of its dip; arcs between frames are shorter
 FAR = 0.1  # m: a pair farther apart at one of the two frames needs no margin there
-THROUGH = 2e-3  # m: a deeper dip is no arc between two postures that touch, but passes through something
-WIDENINGS = 3  # of margins at a gap, before its frames are predicted from each other
-VISITS = 5  # of a gap; what did not help so often does not help
+SHALLOW = 2e-3  # m: a deeper dip is no arc between two postures that touch
+MARGINS, MIDDLES, FORWARD, BACKWARD = 3, 2, 2, 1  # visits of a gap by each way to close it, before the next way
+BESIDE = 2  # frames to each side of a gap that get a share of its displacement, so that no frame jumps
 
 
 def hold_between(recursion: Recursion, predictor: Predictor, changed: list[int], watch: Watch) -> list[int]:
@@ -63,24 +64,24 @@ class Gaps:
         self.left: dict[int, str] = {}
 
     def close(self) -> None:
-        """Sweep all gaps and remove dips."""
-        waiting = list(range(len(self._recursion.q) - 1))[::-1]
-        stuck = set(self._recursion.stuck)
+        """Sweep all gaps and remove dips, from the first frame on."""
+        bad, gaps = self._recursion.bad, len(self._visits)
+        waiting = set(range(gaps))
         while waiting and not self._watch.ended:
-            gap = waiting.pop()
+            gap = min(waiting)
+            waiting.remove(gap)
             pair = self._dip(gap)
             if pair is None:
                 self.left.pop(gap, None)
                 continue
             first, second = (self._workspace.owners[piece] for piece in self._workspace.table.pairs[pair])
             self.left[gap] = f"{first} and {second}"
-            bad = self._recursion.bad
-            if bad[gap] or bad[gap + 1] or {gap, gap + 1} & stuck or self._visits[gap] >= VISITS:
+            if bad[gap] or bad[gap + 1] or self._visits[gap] >= MARGINS + MIDDLES + FORWARD + BACKWARD:
                 continue
             self._visits[gap] += 1
-            self._watch.tell(1.0 - len(waiting) / len(bad), f"between frames {gap} and {gap + 1}")
-            moved = self._close(gap, pair)
-            waiting += [near for near in (gap + 1, gap, gap - 1) if 0 <= near < len(self._visits)] if moved else []
+            self._watch.tell(1.0 - len(waiting) / gaps, f"between frames {gap} and {gap + 1}")
+            for frame in self._closed(gap, pair):
+                waiting |= {near for near in (frame - 1, frame) if 0 <= near < gaps}
 
     def _dip(self, gap: int) -> int | None:
         """The pair that dips first in a gap."""
@@ -88,42 +89,81 @@ class Gaps:
         found = self._workspace.sweep.first_contact(q[gap], q[gap + 1], tolerance=self._overlap)
         return None if found is None else found.index
 
-    def _depth(self, gap: int, pair: int) -> float:
-        """Deepest overlap of a pair in a gap, metres."""
-        deepest = 0.0
-        for share in np.linspace(0.0, 1.0, PLACES):
-            near = self._workspace.near(self._between(gap, float(share)), 0.0)
-            deepest = max(deepest, float(-near.distance[near.number == pair].min(initial=0.0)))
-        return deepest
+    def _deepest(self, gap: int, pair: int) -> tuple[float, float]:
+        """Deepest overlap of a pair in a gap, metres, and the share of the way at which it is."""
+        found = (0.0, 0.5)
+        for share in np.linspace(0.0, 1.0, PLACES)[1:-1].tolist():
+            near = self._workspace.near(self._between(gap, share), 0.0)
+            found = max(found, (float(-near.distance[near.number == pair].min(initial=0.0)), share))
+        return found
 
     def _between(self, gap: int, share: float) -> Array:
         q = self._recursion.q
         return np.asarray(pin.interpolate(self._scene.model, q[gap], q[gap + 1], share))
 
-    def _close(self, gap: int, pair: int) -> bool:
-        """Predict the frames of a gap anew; whether one of them is new.
+    def _closed(self, gap: int, pair: int) -> list[int]:
+        """Change frames at a gap; returns those that changed.
 
-        A shallow dip is an arc between two postures beside each other, and both get a larger margin. A deep one passes
-        through something: then one frame is predicted from the other, on the same side.
+        A shallow dip is an arc between two postures that nearly touch: both get a larger margin. A deeper one passes
+        through something: the posture in between is predicted, and the frames beside get its displacement. What is
+        still on two sides of something after that gets on one: a frame is predicted from the one before it, or after.
         """
-        depth, visit = self._depth(gap, pair), int(self._visits[gap])
-        if depth > THROUGH or visit > WIDENINGS:
-            frame, beside = (gap + 1, gap) if visit < VISITS else (gap, gap + 1)
-            start = self._recursion.applied(frame, self._recursion.q[beside])
-            return self._move(frame, self._predictor.predict(frame, start))
-        moved = False
+        (depth, share), visit = self._deepest(gap, pair), int(self._visits[gap])
+        if depth <= SHALLOW and visit <= MARGINS:
+            return self._widen(gap, pair, depth)
+        self._visits[gap] = visit = max(visit, MARGINS + 1)
+        if visit <= MARGINS + MIDDLES:
+            return self._displace(gap, share)
+        frame, beside = (gap + 1, gap) if visit <= MARGINS + MIDDLES + FORWARD else (gap, gap + 1)
+        start = self._recursion.applied(frame, self._recursion.q[beside])
+        return self._moved(frame, self._counted(self._predictor.predict(frame, start)))
+
+    def _widen(self, gap: int, pair: int, depth: float) -> list[int]:
+        """Predict both frames of a gap with a larger margin of a pair."""
+        moved = []
         for frame in (gap, gap + 1):
             q, margins = self._recursion.q[frame], self._margins[frame]
             margins[pair] = max(margins.get(pair, 0.0), self._distance(q, pair)) + depth + ADDED
-            moved |= self._move(frame, self._predictor.predict(frame, q, margins=margins, effort_from=q))
+            found = self._predictor.predict(frame, q, margins=margins, effort_from=q)
+            moved += self._moved(frame, self._counted(found))
         return moved
 
-    def _move(self, frame: int, found: Prediction) -> bool:
+    def _displace(self, gap: int, share: float) -> list[int]:
+        """Predict a posture within a gap, and move the frames beside it as far as that one moved."""
+        model, q, original = self._scene.model, self._recursion.q, self._predictor.original
+        middle = self._between(gap, share)
+        way = np.array([middle, q[gap + 1]])
+        planes = path_planes(self._scene.figure, way, 0, self._recursion.joints, self._workspace.state)
+        meant = np.asarray(pin.interpolate(model, original[gap], original[gap + 1], share))
+        for through in (planes, []) if planes else ([],):
+            found = self._counted(self._predictor.predict(gap, middle, through, original=meant, effort_from=middle))
+            if found.free:
+                break
+        else:
+            return []
+        away = pin.difference(model, middle, found.q)
+        moved = []
+        for frame in range(max(0, gap - BESIDE), min(len(q), gap + 2 + BESIDE)):
+            beyond = max(gap - frame, frame - gap - 1, 0)
+            near = np.asarray(pin.integrate(model, q[frame], away * (1.0 - beyond / (BESIDE + 1))))
+            near = self._recursion.applied(frame, near)
+            if self._predictor.good(frame, near):
+                q[frame] = near
+                moved.append(frame)
+            elif not beyond:
+                moved += self._moved(frame, self._counted(self._predictor.predict(frame, near, effort_from=near)))
+        return moved
+
+    def _counted(self, found: Prediction) -> Prediction:
         self._recursion.predictions += 1
         self._recursion.programs += found.programs
-        if found.good:
-            self._recursion.q[frame] = found.q
-        return found.good
+        return found
+
+    def _moved(self, frame: int, found: Prediction) -> list[int]:
+        if not found.good:
+            return []
+        self._recursion.q[frame] = found.q
+        return [frame]
 
     def _distance(self, q: Array, pair: int) -> float:
         """Distance of a pair in a posture, metres; 0 where it is far."""

@@ -16,7 +16,7 @@ from wholebody.motion.avoider import MethodResult, Progress, Watch
 from wholebody.motion.bisection.gaps import Gaps, hold_between
 from wholebody.motion.bisection.interpolation import Kind
 from wholebody.motion.bisection.key_frames import key_frames
-from wholebody.motion.bisection.path_planes import ELBOWS
+from wholebody.motion.bisection.path_planes import ANKLES, ELBOWS
 from wholebody.motion.bisection.prediction import Predictor
 from wholebody.motion.bisection.recursion import Recursion, changed_frames
 from wholebody.motion.bisection.stays import Stays
@@ -53,7 +53,7 @@ class Bisection:
         least: least number of frames in a group, where there is room.
         interpolation: "linear" or "quadratic", between the frames beside the group and its middle.
         planes: frames of the figure, such as "left_elbow" and "left_wrist", that leave their path only sideways where a
-            posture is predicted; None for the elbows, where the figure has them.
+            posture is predicted; None for elbows and ankles, where the figure has them.
         frozen: joints and groups that stay as they are; None for a free root. ("root", "lower_body") moves the upper
             body alone.
         clearance: least distance in predicted postures of what overlapped, metres.
@@ -66,7 +66,7 @@ class Bisection:
     interpolation: Kind = "linear"
     planes: tuple[str, ...] | None = None
     frozen: tuple[str, ...] | None = None
-    clearance: float = 0.002
+    clearance: float = 0.005
     method: str | Method = "qp"
 
     def __post_init__(self) -> None:
@@ -115,7 +115,7 @@ class Bisection:
         original = np.array([figure.clamp(q) for q in clip.q])
         terms = frame_terms(scene, original, clip.dt, constraints)
         frozen = self.frozen if self.frozen is not None else ("root",) if figure.root == "free" else ()
-        usual = tuple(name for name in ELBOWS if name in figure.frames)
+        usual = tuple(name for name in (*ELBOWS, *ANKLES) if name in figure.frames)
         joints = usual if self.planes is None else self.planes
         for joint in joints:
             figure.frame_id(joint)

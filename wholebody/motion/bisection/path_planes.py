@@ -12,7 +12,7 @@ from wholebody.figures.state import State
 from wholebody.tasks import Plane
 
 ELBOWS = ("left_elbow", "right_elbow")
-WRISTS = ("left_wrist", "right_wrist")
+ANKLES = ("left_ankle", "right_ankle")
 
 STANDS = 1e-4  # m: a shorter way from frame to frame has no direction; trackers are less exact than this
 

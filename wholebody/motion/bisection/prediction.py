@@ -51,11 +51,13 @@ class Prediction(NamedTuple):
 
     Attributes:
         q: (nq,) posture.
-        good: whether nothing overlaps in it and everything holds.
+        free: whether nothing overlaps in it.
+        good: whether in addition everything holds that is held in the frame.
         programs: quadratic programs that were solved.
     """
 
     q: Array
+    free: bool
     good: bool
     programs: int
 
@@ -96,6 +98,7 @@ class Predictor:
         *,
         margins: dict[int, float] | None = None,
         effort_from: Array | None = None,
+        original: Array | None = None,
     ) -> Prediction:
         """Predict the posture of a frame.
 
@@ -105,9 +108,10 @@ class Predictor:
             planes: further constraints.
             margins: least distances of pairs, by their numbers, metres; the settings' for others.
             effort_from: (nq,) posture from which the effort is counted instead.
+            original: (nq,) original posture where it is not that of the frame, but of a moment after it.
         """
         feet = [Hold(foot) for foot in self.terms.stands[frame]]
-        original = self.original[frame]
+        original = self.original[frame] if original is None else original
         goals = [term for term in self.terms.given if isinstance(term, Goal)]
         others = [term for term in self.terms.given if not isinstance(term, Goal)]
         problem = Problem(
@@ -123,7 +127,8 @@ class Predictor:
         for pair, margin in (margins or {}).items():
             problem.clearances[pair] = max(problem.clearances[pair], margin)
         solution = self._method.solve(problem.with_start(start))
-        return Prediction(solution.q, self.good(frame, solution.q), sum(solution.programs.values()))
+        free = self.free(solution.q)
+        return Prediction(solution.q, free, free and self.holds(frame, solution.q), sum(solution.programs.values()))
 
     def good(self, frame: int, q: Array) -> bool:
         """Whether nothing overlaps in a posture of a frame and everything that is held there holds."""

@@ -29,6 +29,7 @@ class Recursion:
         q: (n, nq) the present postures.
         bad: (n,) which of them overlap.
         keys: frames that were predicted and are free, and evaluation points.
+        joints: frames with plane constraints.
         stuck: frames whose prediction failed, and what overlaps there.
         predictions: number of postures that were solved for.
         programs: number of quadratic programs of these.
@@ -46,7 +47,7 @@ class Recursion:
         watch: Watch,
     ) -> None:
         """Take the settings; `joints` are the frames with plane constraints."""
-        self._scene, self._predictor, self._stays, self._joints = scene, predictor, stays, tuple(joints)
+        self._scene, self._predictor, self._stays, self.joints = scene, predictor, stays, tuple(joints)
         self._share, self._least, self._kind, self._watch = share, least, kind, watch
         self._state = State(scene.model)
         self.q = np.array(predictor.original)
@@ -99,7 +100,7 @@ class Recursion:
         """Predict the posture of a frame: with planes, then without, then from the nearest free postures beside it."""
         if self._watch.tell(self.share_done(), f"frame {frame}"):
             return False
-        planes = path_planes(self._scene.figure, self.q, frame, self._joints, self._state)
+        planes = path_planes(self._scene.figure, self.q, frame, self.joints, self._state)
         free = np.flatnonzero(~self.bad)
         starts = [self.q[frame], *(self.q[side] for side in (*free[free < frame][-1:], *free[free > frame][:1]))]
         attempts = [(starts[0], planes)] if planes else []

@@ -9,13 +9,23 @@ from pathlib import Path
 from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, one_line
 from wholebody.figures.figure import Figure
-from wholebody.motion.files import archive
+from wholebody.motion.files import archive, bvh_writing, columns, gltf, joint_profile
 from wholebody.motion.files.base import Frames, Motion
 
-WRITERS: dict[str, Callable[[Motion, Path], Path]] = {".npz": archive.write}
+WRITERS: dict[str, Callable[[Motion, Path], Path]] = {
+    ".npz": archive.write,
+    ".bvh": bvh_writing.write,
+    ".csv": columns.write,
+    ".txt": joint_profile.write,
+    ".glb": gltf.write,
+}
 """Ending of a name to the function that writes the format."""
 
-READERS: dict[str, Callable[[Path, Figure], Frames]] = {".npz": archive.read}
+READERS: dict[str, Callable[[Path, Figure], Frames]] = {
+    ".npz": archive.read,
+    ".csv": columns.read,
+    ".txt": joint_profile.read,
+}
 """Ending of a name to the function that reads postures of a figure."""
 
 

@@ -19,6 +19,9 @@ LARGEST = 500_000_000  # bytes: an hour of 75 joints at 120 frames a second
 STEADY = 0.01
 """Share of the skeleton's size by which the place of a joint in its parent may change before it is told."""
 
+RESTING = 1e-3
+"""Radians by which the joints of a rest posture turn at most. Converters put one before the motion."""
+
 
 def pybvh() -> ModuleType:
     """Import pybvh.
@@ -59,23 +62,33 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
     if unit is None:
         unit = recognised_unit(parents, offsets)
         notes.append(f"lengths are in {unit}")
+    if len(found.table) > 1 and _is_rest(made, 0) and not _is_rest(made, 1):
+        notes.append("the first frame is the rest posture and no part of the motion; it is left out")
+        first = 1
+    else:
+        first = 0
     turn, scale = UP[up], UNITS[unit]
     moving = np.array([bool(joint.channels) for joint in found.joints])
-    local = np.tile(np.eye(3), (len(found.table), len(parents), 1, 1))
-    local[:, moving] = turn @ made.to_rotmat()[1] @ turn.T
+    local = np.tile(np.eye(3), (len(found.table) - first, len(parents), 1, 1))
+    local[:, moving] = turn @ made.to_rotmat()[1][first:] @ turn.T
     try:
         return SkeletonMotion.moved(
             tuple(joint.name for joint in found.joints),
             parents,
             scale * offsets @ turn.T,
             local,
-            scale * root @ turn.T,
+            scale * root[first:] @ turn.T,
             made.frame_time,
             path.stem,
             tuple(notes),
         )
     except InputError as error:
         raise FileFormatError(f"{path.name}: {error}") from None
+
+
+def _is_rest(made: Any, frame: int) -> bool:
+    """Whether no joint but the root turns in a frame, or all turn very little."""
+    return bool(np.abs(made.joint_angles[frame, 1:]).max(initial=0.0) < RESTING)
 
 
 def _columns(found: BvhText) -> list[dict[tuple[str, str], Array]]:

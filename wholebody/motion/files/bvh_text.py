@@ -8,12 +8,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from wholebody.arrays import Array
 from wholebody.checks import TIME_STEP
 from wholebody.errors import FileFormatError, one_line
-from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
+from wholebody.motion.files.text import number as read_number
+from wholebody.motion.files.text import table
+from wholebody.tracking.tracks import MOST_FRAMES
 
 CHANNEL = re.compile(r"([XYZ])(position|rotation)", re.IGNORECASE)
 MOST_JOINTS = 1000
@@ -73,30 +73,17 @@ def parsed(text: str, name: str) -> BvhText:
     if not 1 <= count <= MOST_FRAMES:
         raise FileFormatError(f"{name}, line {number}: {count} frames; give 1 to {MOST_FRAMES}")
     number = lines[rest - 1][0]
-    dt = _number(step, f"{name}, line {number}")
+    dt = read_number(step, f"{name}, line {number}")
     if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
         raise FileFormatError(f"{name}, line {number}: the frame time is {dt:g} s; give a positive one")
     wide = sum(len(joint.channels) for joint in place.joints)
-    table = np.empty((min(count, len(lines)), wide))
-    rows = lines[rest:]
-    for k, (number, line) in enumerate(rows[:count]):
-        words = line.split()
-        if len(words) != wide:
-            raise FileFormatError(f"{name}, line {number}: {len(words)} values for {wide} channels")
-        try:
-            table[k] = words
-        except ValueError:
-            table[k] = [_number(word, f"{name}, line {number}") for word in words]
-        wrong = np.flatnonzero(~(np.abs(table[k]) <= LARGEST))
-        if len(wrong):
-            raise FileFormatError(
-                f"{name}, line {number}: value {wrong[0] + 1} is {words[wrong[0]][:20]}; mend the frame"
-            )
+    rows = [(number, line.split()) for number, line in lines[rest:]]
+    values = table(name, rows[:count], wide)
     if len(rows) != count:
         number = rows[-1][0] if rows else number
         what = "cut off" if len(rows) < count else "longer than it says"
         raise FileFormatError(f"{name}, line {number}: {len(rows)} frames and not {count}; the file is {what}")
-    return BvhText(place.joints, table, dt)
+    return BvhText(place.joints, values, dt)
 
 
 class _Hierarchy:
@@ -172,7 +159,7 @@ class _Hierarchy:
         if word == "OFFSET":
             if joint.offset or len(words) != 3:
                 raise FileFormatError(f"{where}: an OFFSET has three numbers, once for each joint")
-            joint.offset = tuple(_number(value, where) for value in words)
+            joint.offset = tuple(read_number(value, where) for value in words)
             return
         found = [CHANNEL.fullmatch(value) for value in words[1:]]
         if not words or joint.channels or words[0] != str(len(found)) or None in found:
@@ -198,13 +185,3 @@ def _whole(word: str, where: str) -> int:
     if not re.fullmatch(r"\d{1,9}", word):
         raise FileFormatError(f"{where}: {one_line(word, 20)!r} is no number of frames")
     return int(word)
-
-
-def _number(word: str, where: str) -> float:
-    try:
-        value = float(word)
-    except ValueError:
-        raise FileFormatError(f"{where}: {one_line(word, 20)!r} is no number") from None
-    if not abs(value) <= LARGEST:
-        raise FileFormatError(f"{where}: {one_line(word, 20)} is not finite or beyond {LARGEST:g}")
-    return value

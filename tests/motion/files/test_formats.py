@@ -1,0 +1,403 @@
+"""Formats of clips: round trips, damaged files, and what other readers find in what is written."""
+
+from __future__ import annotations
+
+import json
+import struct
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
+
+import wholebody as wb
+from wholebody.figures.figure import Figure
+from wholebody.motion.files import joint_profile
+
+CLOSE = {".npz": 1e-14, ".csv": 1e-14, ".txt": 1e-6, ".bvh": 1e-6}
+"""Radians and metres by which a file may change a value."""
+
+
+@pytest.fixture(scope="module")
+def human() -> Figure:
+    return wb.load("human")
+
+
+def swinging(figure: Figure, frames: int, seed: int, dt: float = 0.04) -> wb.Clip:
+    """A clip that moves between random postures within the limits, its root turning all the way round."""
+    random = np.random.default_rng(seed)
+    low, high = figure.limits.lower, figure.limits.upper
+    ends = [low + random.uniform(0.05, 0.95, len(low)) * (high - low) for _ in range(2)]
+    q = np.tile(figure.neutral, (frames, 1))
+    for k in range(frames):
+        share = k / max(1, frames - 1)
+        q[k, figure.limits.idx_q] = (1.0 - share) * ends[0] + share * ends[1]
+        turn = pin.AngleAxis(6.5 * share, np.array([0.6, 0.0, 0.8])).matrix()
+        q[k, :7] = pin.SE3ToXYZQUAT(pin.SE3(turn, np.array([share, -0.5 * share, 1.0])))
+    return wb.Clip(figure, q, dt, "swing")
+
+
+def furthest(clip: wb.Clip, other: wb.Clip) -> float:
+    model = clip.figure.model
+    return max(float(np.abs(pin.difference(model, a, b)).max()) for a, b in zip(clip.q, other.q, strict=True))
+
+
+@pytest.mark.parametrize("ending", CLOSE)
+@given(seed=st.integers(0, 2**32 - 1), frames=st.integers(2, 5), dt=st.floats(1e-3, 1.0))
+@settings(max_examples=15)
+def test_what_is_written_is_read_again(
+    ending: str, seed: int, frames: int, dt: float, human: Figure, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    clip = swinging(human, frames, seed, dt)
+    path = tmp_path_factory.getbasetemp() / f"again{ending}"
+    again = wb.read_clip(clip.write(path), human)
+    assert furthest(clip, again) < CLOSE[ending]
+    assert again.dt == pytest.approx(dt, rel=1e-9)
+
+
+def test_a_joint_profile_is_text_as_the_thesis_writes_it(human: Figure, tmp_path: Path) -> None:
+    clip = swinging(human, 3, 1)
+    lines = clip.write(tmp_path / "a.txt").read_text().splitlines()
+    rows = [line for line in lines if not line.startswith("#")]
+    assert float(rows[0]) == clip.dt
+    assert int(rows[1]) == 3
+    assert [len(row.split("\t")) for row in rows[2:]] == [55] * 3
+    values = np.array([row.split("\t") for row in rows[2:]], dtype=float)
+    assert values[:, :3] == pytest.approx(clip.q[:, :3], abs=1e-8)
+    assert values[:, 6:] == pytest.approx(clip.q[:, 7:], abs=1e-8)
+    turns = [
+        pin.utils.rotate("x", a) @ pin.utils.rotate("y", b) @ pin.utils.rotate("z", c) for a, b, c in values[:, 3:6]
+    ]
+    for turn, q in zip(turns, clip.q, strict=True):
+        assert turn == pytest.approx(pin.Quaternion(q[3:7]).matrix(), abs=1e-8)
+
+
+def test_a_joint_profile_of_other_hands_is_read(human: Figure, tmp_path: Path) -> None:
+    """Comments anywhere, blank lines, spaces for tabs, six digits, and a line end of Windows."""
+    row = " ".join(f"{0.01 * k:.6f}" for k in range(55))
+    text = f"# Joint profiles in rad\r\n\r\n0.033333\r\n2\r\n# frames\r\n{row}\r\n  {row}  \r\n"
+    (tmp_path / "a.txt").write_bytes(text.encode())
+    clip = wb.read_clip(tmp_path / "a.txt", human)
+    assert len(clip) == 2
+    assert clip.dt == 0.033333
+    assert clip.q[0, 7:] == pytest.approx(0.01 * np.arange(6, 55), abs=1e-9)
+
+
+def test_splines_are_sampled(human: Figure) -> None:
+    times = np.array([0.5, 1.0, 1.7])
+    curves = np.random.default_rng(3).uniform(-0.4, 0.4, (3, 55))
+    frames = joint_profile.sampled(times, curves, human, 0.1)
+    assert len(frames.q) == 13
+    assert frames.q[5, 7:] == pytest.approx(curves[1, 6:], abs=1e-12)
+    wanted = CubicSpline(times, curves[:, 6:], bc_type="clamped")(0.5 + 0.1 * np.arange(13))
+    assert frames.q[:, 7:] == pytest.approx(wanted, abs=1e-12)
+    for wrong in ([0.5, 0.5, 1.0], [0.5, np.nan, 1.0]):
+        with pytest.raises(wb.InputError, match="times are"):
+            joint_profile.sampled(np.array(wrong), curves, human, 0.1)
+    with pytest.raises(wb.InputError, match="curves have shape"):
+        joint_profile.sampled(times, curves[:, :5], human, 0.1)
+
+
+PROFILE = ["# comment", "0.1", "2", "\t".join(["0"] * 55), "\t".join(["0"] * 55)]
+
+
+@pytest.mark.parametrize(
+    ("line", "text", "sentence"),
+    [
+        (1, "0", r"line 2: the time step is 0 s"),
+        (1, "-1", r"line 2: the time step is -1 s"),
+        (1, "nan", r"line 2: nan is not finite"),
+        (1, "0.1 0.2", r"line 2: 2 values where the time step is due"),
+        (2, "3", r"line 5: 2 rows and not 3"),
+        (2, "1", r"line 5: 2 rows and not 1"),
+        (2, "two", r"line 3: 'two' is no number of frames"),
+        (2, "1e9", r"line 3: '1e9' is no number of frames"),
+        (3, "0\t1", r"line 4: 2 values and not 55"),
+        (4, "\t".join(["0"] * 54 + ["nan"]), r"line 5: value 55 is nan"),
+        (4, "\t".join(["0"] * 54 + ["x"]), r"line 5: 'x' is no number"),
+    ],
+)
+def test_a_wrong_joint_profile_names_its_line(
+    line: int, text: str, sentence: str, human: Figure, tmp_path: Path
+) -> None:
+    lines = list(PROFILE)
+    lines[line] = text
+    (tmp_path / "a.txt").write_text("\n".join(lines))
+    with pytest.raises(wb.FileFormatError, match=rf"^a\.txt, {sentence}"):
+        wb.read_clip(tmp_path / "a.txt", human)
+
+
+@pytest.mark.parametrize("ending", CLOSE)
+@given(data=st.data())
+@settings(max_examples=40)
+def test_a_damaged_file_is_one_sentence_or_a_clip(
+    ending: str, data: st.DataObject, human: Figure, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.getbasetemp()
+    whole = folder / f"whole{ending}"
+    if not whole.exists():
+        swinging(human, 3, 0).write(whole)
+    content = bytearray(whole.read_bytes())
+    del content[data.draw(st.integers(0, len(content))) :]
+    words = [b"nan", b" ", b"\n", b"}", b"1e400", b"\xff", b"ROOT x\n", b"-", b"\x00"]
+    for _ in range(data.draw(st.integers(0, 3))):
+        at = data.draw(st.integers(0, len(content)))
+        content[at : at + data.draw(st.integers(0, 8))] = data.draw(st.sampled_from(words))
+    damaged = folder / f"damaged{ending}"
+    damaged.write_bytes(content)
+    try:
+        clip = wb.read_clip(damaged, human)
+        said = "damaged, but finite" if np.isfinite(clip.q).all() else ""
+    except wb.WholebodyError as error:
+        said = str(error)
+    assert "damaged" in said
+    assert "\n" not in said
+    assert len(said) < 400
+
+
+# ---- glTF, read by the specification
+
+
+def glb(path: Path) -> tuple[dict[str, Any], Callable[[int], np.ndarray]]:
+    """The JSON of a GLB file, and a function: number of an accessor -> its values."""
+    data = path.read_bytes()
+    magic, version, length = struct.unpack_from("<4sII", data)
+    assert (magic, version, length) == (b"glTF", 2, len(data))
+    size, kind = struct.unpack_from("<I4s", data, 12)
+    assert kind == b"JSON"
+    tree = json.loads(data[20 : 20 + size])
+    start = 20 + size + 8
+    assert data[start - 4 : start] == b"BIN\0"
+    assert tree["buffers"][0]["byteLength"] == len(data) - start
+
+    def values(index: int) -> np.ndarray:
+        accessor = tree["accessors"][index]
+        view = tree["bufferViews"][accessor["bufferView"]]
+        dtype = {5126: "<f4", 5125: "<u4", 5123: "<u2"}[accessor["componentType"]]
+        wide = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+        begin = start + view["byteOffset"] + accessor.get("byteOffset", 0)
+        found = np.frombuffer(data, dtype, wide * accessor["count"], begin).reshape(-1, wide)
+        assert found.min(axis=0) == pytest.approx(accessor["min"])
+        assert found.max(axis=0) == pytest.approx(accessor["max"])
+        return found
+
+    return tree, values
+
+
+def test_a_gltf_animation_moves_as_pinocchio_does(human: Figure, tmp_path: Path) -> None:
+    clip = swinging(human, 6, 2)
+    tree, values = glb(clip.write(tmp_path / "a.glb"))
+    nodes, animation = tree["nodes"], tree["animations"][0]
+    above = {child: k for k, node in enumerate(nodes) for child in node.get("children", [])}
+    keys: dict[tuple[int, str], np.ndarray] = {}
+    for channel in animation["channels"]:
+        sampler = animation["samplers"][channel["sampler"]]
+        assert sampler["interpolation"] == "LINEAR"
+        assert values(sampler["input"])[:, 0] == pytest.approx(clip.times, abs=1e-6)
+        keys[channel["target"]["node"], channel["target"]["path"]] = values(sampler["output"])
+        assert "matrix" not in nodes[channel["target"]["node"]]  # the specification forbids both
+
+    def placed(index: int, frame: int) -> np.ndarray:
+        node = nodes[index]
+        at = np.array(node["matrix"]).reshape(4, 4).T if "matrix" in node else np.eye(4)
+        turn = keys[index, "rotation"][frame] if (index, "rotation") in keys else node.get("rotation")
+        place = keys[index, "translation"][frame] if (index, "translation") in keys else node.get("translation")
+        if turn is not None:
+            at[:3, :3] = pin.Quaternion(np.array(turn, dtype=float)).normalized().matrix()
+        if place is not None:
+            at[:3, 3] = place
+        return placed(above[index], frame) @ at if index in above else at
+
+    upward = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])  # our left, up, forward are its x, y, z
+    data = human.model.createData()
+    numbers = {node["name"]: k for k, node in enumerate(nodes)}
+    for frame, q in enumerate(clip.q):
+        pin.forwardKinematics(human.model, data, q)
+        for joint, name in enumerate(human.model.names):
+            found = placed(numbers[f"joint {name}"], frame)
+            assert found[:3, 3] == pytest.approx(upward @ data.oMi[joint].translation, abs=2e-6)
+            assert found[:3, :3] == pytest.approx(upward @ data.oMi[joint].rotation, abs=2e-6)
+    drawn = {node["name"] for node in nodes if "mesh" in node}
+    assert drawn == {f"piece {piece.name}" for piece in human.geometry.geometryObjects}
+    for turns in (keys[key] for key in keys if key[1] == "rotation"):
+        assert ((turns[1:] * turns[:-1]).sum(axis=1) > 0.0).all()  # the shorter way from key to key
+
+
+# ---- BVH
+
+
+def test_what_is_written_as_bvh_moves_as_pinocchio_does(human: Figure, tmp_path: Path) -> None:
+    """Read by pybvh alone, whose kinematics is its own."""
+    pybvh = pytest.importorskip("pybvh")
+    clip = swinging(human, 40, 5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        read = pybvh.read_bvh_file(clip.write(tmp_path / "a.bvh"))
+    places = 0.01 * read.joint_positions()[:, :, [2, 0, 1]]
+    data = human.model.createData()
+    for joint, name in (("left_forearm", "left_elbow"), ("right_foot", "right_ankle"), ("left_thigh", "left_hip")):
+        at = read.joint_names.index(joint)
+        for frame in (0, 17, 39):
+            pin.framesForwardKinematics(human.model, data, clip.q[frame])
+            assert places[frame, at] == pytest.approx(data.oMf[human.frame_id(name)].translation, abs=1e-6)
+    assert np.abs(np.diff(read.joint_angles, axis=0)).max() < 1.6  # no flip of half a turn
+
+
+BVH = """HIERARCHY
+ROOT hips
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Yrotation Xposition Zposition Xrotation Yposition Zrotation
+  JOINT Bip01 L Thigh
+  {
+    OFFSET 10 0 0
+    CHANNELS 6 Xposition Yposition Zposition Yrotation Xrotation Zrotation
+    JOINT shank
+    {
+      OFFSET 0 -40 0
+      CHANNELS 2 Zrotation Xrotation
+      End Site
+      {
+        OFFSET 0 -40 0
+      }
+    }
+  }
+  JOINT spine
+  {
+    OFFSET 0 100 0
+    CHANNELS 3 Xrotation Zrotation Yrotation
+  }
+}
+MOTION
+Frames: 2
+Frame Time: 0.05
+30 1 2 40 90 50 12 0 0 10 20 30 40 50 10 20 30
+31 1 3 41 91 51 12 0 0 11 21 31 41 51 11 21 31
+"""
+"""Rotations before places, all orders mixed, places of a joint, a joint of two rotations, a name with spaces."""
+
+
+def turned(*turns: tuple[str, float]) -> np.ndarray:
+    found = np.eye(3)
+    for axis, degrees in turns:
+        found = found @ pin.utils.rotate(axis, np.radians(degrees))
+    return found
+
+
+def test_channels_of_any_order_are_read(tmp_path: Path) -> None:
+    (tmp_path / "a.bvh").write_text(BVH)
+    motion = wb.read_skeleton(tmp_path / "a.bvh")
+    assert motion.names == ("hips", "Bip01 L Thigh", "shank", "shank_end", "spine")
+    assert motion.notes == ("y is up", "lengths are in centimetres")
+    ours = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    root = np.array([1.0, 90.0, 2.0])
+    hips = turned(("y", 30), ("x", 40), ("z", 50))
+    thigh = root + hips @ (12.0, 0.0, 0.0)
+    shank = thigh + hips @ turned(("y", 10), ("x", 20), ("z", 30)) @ (0.0, -40.0, 0.0)
+    end = shank + hips @ turned(("y", 10), ("x", 20), ("z", 30)) @ turned(("z", 40), ("x", 50)) @ (0.0, -40.0, 0.0)
+    for joint, place in enumerate((root, thigh, shank, end)):
+        assert motion.positions[0, joint] == pytest.approx(0.01 * ours @ place, abs=1e-12)
+
+
+def test_up_and_units_are_recognised_or_said(tmp_path: Path) -> None:
+    (tmp_path / "a.bvh").write_text(BVH)
+    (tmp_path / "inch.bvh").write_text(BVH.replace("100", "50").replace("-40", "-20").replace("10 0 0", "5 0 0"))
+    standing = BVH.replace("OFFSET 0 100 0", "OFFSET 0 0 100").replace("OFFSET 0 -40 0", "OFFSET 0 0 -40")
+    (tmp_path / "z.bvh").write_text(standing)
+    assert wb.read_skeleton(tmp_path / "z.bvh").notes[0] == "z is up"
+    assert wb.read_skeleton(tmp_path / "inch.bvh").notes[1] == "lengths are in inches"
+    said = wb.read_skeleton(tmp_path / "a.bvh", unit="metres", up="z")
+    assert said.notes == ()
+    assert said.positions[0, 0] == pytest.approx([1.0, 90.0, 2.0])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("HIERARCHY", "hello", r"line 1: is no BVH file"),
+        ("  JOINT spine", "}\nROOT other\n{\n  JOINT spine", r"line \d+: a second root, 'other'"),
+        ("Frames: 2", "Frames: 3", r"line 30: 2 frames and not 3; the file is cut off"),
+        ("Frames: 2", "Frames: 1", r"line 30: 2 frames and not 1; the file is longer"),
+        ("Frames: 2", "Frames: x", r"line 27: 'x' is no number of frames"),
+        ("Frame Time: 0.05", "Frame Time: 0", r"line 28: the frame time is 0 s"),
+        ("Frame Time: 0.05", "", r"line 29: '30 1 2 .*' stands where Frame Time: is due"),
+        ("31 1 3", "31 1", r"line 30: 16 values and not 17"),
+        ("31 1 3", "31 1 nan", r"line 30: value 3 is nan"),
+        ("31 1 3", "31 1 a", r"line 30: 'a' is no number"),
+        ("OFFSET 10 0 0", "OFFSET 10 0", r"line 8: an OFFSET has three numbers"),
+        ("OFFSET 10 0 0", "OFFSET inf 0 0", r"line 8: inf is not finite"),
+        ("CHANNELS 2", "CHANNELS 3", r"line 13: CHANNELS are a count and as many names"),
+        ("JOINT shank", "JOINT hips", r"line 10: a second joint is called 'hips'"),
+        ("MOTION", "}\nMOTION", r"line 26: a brace that closes nothing"),
+        ("MOTION", "", r"line \d+: "),
+    ],
+)
+def test_a_wrong_bvh_names_its_line(old: str, new: str, sentence: str, human: Figure, tmp_path: Path) -> None:
+    assert old in BVH
+    (tmp_path / "a.bvh").write_text(BVH.replace(old, new, 1))
+    with pytest.raises(wb.FileFormatError, match=rf"^a\.bvh, {sentence}"):
+        wb.read_clip(tmp_path / "a.bvh", human)
+
+
+# ---- AMASS
+
+
+def amass(path: Path, **changed: Any) -> Path:
+    random = np.random.default_rng(0)
+    arrays = {
+        "poses": random.uniform(-0.3, 0.3, (7, 156)),
+        "trans": np.tile([0.0, 0.0, 0.9], (7, 1)),
+        "mocap_framerate": np.array(60.0),
+        "gender": np.array("male"),
+        "betas": np.zeros(16),
+    }
+    arrays["poses"][:, :3] = (np.pi / 2, 0.0, 0.0)
+    arrays |= changed
+    np.savez(path, **{name: value for name, value in arrays.items() if value is not None})
+    return path
+
+
+def test_an_archive_of_amass_stands_upright_and_faces_forward(tmp_path: Path, human: Figure) -> None:
+    """A root turned by a right angle about x takes the template's y (up) to z, and its z (forward) to -y."""
+    motion = wb.read_skeleton(amass(tmp_path / "a.npz", poses=np.tile([np.pi / 2] + [0.0] * 155, (7, 1))))
+    at = dict(zip(motion.names, motion.positions[0], strict=True))
+    assert motion.dt == pytest.approx(1 / 60)
+    assert at["head"][2] > at["pelvis"][2] + 0.4 > at["left_ankle"][2] + 0.8
+    assert at["left_foot"][1] < at["left_ankle"][1] - 0.1
+    assert at["left_hip"][0] > at["right_hip"][0] + 0.1
+    assert len(wb.read_clip(amass(tmp_path / "b.npz"), human)) == 7
+
+
+@pytest.mark.parametrize(
+    ("changed", "sentence"),
+    [
+        ({"trans": None}, "is no clip of wholebody"),
+        ({"mocap_framerate": None}, "is no archive of AMASS; it lacks mocap_framerate"),
+        ({"mocap_framerate": np.array(0.0)}, "the frame rate is 0"),
+        ({"poses": np.zeros((7, 20))}, r"poses have shape \(7, 20\)"),
+        ({"trans": np.zeros((6, 3))}, r"trans has shape \(6, 3\)"),
+        ({"trans": np.full((7, 3), np.nan)}, "trans have a value that is not finite or beyond 1e.06 in frame 0"),
+        ({"poses": np.array(["x"])}, "poses are no numbers"),
+    ],
+)
+def test_a_wrong_archive_of_amass_is_one_sentence(
+    changed: dict[str, Any], sentence: str, human: Figure, tmp_path: Path
+) -> None:
+    with pytest.raises(wb.FileFormatError, match=rf"^a\.npz: {sentence}"):
+        wb.read_clip(amass(tmp_path / "a.npz", **changed), human)
+
+
+def test_csv_of_other_columns_is_refused_with_its_line(human: Figure, tmp_path: Path) -> None:
+    path = swinging(human, 3, 0).write(tmp_path / "a.csv")
+    path.write_text(path.read_text().replace("left_knee_flexion", "left_knee_flexoin", 1))
+    with pytest.raises(wb.UnknownNameError, match=r"a\.csv, line 1: no column is called 'left_knee_flexoin'"):
+        wb.read_clip(path, human)
+    with pytest.raises(wb.InputError, match="two frames or more"):
+        swinging(human, 1, 0).write(tmp_path / "b.csv")
+    assert not (tmp_path / "b.csv").exists()

@@ -1,0 +1,124 @@
+"""Errors of postures in the joints' own coordinates, and heights of masses, as compiled loops: see `term_plan`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.arrays import Array
+from wholebody.compiled import compiled
+from wholebody.residual_kernel import SMALL, inverse_left, rotation_vector
+from wholebody.term_plan import Integers
+
+
+@compiled()
+def coordinates(targets: Array, places: Integers, q: Array, value: Array, jacobian: Array) -> None:
+    """Joints with a plain coordinate: see `tasks.Posture`."""
+    for e in range(len(targets)):
+        value[places[e, 0]] = q[places[e, 1]] - targets[e, 0]
+        jacobian[places[e, 0], places[e, 2]] = 1.0
+
+
+@compiled()
+def turns(targets: Array, places: Integers, q: Array, value: Array, jacobian: Array) -> None:
+    """Joints that turn for ever, whose coordinates are a cosine and a sine."""
+    for e in range(len(targets)):
+        cosine, sine = q[places[e, 1]], q[places[e, 1] + 1]
+        across = targets[e, 0] * sine - targets[e, 1] * cosine
+        value[places[e, 0]] = np.arctan2(across, targets[e, 0] * cosine + targets[e, 1] * sine)
+        jacobian[places[e, 0], places[e, 2]] = 1.0
+
+
+@compiled(error_model="numpy")
+def roots(targets: Array, places: Integers, q: Array, value: Array, jacobian: Array) -> None:
+    """Free roots: log of the motion from the target, and its derivative by a motion in the root's own frame.
+
+    With log M = (v, w), v = J p for the inverse left Jacobian J of w and the translation p of M. The derivative is
+    [[A, B A], [0, A]] with A the transpose of J and B the derivative of v by the rotation (Chirikjian 2011, section
+    10.6, in the form of Pinocchio's Jlog6).
+    """
+    own, change, left, bend = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    angle, way, along = np.empty(3), np.empty(3), np.empty(3)
+    for e in range(len(targets)):
+        row, at, v = places[e, 0], places[e, 1], places[e, 2]
+        target = targets[e].reshape((4, 3))
+        _rotation(q[at + 3 : at + 7], own)
+        for i in range(3):
+            way[i] = 0.0
+            for k in range(3):
+                way[i] += target[i, k] * (q[at + k] - target[3, k])
+            for j in range(3):
+                change[i, j] = 0.0
+                for k in range(3):
+                    change[i, j] += target[i, k] * own[k, j]
+        rotation_vector(change, angle)
+        inverse_left(angle, left)
+        for i in range(3):
+            value[row + i] = left[i, 0] * way[0] + left[i, 1] * way[1] + left[i, 2] * way[2]
+            value[row + 3 + i] = angle[i]
+        square = angle[0] ** 2 + angle[1] ** 2 + angle[2] ** 2
+        size = np.sqrt(square)
+        if size < SMALL:
+            beta, slope = 1.0 / 12.0 + square / 720.0, 1.0 / 360.0
+        else:
+            half = 0.5 / (1.0 - np.cos(size))
+            share = np.sin(size) / size
+            beta = 1.0 / square - share * half
+            slope = -2.0 / (square * square) + (1.0 + share) * half / square
+        inner = angle[0] * way[0] + angle[1] * way[1] + angle[2] * way[2]
+        for i in range(3):
+            along[i] = slope * inner * angle[i] - (square * slope + 2.0 * beta) * way[i]
+        for i in range(3):
+            for m in range(3):
+                bend[i, m] = along[i] * angle[m] + beta * angle[i] * way[m]
+            bend[i, i] += beta * inner
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            bend[j, i] += 0.5 * way[k]
+            bend[k, i] -= 0.5 * way[j]
+        for i in range(3):
+            for m in range(3):
+                jacobian[row + i, v + m] = jacobian[row + 3 + i, v + 3 + m] = left[m, i]
+                jacobian[row + i, v + 3 + m] = (
+                    bend[i, 0] * left[m, 0] + bend[i, 1] * left[m, 1] + bend[i, 2] * left[m, 2]
+                )
+
+
+@compiled()
+def _rotation(unit: Array, turn: Array) -> None:
+    """Rotation (3, 3) of a unit quaternion x, y, z, w."""
+    x, y, z, w = unit[0], unit[1], unit[2], unit[3]
+    turn[0, 0], turn[0, 1], turn[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)
+    turn[1, 0], turn[1, 1], turn[1, 2] = 2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)
+    turn[2, 0], turn[2, 1], turn[2, 2] = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)
+
+
+@compiled()
+def heights(
+    tables: Array,
+    entries: Integers,
+    joints: Array,
+    columns: Array,
+    support: NDArray[np.int8],
+    column: Integers,
+    measure: Array,
+) -> None:
+    """See `tasks.PotentialEnergy`."""
+    nv = measure.shape[1] - 1
+    row = np.empty(nv)
+    centre = np.empty(3)
+    for e in range(len(tables)):
+        joint = entries[e, 0]
+        for i in range(3):
+            centre[i] = joints[joint, 3, i]
+            for k in range(3):
+                centre[i] += joints[joint, k, i] * tables[e, k]
+        weight, rise = tables[e, 3], centre[2] - tables[e, 4]
+        measure[0, nv] += weight * rise * rise
+        row[:] = 0.0
+        for k in range(len(columns)):
+            if support[joint, k]:
+                row[column[k, 0]] += columns[k, 2] + centre[1] * columns[k, 3] - centre[0] * columns[k, 4]
+        for v in range(nv):
+            measure[0, v] += 2.0 * weight * rise * row[v]
+            measure[1, v] += 2.0 * weight * row[v] * row[v]

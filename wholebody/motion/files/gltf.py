@@ -1,0 +1,156 @@
+"""Clips as glTF animations (.glb): one node a joint, with the figure's pieces below, for Blender and three.js viewers.
+
+trimesh writes the meshes and the nodes. Its postprocessors add keyframes of rotations and translations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.errors import InputError, MissingPackageError
+from wholebody.figures.figure import Figure
+from wholebody.files import write as write_file
+from wholebody.motion.files.base import Motion
+from wholebody.motion.skeleton import UP
+
+FLOAT = 5126
+"""glTF's number for 32-bit floats."""
+
+STILL = 1e-9
+"""Metres or quaternion units by which a joint may move over a clip and still get no keyframes."""
+
+COLOR = (214, 189, 165, 255)
+"""Red, green, blue, alpha of the figure."""
+
+MOST_KEYS = 20_000_000
+"""Keyframes of all joints together: about 600 MB."""
+
+WORLD = "world_y_up"
+
+
+def write(motion: Motion, path: Path) -> Path:
+    """Write a clip as an animation: y up, z forward, metres, one keyframe a frame, interpolated linearly.
+
+    Raises:
+        InputError: the file cannot be written.
+        MissingPackageError: trimesh is not installed.
+    """
+    try:
+        import trimesh
+        from trimesh.exchange.gltf import export_glb
+    except ImportError:
+        raise MissingPackageError("writing glTF needs trimesh: pip install trimesh") from None
+    figure = motion.figure
+    if len(motion.q) * figure.model.njoints > MOST_KEYS:
+        raise InputError(f"{motion.name}: {len(motion.q)} frames are too many for one glTF file; write parts of it")
+    names = [f"joint {name}" for name in figure.model.names]
+    keys = _keys(figure, motion.q)
+    scene = trimesh.Scene(base_frame=WORLD)
+    upward = np.eye(4)
+    upward[:3, :3] = UP["y"].T
+    scene.graph.update(frame_to=names[0], frame_from=WORLD, matrix=upward)
+    for joint in range(1, figure.model.njoints):
+        at = np.eye(4)
+        at[:3, :3], at[:3, 3] = pin.Quaternion(keys[0][0, joint]).matrix(), keys[1][0, joint]
+        scene.graph.update(frame_to=names[joint], frame_from=names[figure.model.parents[joint]], matrix=at)
+    material = trimesh.visual.material.PBRMaterial(baseColorFactor=COLOR, roughnessFactor=0.8, metallicFactor=0.0)
+    for piece in figure.geometry.geometryObjects:
+        mesh = _mesh(trimesh, piece.geometry)
+        if mesh is not None:
+            mesh.visual = trimesh.visual.TextureVisuals(material=material)
+            scene.add_geometry(
+                mesh, node_name=f"piece {piece.name}", geom_name=f"mesh {piece.name}",
+                parent_node_name=names[piece.parentJoint], transform=piece.placement.homogeneous,
+            )  # fmt: skip
+    animate = _Animation(motion, names, keys)
+    return write_file(path, export_glb(scene, buffer_postprocessor=animate.buffers, tree_postprocessor=animate.tree))
+
+
+class _Animation:
+    """Adds keyframes to trimesh's tree and buffers."""
+
+    def __init__(self, motion: Motion, names: list[str], keys: tuple[Array, Array]) -> None:
+        self.motion, self.names = motion, names
+        self.turns, self.places = keys
+        self._channels: list[tuple[str, str, int]] = []
+        self._times = 0
+
+    def buffers(self, buffers: Any, tree: Any) -> None:
+        """Append times, rotations and translations as accessors."""
+
+        def accessor(label: str, values: Array, kind: str) -> int:
+            data = np.ascontiguousarray(values, dtype="<f4")
+            flat = data.reshape(len(data), -1)
+            buffers[label] = data.tobytes()
+            tree["accessors"][label] = {
+                "bufferView": len(buffers) - 1, "componentType": FLOAT, "count": len(data), "type": kind,
+                "min": flat.min(axis=0).tolist(), "max": flat.max(axis=0).tolist(),
+            }  # fmt: skip
+            return len(tree["accessors"]) - 1
+
+        self._times = accessor("times", self.motion.dt * np.arange(len(self.motion.q), dtype=np.float64), "SCALAR")
+        for joint in range(1, len(self.names)):
+            for path, keys, kind in (("rotation", self.turns, "VEC4"), ("translation", self.places, "VEC3")):
+                values = keys[:, joint]
+                if np.ptp(values, axis=0).max() > STILL:
+                    index = accessor(f"{path} {joint}", values, kind)
+                    self._channels.append((self.names[joint], path, index))
+
+    def tree(self, tree: Any) -> None:
+        """Give the joints rotations and translations in place of matrices, and list the channels."""
+        times = self._times
+        nodes = {node["name"]: index for index, node in enumerate(tree["nodes"])}
+        for joint in range(1, len(self.names)):
+            node = tree["nodes"][nodes[self.names[joint]]]
+            node.pop("matrix", None)
+            node["rotation"], node["translation"] = self.turns[0, joint].tolist(), self.places[0, joint].tolist()
+        if self._channels:
+            tree["animations"] = [
+                {
+                    "name": self.motion.name,
+                    "samplers": [
+                        {"input": times, "output": index, "interpolation": "LINEAR"} for *_, index in self._channels
+                    ],
+                    "channels": [
+                        {"sampler": number, "target": {"node": nodes[name], "path": path}}
+                        for number, (name, path, _) in enumerate(self._channels)
+                    ],
+                }
+            ]
+
+
+def _keys(figure: Figure, q: Array) -> tuple[Array, Array]:
+    """Quaternions (n, joints, 4) and translations (n, joints, 3) of all joints in their parents, without sign flips."""
+    model = figure.model
+    data = model.createData()
+    turns, places = np.empty((len(q), model.njoints, 4)), np.empty((len(q), model.njoints, 3))
+    for k, posture in enumerate(q):
+        pin.forwardKinematics(model, data, posture)
+        for joint, at in enumerate(data.liMi):
+            values = pin.SE3ToXYZQUAT(at)
+            places[k, joint], turns[k, joint] = values[:3], values[3:]
+    flips = np.where((turns[1:] * turns[:-1]).sum(axis=2) < 0.0, -1.0, 1.0)
+    turns[1:] *= np.cumprod(flips, axis=0)[:, :, None]
+    return turns, places
+
+
+def _mesh(trimesh: Any, shape: Any) -> Any:
+    """Triangles of a convex piece; None for a half-space, which has no end."""
+    kind = type(shape).__name__
+    makers: dict[str, Callable[[], Any]] = {
+        "Sphere": lambda: trimesh.creation.icosphere(3, shape.radius),
+        "Box": lambda: trimesh.creation.box(2.0 * np.asarray(shape.halfSide)),
+        "Capsule": lambda: trimesh.creation.capsule(2.0 * shape.halfLength, shape.radius, count=[16, 16]),
+        "Ellipsoid": lambda: trimesh.creation.icosphere(3, 1.0).apply_scale(np.asarray(shape.radii)),
+    }
+    if kind in makers:
+        return makers[kind]()
+    if kind in ("Halfspace", "Plane"):
+        return None
+    return trimesh.convex.convex_hull(np.asarray(shape.points()))

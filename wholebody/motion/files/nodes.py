@@ -1,0 +1,211 @@
+"""A figure as a tree of nodes that rotate, as files of skeletons hold it, and back.
+
+Joints at one place become one node: the three of a hip are one rotation. All axes of nodes are those of the world where
+the posture is zero, as in BVH.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from scipy.spatial.transform import Rotation
+
+from wholebody.arrays import Array
+from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
+
+SAME_PLACE = 1e-9
+"""Metres between joints that are at one place."""
+
+ORTHOGONAL = 1e-6
+"""Cosine between axes of joints that make one node."""
+
+OFF = 1e-4
+"""Metres and radians by which a skeleton may differ from a figure and still be the figure's own."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A part that rotates about one place.
+
+    Attributes:
+        name: of the segment.
+        parent: index of a node; -1 for the root.
+        offset: (3,) from the parent's place to this one's where the posture is zero, metres.
+        joints: indices of Pinocchio's joints, from the trunk outwards; none for the base of a fixed figure.
+        axes: (k, 3) their axes where the posture is zero.
+        tip: (3,) from its place to its end, or None where other nodes follow.
+    """
+
+    name: str
+    parent: int
+    offset: Array
+    joints: tuple[int, ...]
+    axes: Array
+    tip: Array | None
+
+
+def nodes_of(figure: Figure) -> list[Node]:
+    """The nodes of a figure, parents before children.
+
+    Raises:
+        InputError: a joint slides, or follows another one.
+    """
+    model = figure.model
+    data = model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    pin.updateFramePlacements(model, data)
+    places = [np.zeros(3)]
+    found = [Node(figure.segments[0] if figure.segments else "base", -1, np.zeros(3), (), np.zeros((0, 3)), None)]
+    node_of = {0: 0}
+    first = 1
+    if figure.root == "free":
+        found[0] = Node(found[0].name, -1, np.zeros(3), (1,), np.zeros((0, 3)), None)
+        node_of[1], first = 0, 2
+    for joint in range(first, model.njoints):
+        parent = model.parents[joint]
+        if model.joints[joint].nv != 1 or np.linalg.norm(data.J[3:, model.joints[joint].idx_v]) < 0.5:
+            raise InputError(
+                f"{figure.name}: joint {model.names[joint]!r} is no hinge, and files of skeletons hold rotations; "
+                "give .npz or .csv"
+            )
+        axis = np.array(data.J[3:, model.joints[joint].idx_v])
+        place = np.array(data.oMi[joint].translation)
+        at = node_of[parent]
+        before = found[at]
+        merges = (
+            at > 0
+            and before.joints[-1] == parent
+            and len(before.joints) < 3
+            and np.linalg.norm(place - places[at]) < SAME_PLACE
+            and sum(other == parent for other in model.parents) == 1
+            and abs(before.axes[-1] @ axis) < ORTHOGONAL
+        )
+        if merges:
+            found[at] = Node(
+                _segment(figure, joint), before.parent, before.offset, (*before.joints, joint),
+                np.vstack([before.axes, axis]), None,
+            )  # fmt: skip
+            node_of[joint] = at
+            continue
+        node_of[joint] = len(found)
+        found.append(Node(_segment(figure, joint), at, place - places[at], (joint,), axis[None], None))
+        places.append(place)
+    ends = set(range(len(found))) - {node.parent for node in found}
+    return [
+        Node(node.name, node.parent, node.offset, node.joints, node.axes, _tip(figure, data, node, places[k]))
+        if k in ends
+        else node
+        for k, node in enumerate(found)
+    ]
+
+
+def rotations(figure: Figure, nodes: list[Node], q: Array) -> tuple[Array, Array]:
+    """Rotation of each node in its parent (n, nodes, 3, 3), and the place of the root (n, 3), of postures (n, nq)."""
+    model = figure.model
+    data = model.createData()
+    last = [node.joints[-1] if node.joints else 0 for node in nodes]
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    rest = np.array([data.oMi[joint].rotation for joint in last])
+    world, root = np.empty((len(q), len(nodes), 3, 3)), np.empty((len(q), 3))
+    for k, posture in enumerate(q):
+        pin.forwardKinematics(model, data, posture)
+        world[k] = np.array([data.oMi[joint].rotation for joint in last])
+        root[k] = data.oMi[last[0]].translation
+    world = world @ np.swapaxes(rest, 1, 2)
+    parents = [node.parent for node in nodes]
+    local = np.array(world)
+    local[:, 1:] = np.swapaxes(world[:, parents[1:]], 2, 3) @ world[:, 1:]
+    return local, root
+
+
+def postures(figure: Figure, nodes: list[Node], local: Array, root: Array) -> Array | None:
+    """Postures (n, nq) of rotations that `rotations` gave; None where the rotations are not the figure's."""
+    model = figure.model
+    q = np.tile(pin.neutral(model), (len(local), 1))
+    for k, node in enumerate(nodes):
+        if k == 0:
+            if figure.root == "free":
+                q[:, :3] = root
+                q[:, 3:7] = Rotation.from_matrix(local[:, 0]).as_quat()
+            continue
+        angles = _angles(figure, node, local[:, k])
+        if angles is None:
+            return None
+        for joint, values in zip(node.joints, angles.T, strict=True):
+            at = model.joints[joint]
+            if at.nq == 1:
+                q[:, at.idx_q] = values
+            else:
+                q[:, at.idx_q], q[:, at.idx_q + 1] = np.cos(values), np.sin(values)
+    return q
+
+
+def _angles(figure: Figure, node: Node, turns: Array) -> Array | None:
+    """Angles (n, joints) about the axes of a node; None where other axes are needed."""
+    count = len(node.joints)
+    turned = Rotation.from_matrix(turns)
+    if count == 1:
+        vectors = turned.as_rotvec()
+        angle = vectors @ node.axes[0]
+        off = np.linalg.norm(vectors - angle[:, None] * node.axes[0], axis=1)
+        choices = angle[:, None][None]
+    else:
+        axes = node.axes if count == 3 else np.vstack([node.axes, np.cross(node.axes[0], node.axes[1])])
+        first = turned.as_davenport(axes, "intrinsic")
+        mirrored = -1.0 if abs(axes[0] @ axes[2]) > 0.5 else 1.0  # axes as Z X Z, or as Z X Y
+        other = first * (1.0, -mirrored, 1.0) + (np.pi, np.pi if mirrored > 0.0 else 0.0, np.pi)
+        off = np.abs(_wrapped(first[:, 2])) if count == 2 else np.zeros(len(first))
+        # The other solution of two axes has half a turn about a third one, which the node has not.
+        choices = first[:, :2][None] if count == 2 else np.stack([first, other])
+    if (off > OFF).any():
+        return None
+    lower, upper = _ranges(figure, node)
+    middle = 0.5 * (lower + upper)
+    choices = middle + _wrapped(choices - middle)
+    beyond = (np.maximum(lower - choices, 0.0) + np.maximum(choices - upper, 0.0)).sum(axis=2)
+    best = beyond.argmin(axis=0)
+    chosen: Array = choices[best, np.arange(len(turns))]
+    return chosen
+
+
+def _ranges(figure: Figure, node: Node) -> tuple[Array, Array]:
+    """Limits of a node's joints; half a turn both ways without."""
+    limits = {
+        int(i): (low, high)
+        for i, low, high in zip(figure.limits.idx_q, figure.limits.lower, figure.limits.upper, strict=True)
+    }
+    found = [limits.get(figure.model.joints[joint].idx_q, (-np.pi, np.pi)) for joint in node.joints]
+    return np.array([low for low, _ in found]), np.array([high for _, high in found])
+
+
+def _wrapped(angles: Array) -> Array:
+    found: Array = (angles + np.pi) % (2.0 * np.pi) - np.pi
+    return found
+
+
+def _segment(figure: Figure, joint: int) -> str:
+    """Name of the segment that a joint carries; the joint's where there is none."""
+    frames = figure.model.frames
+    name = next(
+        (s for s in figure.segments if frames[figure.frame_id(s)].parentJoint == joint), figure.model.names[joint]
+    )
+    return "_".join(str(name).split())
+
+
+def _tip(figure: Figure, data: pin.Data, node: Node, place: Array) -> Array:
+    """The frame of the node that is farthest from its place; five centimetres on where there is none."""
+    last = node.joints[-1] if node.joints else 0
+    frames = figure.model.frames
+    ends = [
+        data.oMf[figure.frame_id(name)].translation - place
+        for name in figure.frames
+        if frames[figure.frame_id(name)].parentJoint == last
+    ]
+    far: Array = np.array(max(ends, key=np.linalg.norm, default=np.zeros(3)))
+    if np.linalg.norm(far) < SAME_PLACE:
+        along = node.offset / max(float(np.linalg.norm(node.offset)), SAME_PLACE)
+        far = 0.05 * (along if np.linalg.norm(along) > 0.5 else np.array([0.0, 0.0, -1.0]))
+    return far
