@@ -529,6 +529,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "equipment", Call(wb.equipment, {"name": "pack", "figure": hand})
     yield "fill_with_spheres", Call(fill_with_spheres, {"shape": wb.Sphere(0.1), "count": 1, "envelope": False})
     yield "Spheres", Call(Spheres, {"centers": [[0.0, 0.0, 0.0]], "radii": [0.1]})
+    yield "Spheres.pieces", Call(Spheres([[0.0, 0.0, 0.0]], [0.1]).pieces, {})
     stance = {"feet": ["link1"], "speed": 0.1, "height": 0.05, "least": 0.1}
     yield "StanceFeet", Call(wb.StanceFeet, stance, lambda made: made.names(arm))
     yield "StanceFeet.names", Call(wb.StanceFeet(["link1"]).names, {"figure": arm})
@@ -536,8 +537,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     pair = {"before": clip, "after": clip}
     for measure in (measures.deviation, measures.jerk_ratio, measures.foot_sliding):
         yield measure.__name__, Call(measure, pair)
-    one = wb.Clip(hand, [hand.neutral], 0.1)  # type: ignore[arg-type]
-    held = {"before": one, "after": one, "hand": "right_palm", "other": "left_palm"}
+    still = wb.Clip(hand, [hand.neutral], 0.1)  # type: ignore[arg-type]
+    held = {"before": still, "after": still, "hand": "right_palm", "other": "left_palm"}
     yield "hand_error", Call(measures.hand_error, held)
     yield "share_deeper", Call(measures.share_deeper, {"found": wb.check(clip), "depth": 0.01})
     yield "ClipCheck.as_dict", Call(wb.check(clip).as_dict, {})
@@ -589,8 +590,7 @@ ANSWERS = (
     "Task", "Step", "QPStep", "Simplified", "LeftOut",
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
     "Scene.of_parts", "ClipCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
-    "Recording", "Torques", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
-    "Scene.of_parts",
+    "Torques", "SphereFilling",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 
