@@ -18,7 +18,7 @@ from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
 from wholebody.methods.qp.subproblem import Rows
-from wholebody.methods.qp.turning import Turning
+from wholebody.methods.qp.turning import OFF, Turning
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
@@ -193,7 +193,7 @@ class QPTracker:
             motion = answer.motion
         share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
         displacement = answer.x.copy() if share == 1.0 else share * answer.x
-        following, curved = None, share**2 * motion * answer.turn  # twice what bodies that turn alike are nearer by
+        following, curved = None, share * motion * (share * answer.turn + OFF)  # roughly, and rather too much
         if curved > INSIDE and answer.spare < 0.5 * SPARE * curved:
             unseen = _unseen(at.clearance[: len(at.contacts.distance)])
             if curved > np.minimum.reduce(unseen, initial=np.inf):

@@ -18,6 +18,7 @@ from wholebody.methods.qp.subproblem import Rows
 from wholebody.workspace import Workspace
 
 ROOM = 2.0  # times what a pair may get nearer by turning: with more room after a step it is not looked at
+OFF = 6e-3  # rad: by which coal's normal may be off, as it stops within 1e-6 m of the distance
 
 
 class Turning:
@@ -33,7 +34,7 @@ class Turning:
              for own, reach in zip(points, table.reach, strict=True)]
         ).reshape(-1)  # fmt: skip
         self._point = np.array([len(own) == 1 for own in points], dtype=bool)
-        self._lengths = np.array([ROOM, BAND, LEVER_DISTANCE])
+        self._lengths = np.array([ROOM, BAND, LEVER_DISTANCE, OFF])
 
     def bent(self, at: Passing, rows: Rows, displacement: Array, unseen: Array) -> float:
         """Largest share of `unseen` by which a pair that may end too near can be nearer than its rows say.
@@ -51,7 +52,7 @@ class Turning:
         share: float = self._kernel.bent(
             state.spread(displacement), state.columns, state.column_joint, state.parents, self._workspace.table.joint,
             self._reach, self._point, contacts.placements, contacts.pair, contacts.distance,
-            at.clearance[: len(unseen)], unseen, rows.elastic_violation - rows.elastic @ displacement, rows.contact,
+            at.clearance[: len(unseen)], unseen, displacement, rows.elastic, rows.elastic_violation, rows.contact,
             rows.contacts - len(unseen), self._lengths,
         )  # fmt: skip
         return share
@@ -65,7 +66,7 @@ def compiled_kernel() -> Any:
     none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
     turning_kernel.bent(
         np.zeros(1), np.zeros((6, 1)).T, np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp), index, none,
-        np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), none, none, none, none, index,
-        0, np.zeros(3),
+        np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), none, none, none, np.zeros(1),
+        np.zeros((0, 1)), none, index, 0, np.zeros(4),
     )  # fmt: skip
     return turning_kernel
