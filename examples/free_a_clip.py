@@ -39,10 +39,7 @@ def main(
     report = freed.report
     print(f"{walk.name} with {gear}: {len(walk)} frames of {walk.dt:.4f} s, by {report.method}")
     for name, found in (("before", report.before), ("after", report.after)):
-        print(
-            f"  {name}: {found.colliding} frames collide, {1e3 * found.deepest:.1f} mm at most; "
-            f"{found.dips} dips between"
-        )
+        print(f"  {name}: {found.colliding} frames collide, {1e3 * found.deepest:.1f} mm at most; {found.dips} dips")
     print(
         f"  {report.frames_changed} frames changed, {report.posture_solves} postures predicted, {report.seconds:.1f} s"
     )

@@ -85,6 +85,13 @@ def test_things_of_a_task(folder: Path, root: Path, capsys: pytest.CaptureFixtur
     assert "with things around it" in capsys.readouterr().out
 
 
+def test_what_is_worn(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["clip", "check", str(folder / "inside.npz"), "--equipment", "side_sphere"]) == 1
+    out = capsys.readouterr().out
+    assert "with what it carries" in out
+    assert "side_sphere" in out
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -93,6 +100,7 @@ def test_things_of_a_task(folder: Path, root: Path, capsys: pytest.CaptureFixtur
         (["free.npz", "--html", "no/such/page.html"], "no/such"),
         (["free.npz", "--scene", "no.toml"], "no.toml"),
         (["free.npz", "--figure", "hand"], "free"),
+        (["free.npz", "--equipment", "sack"], "did you mean pack"),
     ],
 )
 def test_wrong_input_is_one_sentence(

@@ -24,7 +24,7 @@ Example = Callable[[str], ModuleType]
 SINGLE = ("shelf", "carry_box_past_table", "behind_the_back", "look_and_touch_overhead", "robot_arm_among_obstacles")
 OTHERS = (
     *("chair", "console_two_people", "hand_on_table", "avatar_two_arms"),
-    *("sit_on_chair", "four_bar", "assemble_shelf"),
+    *("sit_on_chair", "four_bar", "assemble_shelf", "free_a_clip"),
 )
 REST_ON = {("pelvis", "pouch"), ("lower_lumbar", "pouch")}  # what the figure wears lies on it
 
@@ -313,3 +313,20 @@ def test_ends_in_a_picture_and_a_page(example: Example, tmp_path: Path, monkeypa
     pixels = np.asarray(Image.open(picture).convert("RGB"), dtype=float)
     assert pixels.shape == (720, 960, 3)
     assert pixels.std() > 10.0
+
+
+def test_a_clip_with_a_pack_is_free_in_every_frame(
+    example: Example, tmp_path: Path, capsys: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Arms swing where there is no recording; the freed clip is judged by coal on all pairs."""
+    module = example("free_a_clip")
+    monkeypatch.setenv("WHOLEBODY_DATA", str(tmp_path))
+    freed = module.main(out=tmp_path, pictures=False)
+    assert freed.report.solved
+    assert freed.report.frames_changed > 10
+    scene = wb.Scene(freed.clip.figure)
+    for piece in wb.equipment("pack", freed.clip.figure):
+        piece.attach(scene)
+    assert assess_motion(scene, freed.clip.q, freed.clip.dt).depth.max() <= 1e-4
+    assert "arms swing" in capsys.readouterr().out
+    assert module.chart(freed.clip, freed.clip, "pack", tmp_path / "curves.png").stat().st_size > 10_000

@@ -203,5 +203,22 @@ def test_a_skeleton_of_unknown_names_is_refused_with_the_way_out(human: Figure) 
         wb.retarget(strange, human)
 
 
+def test_an_arm_alone_moves_the_arm_of_a_person_that_stays(human: Figure) -> None:
+    whole = person(6)
+    kept = [whole.names.index(f"left_{part}") for part in ("shoulder", "elbow", "wrist")]
+    arm = SkeletonMotion(
+        tuple(whole.names[k] for k in kept), np.array([-1, 0, 1]), whole.offsets[kept], whole.rotations[:, kept],
+        whole.positions[:, kept], whole.dt,
+    )  # fmt: skip
+    names = {"skeleton": {name: name for name in arm.names}}
+    clip = wb.retarget(arm, human, names)
+    assert np.abs(clip.q[:, :3] - human.neutral[:3]).max() < 0.02
+    way = arm.positions[:, 2] - arm.positions[:, 1]
+    assert angles(bone(clip, "left_elbow", "left_wrist"), way).max() < 8.0
+    alone = {"skeleton": {"left_shoulder": "left_shoulder", "right_wrist": "left_wrist"}}
+    with pytest.raises(wb.InputError, match="make no bone; name both ends of one"):
+        wb.retarget(arm, human, alone)
+
+
 def test_one_frame_is_retargeted(human: Figure) -> None:
     assert len(wb.retarget(person(1), human)) == 1

@@ -67,7 +67,7 @@ def _deepest(workspace: Workspace, before: Array, after: Array, number: int) -> 
         return float(near.distance[near.number == number].min(initial=FAR))
 
     contact = workspace.sweep.first_contact(before, after, tolerance=DIP)
-    begun = () if contact is None else (contact.fraction, contact.fraction + BEHIND)
+    begun: tuple[float, ...] = () if contact is None else (contact.fraction, contact.fraction + BEHIND)
     shares = sorted({0.0, *MANY, *begun, 1.0})
     place = 1 + int(np.argmin([distance(share) for share in shares[1:-1]]))
     low, high = shares[place - 1], shares[place + 1]

@@ -25,6 +25,7 @@ from wholebody.scene import Scene
 from wholebody.tasks.base import Bound, Goal
 
 ROUNDS = 12  # each frees the deepest frame of every collision that is left
+SMALLEST = 1e-4  # m: what a dip between two frames counts for
 MOST_SOLVES = 200  # of postures, for a whole clip
 
 
@@ -61,6 +62,7 @@ class Fade:
         check_input(clip, scene, progress)
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
         q, fade, solves, programs = np.array(clip.q), max(1, round(self.fade / clip.dt)), 0, 0
+        total = np.inf
         with scene.lend() as workspace:
             for number in range(self.rounds):
                 depths, wrong, gaps = faults(workspace, terms, q, self.clearance)
@@ -68,6 +70,9 @@ class Fade:
                 left = runs(wrong)
                 if not left:
                     return MethodResult(q, solves, programs)
+                total, before = float(depths.sum()) + len(gaps) * SMALLEST, total
+                if total >= before:
+                    return MethodResult(q, solves, programs, "a round made nothing better")
                 for place, run in enumerate(left):
                     if watch.tell((number + place / len(left)) / self.rounds, f"round {number + 1}"):
                         return MethodResult(q, solves, programs, "the caller ended it")
@@ -97,7 +102,7 @@ def freed_posture(terms: FrameTerms, frame: int, q: Array, clearance: float) -> 
     bounds = [term for term in terms.given if isinstance(term, Bound)]
     problem = Problem(terms.scene, terms.scene.figure.clamp(q), goals=goals, constraints=[*others, *bounds])
     problem.clearances = np.full_like(problem.clearances, clearance)
-    solution = QP().solve(problem)
+    solution = QP(restarts=0).solve(problem)
     return solution.q, sum(solution.programs.values())
 
 

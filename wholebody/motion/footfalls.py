@@ -25,6 +25,9 @@ BLEND = 0.15
 DRIFT = 0.03
 """Metres by which a foot that stands may move in the recording: a foot that moves more has made a step."""
 
+SMALL = 1e-9
+"""Metres: shorter ways have no direction."""
+
 
 class Footfalls(NamedTuple):
     """When parts of the feet stand.
@@ -94,7 +97,9 @@ def held(
                     flat = place[:2] - ahead[:2]
                     rise = places[role][2] - places[toe][2]
                     length = np.linalg.norm(places[role] - places[toe])
-                    place[:2] = ahead[:2] + flat / np.linalg.norm(flat) * np.sqrt(max(length**2 - rise**2, 0.0))
+                    place[:2] = ahead[:2] + flat / max(float(np.linalg.norm(flat)), SMALL) * np.sqrt(
+                        max(length**2 - rise**2, 0.0)
+                    )
                 place[2] = places[role][2] - lowest
                 corrections.append((first, last, place))
             found[role] = _blended(points[role], corrections, max(1, round(BLEND / dt)))

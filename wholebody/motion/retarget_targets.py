@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -151,12 +152,19 @@ def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, steps: Footfal
     else:
         scale = _leg(own) / max(_leg(source), SMALL) if _leg(own) and _leg(source) else 1.0
         hips = scale * source.places["hips"]
-        if "left_ankle" in steps.heights and own.has("left_ankle"):
-            hips[:, 2] += own.places["left_ankle"][2] - lowest - scale * steps.heights["left_ankle"]
+        foot = next((part for part in ("left_ankle", "left_toe") if part in steps.heights and own.has(part)), None)
+        if foot is not None:
+            hips[:, 2] += own.places[foot][2] - lowest - scale * steps.heights[foot]
         else:
             hips[:, 2] -= scale * float(np.percentile(motion.positions[:, :, 2].min(axis=1), 2))
-    points = _points(own, source, hips, figure.root == "fixed")
+    points = _points(own, source, hips, figure.root == "fixed" or not has_trunk(joint))
     return Targets(held(points, steps, places, lowest, motion.dt), turns, root, scale)
+
+
+def has_trunk(roles: Collection[str]) -> bool:
+    """Whether roles say where the trunk is: a pelvis, or a hip or shoulder on both sides."""
+    pairs = ({f"left_{part}", f"right_{part}"} for part in ("hip", "shoulder"))
+    return "pelvis" in roles or any(pair <= set(roles) for pair in pairs)
 
 
 def _leg(body: _Body) -> float:

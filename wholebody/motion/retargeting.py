@@ -10,11 +10,12 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.checks import function
+from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.footfalls import Footfalls, footfalls
 from wholebody.motion.posture_fit import Fitter, Goals
-from wholebody.motion.retarget_targets import Targets, targets
+from wholebody.motion.retarget_targets import Targets, has_trunk, targets
 from wholebody.motion.roles import Roles, matched
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.smooth_fit import smooth
@@ -65,7 +66,7 @@ def retarget(
     Raises:
         UnknownNameError: a name that does not exist.
         FileFormatError: the TOML file cannot be read.
-        InputError: no bones are known to belong to the figure.
+        InputError: no bones are known to belong to the figure, or two ends of none.
     """
     motion = checked_motion(motion, "retarget: motion")
     check_figure(figure, "retarget")
@@ -73,6 +74,11 @@ def retarget(
     roles = matched(motion.names, figure, names)
     steps = footfalls(motion, roles)
     wanted = targets(motion, figure, roles, steps)
+    if not wanted.points:
+        raise InputError(
+            f"the roles that {motion.name} and {figure.name} have in common ({', '.join(roles.joints)}) make no bone; "
+            "name both ends of one"
+        )
     return Clip(figure, _Retargeting(motion, figure, roles, wanted, steps, progress).run(), motion.dt, motion.name)
 
 
@@ -109,6 +115,9 @@ class _Retargeting:
         self.count = len(motion)
         self.neutral = figure.neutral
         self.stay = POSTURE * figure.neutral_weights
+        self.led = figure.root == "free" and has_trunk(roles.joints)
+        if figure.root == "free" and not self.led:
+            self.stay[:6] = 1.0  # nothing says where the figure is, so it stays
         self._progress, self._done = progress, 0
 
     def run(self) -> Array:
@@ -141,7 +150,7 @@ class _Retargeting:
     def _start(self, frame: int) -> Array:
         """Where the descent of a frame alone begins: the neutral posture, with the pelvis as it is wanted."""
         q = np.array(self.neutral)
-        if self.figure.root == "free":
+        if self.led:
             hips = [k for k, role in enumerate(self.points) if role.endswith("hip")] or [0]
             at = self.places[frame, hips].mean(axis=0)
             q[:7] = pin.SE3ToXYZQUAT(pin.SE3(self.root[frame], at))

@@ -37,6 +37,12 @@ _SMPL = {
 }  # fmt: skip
 _PLAIN = {**_SMPL, "pelvis": "root", "chest": "chest", "neck": "", "head": "neck", "toe": "", "hand": "wrist_end"}
 
+_OWN = {
+    **_SMPL, "chest": "thorax",
+    "hip": "thigh", "knee": "shank", "ankle": "foot", "toe": "toes",
+    "shoulder": "upper_arm", "elbow": "forearm", "wrist": "hand", "hand": "hand_end",
+}  # fmt: skip
+
 
 def _both(table: Mapping[str, str], name: str) -> dict[str, str]:
     """Names of all roles from those of one side; `name` has {side}, {Side} or {s} where the side stands."""
@@ -57,6 +63,7 @@ TABLES: dict[str, dict[str, str]] = {
     "MotionBuilder": _both(_MOTION_BUILDER, "{Side}{part}"),
     "SMPL": _both(_SMPL, "{side}_{part}"),
     "DeepMimic": _both(_PLAIN, "{side}_{part}"),
+    "wholebody": _both(_OWN, "{side}_{part}"),
 }
 """Names of joints by role, of the skeletons that files of motion capture have."""
 
@@ -123,7 +130,8 @@ def matched(
     """
     given = _given(names)
     table, found = _recognised(joints)
-    found |= _checked(given.get("skeleton", {}), joints, "joint of the skeleton")
+    said = _checked(given.get("skeleton", {}), joints, "joint of the skeleton")
+    found = {role: joint for role, joint in found.items() if joint not in said.values()} | said
     frames = _frames(figure)
     frames |= {
         role: frame

@@ -23,7 +23,7 @@ LOOKS = {"trajectory": ("#0072b2", "o"), "bisection": ("#d55e00", "s"), "frames"
 DRAWN = (
     ("distance_mm", "deviation of the joints' centres, mm", None),
     ("jerk", "jerk, of that before", 1.2),
-    ("sliding_mm", "standing feet slide, mm", 1.0),
+    ("sliding_mm", "standing feet slide, mm (0.001: or less)", 1.0),
 )
 """Column, title and what is asked."""
 

@@ -9,7 +9,7 @@ from wholebody.cli.bench.publishing import add_common, check_count, publish
 
 CAPTIONS = {
     "motion": "Deviation, jerk and sliding against seconds for each second of motion; hollow: not free; dotted: asked",
-    "motion-check": "CPU time of a check of each clip, a point for each piece of equipment",
+    "motion-check": "CPU time of a check of each clip with each piece of equipment; black: as it is, coloured: freed",
 }
 
 

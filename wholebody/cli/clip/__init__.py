@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from wholebody.cli.clip import avoid, check, info
+from wholebody.cli.clip import avoid, check, convert, info, play, retarget
 
 HELP = "describe, convert and play motions"
 DESCRIPTION = """\
@@ -15,5 +15,5 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     """Add the command `clip` with its own commands."""
     parser = commands.add_parser("clip", help=HELP, description=DESCRIPTION)
     kinds = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command in (info, check, avoid):
+    for command in (info, convert, retarget, play, check, avoid):
         command.add_to(kinds)

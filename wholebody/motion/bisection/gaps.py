@@ -60,12 +60,12 @@ class Gaps:
         self._scene, self._recursion, self._predictor = scene, recursion, predictor
         self._workspace, self._overlap, self._watch = workspace, overlap, watch
         self._margins: list[dict[int, float]] = [{} for _ in recursion.q]
-        self._visits = np.zeros(max(0, len(recursion.q) - 1), dtype=int)
+        self._widened, self._passes = np.zeros((2, max(0, len(recursion.q) - 1)), dtype=int)
         self.left: dict[int, str] = {}
 
     def close(self) -> None:
         """Sweep all gaps and remove dips, from the first frame on."""
-        bad, gaps = self._recursion.bad, len(self._visits)
+        bad, gaps = self._recursion.bad, len(self._passes)
         waiting = set(range(gaps))
         while waiting and not self._watch.ended:
             gap = min(waiting)
@@ -76,9 +76,8 @@ class Gaps:
                 continue
             first, second = (self._workspace.owners[piece] for piece in self._workspace.table.pairs[pair])
             self.left[gap] = f"{first} and {second}"
-            if bad[gap] or bad[gap + 1] or self._visits[gap] >= MARGINS + MIDDLES + FORWARD + BACKWARD:
+            if bad[gap] or bad[gap + 1] or self._passes[gap] >= MIDDLES + FORWARD + BACKWARD:
                 continue
-            self._visits[gap] += 1
             self._watch.tell(1.0 - len(waiting) / gaps, f"between frames {gap} and {gap + 1}")
             for frame in self._closed(gap, pair):
                 waiting |= {near for near in (frame - 1, frame) if 0 <= near < gaps}
@@ -108,13 +107,14 @@ class Gaps:
         through something: the posture in between is predicted, and the frames beside get its displacement. What is
         still on two sides of something after that gets on one: a frame is predicted from the one before it, or after.
         """
-        (depth, share), visit = self._deepest(gap, pair), int(self._visits[gap])
-        if depth <= SHALLOW and visit <= MARGINS:
+        depth, share = self._deepest(gap, pair)
+        if depth <= SHALLOW and self._widened[gap] < MARGINS:
+            self._widened[gap] += 1
             return self._widen(gap, pair, depth)
-        self._visits[gap] = visit = max(visit, MARGINS + 1)
-        if visit <= MARGINS + MIDDLES:
+        self._passes[gap] += 1
+        if self._passes[gap] <= MIDDLES:
             return self._displace(gap, share)
-        frame, beside = (gap + 1, gap) if visit <= MARGINS + MIDDLES + FORWARD else (gap, gap + 1)
+        frame, beside = (gap + 1, gap) if self._passes[gap] <= MIDDLES + FORWARD else (gap, gap + 1)
         start = self._recursion.applied(frame, self._recursion.q[beside])
         return self._moved(frame, self._counted(self._predictor.predict(frame, start)))
 

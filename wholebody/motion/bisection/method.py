@@ -12,7 +12,7 @@ from wholebody.checks import choice, listed, number, text, whole
 from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
 from wholebody.methods.solve import as_method, method_for_motions
-from wholebody.motion.avoider import MethodResult, Progress, Watch
+from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.bisection.gaps import Gaps, hold_between
 from wholebody.motion.bisection.interpolation import Kind
 from wholebody.motion.bisection.key_frames import key_frames
@@ -109,6 +109,7 @@ class Bisection:
             InputError: an evaluation point beyond the clip's frames, or a constraint that is none.
             UnknownNameError: a plane, a frozen joint or a constraint names what the figure does not have.
         """
+        check_input(clip, scene, progress)
         figure, watch = scene.figure, Watch(progress)
         for frame in self.evaluation or ():
             whole(frame, f"Bisection: evaluation, {clip.name}", 0, len(clip) - 1)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.figures.state import State
@@ -88,6 +89,9 @@ class Predictor:
         self._frozen = [Freeze(*frozen)] if frozen else []
         self._method, self._clearance, self._workspace = method, clearance, workspace
         moves = scene.figure.root == "free" and "root" not in scene.figure.joint_names(frozen)
+        self._weights = np.array(scene.figure.effort_weights)
+        if scene.figure.root == "free":
+            self._weights[:6] = ROOT_WEIGHT
         self._measures = (Effort(), RootEffort()) if moves else (Effort(),)
 
     def predict(
@@ -141,6 +145,15 @@ class Predictor:
     def holds(self, frame: int, q: Array) -> bool:
         """Whether what is held in a frame holds."""
         return not self.terms.holds or self.terms.missed(frame, self._workspace.state.update(q)) <= HELD
+
+    def effort(self, frame: int, q: Array) -> float:
+        """Effort of a posture (nq,) of a frame from the original one, that of the root included."""
+        away = pin.difference(self.scene.model, self.original[frame], q)
+        return float(self._weights @ (away * away))
+
+    def farthest(self, frame: int, q: Array) -> float:
+        """Largest change of a joint or of the root from the original posture of a frame, radians or metres."""
+        return float(np.abs(pin.difference(self.scene.model, self.original[frame], q)).max(initial=0.0))
 
     def deepest(self, q: Array) -> str:
         """The pair that overlaps most, in words; empty if none does."""

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.arrays import Array, Mask
 from wholebody.figures.state import State
@@ -13,9 +14,16 @@ from wholebody.motion.avoider import Watch
 from wholebody.motion.bisection.groups import Group, collision_groups
 from wholebody.motion.bisection.interpolation import Kind, fill
 from wholebody.motion.bisection.path_planes import path_planes
-from wholebody.motion.bisection.prediction import Predictor
+from wholebody.motion.bisection.prediction import Prediction, Predictor
 from wholebody.motion.bisection.stays import Stays
 from wholebody.scene import Scene
+from wholebody.tasks import Plane
+
+SAME = 1e-4
+"""Radians and metres: a joint that a prediction moves less was not needed, and keeps its curve."""
+
+FAR = 0.3
+"""Radians and metres: a prediction that goes farther may be a poor local answer, and others are tried beside it."""
 
 
 class Recursion:
@@ -97,29 +105,53 @@ class Recursion:
         return True
 
     def _key(self, frame: int) -> bool:
-        """Predict the posture of a frame: with planes, then without, then from the nearest free postures beside it."""
+        """Predict the posture of a frame with planes; where that fails or goes far, the least effort of several."""
         if self._watch.tell(self.share_done(), f"frame {frame}"):
             return False
         planes = path_planes(self._scene.figure, self.q, frame, self.joints, self._state)
+        found = [self._predicted(frame, self.q[frame], planes)]
+        if not found[0].good or self._predictor.farthest(frame, found[0].q) > FAR:
+            starts = [*([self.q[frame]] if planes else []), *self._beside(frame)]
+            found += [self._predicted(frame, start, []) for start in starts]
+        good = [prediction for prediction in found if prediction.good]
+        if not good:
+            self.stuck[frame] = self._predictor.deepest(found[0].q) or "what is held there cannot hold"
+            return False
+        self.q[frame] = min((each.q for each in good), key=lambda q: self._predictor.effort(frame, q))
+        self.bad[frame] = False
+        self.keys.add(frame)
+        return True
+
+    def _predicted(self, frame: int, start: Array, planes: Sequence[Plane]) -> Prediction:
+        found = self._predictor.predict(frame, self._stays.applied(frame, start), planes)
+        self.predictions += 1
+        self.programs += found.programs
+        return found
+
+    def _beside(self, frame: int) -> list[Array]:
+        """Starts from the nearest free frames: their deviations from the original ones, on the original of this one."""
+        model, original = self._scene.model, self._predictor.original
         free = np.flatnonzero(~self.bad)
-        starts = [self.q[frame], *(self.q[side] for side in (*free[free < frame][-1:], *free[free > frame][:1]))]
-        attempts = [(starts[0], planes)] if planes else []
-        attempts += [(start, []) for start in starts]
-        for start, through in attempts:
-            found = self._predictor.predict(frame, self._stays.applied(frame, start), through)
-            self.predictions += 1
-            self.programs += found.programs
-            if found.good:
-                self.q[frame], self.bad[frame] = found.q, False
-                self.keys.add(frame)
-                return True
-        self.stuck[frame] = self._predictor.deepest(found.q) or "what is held there cannot hold"
-        return False
+        near = [int(side) for side in (*free[free < frame][-1:], *free[free > frame][:1])]
+        away = [pin.difference(model, original[side], self.q[side]) for side in near]
+        starts = [np.asarray(pin.integrate(model, original[frame], step)) for step in away if step.any()]
+        return starts or [self.q[side] for side in near]
 
     def _fill(self, a: int, m: int, b: int) -> None:
-        fill(self._scene.model, self.q, a, m, b, self._kind)
+        """Interpolate between keys; joints that no key changed keep their original curves."""
+        model, original = self._scene.model, self._predictor.original
+        fill(model, self.q, a, m, b, self._kind)
+        changes = [np.abs(pin.difference(model, original[key], self.q[key])) for key in {a, m, b}]
+        changed = np.max(changes, axis=0) > SAME
+        kept = [
+            slice(joint.idx_q, joint.idx_q + joint.nq)
+            for joint in model.joints[1:]
+            if not changed[joint.idx_v : joint.idx_v + joint.nv].any()
+        ]
         for frame in range(a + 1, b):
             if frame != m:
+                for values in kept:
+                    self.q[frame, values] = original[frame, values]
                 self.q[frame] = self._stays.applied(frame, self.q[frame])
                 self.bad[frame] = not self._predictor.free(self.q[frame])
 

@@ -39,6 +39,17 @@ def write_motion(motion: Motion, path: str | os.PathLike[str]) -> Path:
     return WRITERS[_ending(path, WRITERS, "written")](motion, path)
 
 
+def check_ending(path: str | os.PathLike[str]) -> Path:
+    """The path of a file to write, checked before long work.
+
+    Raises:
+        FileFormatError: the ending of its name is no format that can be written.
+    """
+    path = checked_path(path, "path")
+    _ending(path, WRITERS, "written")
+    return path
+
+
 def read_frames(path: str | os.PathLike[str], figure: Figure) -> Frames:
     """Read postures of a figure from a file in the format that the ending of its name says.
 

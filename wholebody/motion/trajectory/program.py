@@ -20,6 +20,7 @@ from wholebody.motion.trajectory.objective import Objective
 
 SLACK_CURVATURE = 1e-2  # 1/m^2, of a share of the penalty: keeps equal splits of a shortfall unique
 ONE_STEP = 0.03  # m, rad: of a deeper shortfall one step asks for this much; the normals are looked at again on the way
+SMALL_EXCESS = 0.1  # of the radius: speeds that exceed their bound by less are brought back by one step
 NEAR_SPEED = 0.5  # share of a bound on speed from which a change has a row; what passes unseen has one in the next step
 TIGHT = 1e-6  # m, rad: a row nearer than this to being missed at a program's answer is active
 
@@ -221,8 +222,9 @@ def _speed_part(
     # what is passed already is to be passed by less: by a share that the trust region allows
     share = min(0.5, radius / max(float(np.abs(x).max(initial=0.0)), 1e-9))
     low, high = slowest[frame, dof], fastest[frame, dof]
-    low = np.where(now < low, now + share * (low - now), low)
-    high = np.where(now > high, now + share * (high - now), high)
+    little = SMALL_EXCESS * radius  # is taken back at once
+    low = np.where(now < low - little, now + share * (low - now), low)
+    high = np.where(now > high + little, now + share * (high - now), high)
     index = np.arange(len(frame))
     values = np.concatenate([np.ones(len(index)), -np.ones(len(index))])
     columns = np.concatenate([place[frame + 1, dof], place[frame, dof]])

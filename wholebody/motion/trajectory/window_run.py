@@ -140,6 +140,8 @@ class ClipRun:
     def _starts(self, window: Window, chart: Chart, limits: Limits, depths: Array) -> Iterable[Array]:
         """Deviations (n, nv) to begin with: none; then what following gives, from the deepest frame and both ends."""
         yield np.zeros((len(window), self._workspace.model.nv))
+        if not (limits.lower < limits.upper).any():
+            return  # nothing can move
         deepest = window.first + int(np.argmax(depths[window.first : window.end]))
         for middle in dict.fromkeys((deepest, window.first, window.end - 1)):
             q = self._carried.outwards(window, middle)

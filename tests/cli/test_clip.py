@@ -1,0 +1,83 @@
+"""The commands `wholebody clip`: what they write, and that nothing is written where something is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.cli import main
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> Path:
+    """A clip of a person that bends an elbow."""
+    human = wb.load("human")
+    q = np.tile(human.neutral, (12, 1))
+    q[:, human.model.joints[human.joint_id("left_elbow_flexion")].idx_q] = np.radians(np.linspace(10.0, 120.0, 12))
+    return wb.Clip(human, q, 0.05, "bend").write(tmp_path / "bend.npz")
+
+
+def test_info_tells_size_and_what_moves(walk: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["clip", "info", str(walk)]) == 0
+    said = capsys.readouterr().out
+    assert "bend: 12 frames at 20 Hz, 0.550 s, human with 55 degrees of freedom" in said
+    assert "frames beyond joint limits: 0" in said
+    row = next(line for line in said.splitlines() if line.startswith("left_elbow_flexion")).split()
+    assert row[1:] == ["10", "deg", "120", "deg", "200", "deg/s"]
+
+
+@pytest.mark.parametrize("ending", [".bvh", ".csv", ".txt", ".npz"])
+def test_convert_writes_a_file_that_is_read_again(walk: Path, ending: str, tmp_path: Path) -> None:
+    out = tmp_path / f"out{ending}"
+    assert main(["clip", "convert", str(walk), str(out), "--dt", "0.1", "--mirror"]) == 0
+    clip = wb.read_clip(out, wb.load("human"))
+    assert len(clip) == 6
+    values = [clip.figure.joint_values(q)["right_elbow_flexion"] for q in clip.q]
+    assert np.degrees(values) == pytest.approx(np.linspace(10.0, 110.0, 6), abs=1e-5)
+
+
+def test_retarget_writes_a_clip_of_the_figure(walk: Path, tmp_path: Path) -> None:
+    """A small woman takes over what a man's BVH holds."""
+    assert main(["clip", "convert", str(walk), str(tmp_path / "bend.bvh")]) == 0
+    size = ["--sex", "female", "--stature", "1.55"]
+    out = tmp_path / "woman.npz"
+    assert main(["clip", "retarget", str(tmp_path / "bend.bvh"), str(out), *size]) == 0
+    clip = wb.read_clip(out, wb.load("human", sex="female", stature=1.55))
+    values = [clip.figure.joint_values(q)["left_elbow_flexion"] for q in clip.q]
+    assert np.degrees(values) == pytest.approx(np.linspace(10.0, 120.0, 12), abs=6.0)
+
+
+def test_play_writes_a_page(walk: Path, tmp_path: Path) -> None:
+    page = tmp_path / "bend.html"
+    assert main(["clip", "play", str(walk), "--ghost", str(walk), "--out", str(page)]) == 0
+    assert page.stat().st_size > 100_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["info", "none.npz"], "there is no such file"),
+        (["convert", "bend.npz", "out.xyz"], "cannot be written as .xyz"),
+        (["convert", "bend.npz", "none/out.bvh"], "there is no such folder"),
+        (["convert", "bend.npz", "out.bvh", "--dt", "0"], "dt is 0"),
+        (["retarget", "bend.npz", "out.npz"], "bend.npz: is no skeleton"),
+        (["play", "bend.npz", "--out", "out.doc"], "ends in none of .html"),
+        (["play", "bend.npz", "--pictures", "0", "--out", "out.png"], "--pictures is 0"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence_and_writes_nothing(
+    walk: Path,
+    arguments: list[str],
+    sentence: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(walk.parent)
+    assert main(["clip", *arguments]) == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count("\n") == 1
+    assert [path.name for path in walk.parent.iterdir()] == ["bend.npz"]

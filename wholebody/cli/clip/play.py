@@ -1,0 +1,78 @@
+"""`wholebody clip play`: a motion as a page, a movie or a strip of pictures."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from wholebody.cli.clip.arguments import add_clip, clip_of
+
+DESCRIPTION = """\
+Show a motion. Without --out a page opens in the browser and plays it; with --out it is written as a page that opens
+without a network (.html), a movie (.mp4, .gif) or a strip of pictures (.png). A second motion is its ghost."""
+EPILOG = """\
+examples:
+  wholebody clip play walk.bvh
+  wholebody clip play free.npz --ghost walk.npz --out before-after.html"""
+PICTURES = 8
+VIEW = (1.6, 1.0, 0.5)
+"""Direction from the figure to the camera: from in front, from the left and from above."""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser(
+        "play", help="show a motion", description=DESCRIPTION, epilog=EPILOG, formatter_class=shape
+    )
+    add_clip(parser)
+    parser.add_argument("--ghost", type=Path, metavar="FILE", help="another motion of the figure, shown transparent")
+    parser.add_argument("--out", type=Path, metavar="OUT", help=".html, .mp4, .gif or .png")
+    parser.add_argument("--pictures", type=int, default=PICTURES, metavar="N", help="of a strip (default: 8)")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Show or write the motion."""
+    import math
+
+    import numpy as np
+
+    from wholebody.checks import whole
+    from wholebody.errors import InputError
+    from wholebody.files import check_writable
+    from wholebody.geometry.shapes import HalfSpace
+    from wholebody.motion.reading import read_clip
+    from wholebody.scene import Scene
+    from wholebody.view import Viewer
+    from wholebody.view.filmstrip import write_filmstrip
+
+    out: Path | None = arguments.out
+    whole(arguments.pictures, "--pictures", 1, 100)
+    if out is not None:
+        check_writable(out)
+        if out.suffix.lower() not in (".html", ".mp4", ".gif", ".png"):
+            raise InputError(f"--out: {out.name} ends in none of .html, .mp4, .gif, .png; give one of them")
+    clip = clip_of(arguments)
+    ghost = None if arguments.ghost is None else read_clip(arguments.ghost, clip.figure)
+    if ghost is not None and len(ghost) != len(clip):
+        raise InputError(f"--ghost: {arguments.ghost.name} has {len(ghost)} frames and not {len(clip)}")
+    scene = Scene(clip.figure)
+    if clip.figure.root == "free":
+        scene.add(HalfSpace(), name="floor")
+    with Viewer(scene, title=clip.name) as viewer:
+        if clip.figure.root == "free":
+            middle = 0.5 * (clip.q[:, :3].min(axis=0) + clip.q[:, :3].max(axis=0))
+            away = 1.3 + 0.6 * float(np.ptp(clip.q[:, :2], axis=0).max())
+            viewer.look(tuple(middle + away * np.array(VIEW)), tuple(middle))
+        if out is not None and out.suffix.lower() == ".png":
+            frames = np.linspace(0, len(clip) - 1, min(arguments.pictures, len(clip))).round().astype(int)
+            print(f"wrote {write_filmstrip(viewer, list(clip.q[frames]), out)}")
+            return 0
+        viewer.play(clip, ghost=ghost, repeat=math.inf if out is None else 1)
+        if out is None:
+            viewer.open()
+            viewer.wait_until_closed()
+        else:
+            print(f"wrote {viewer.save(out) if out.suffix.lower() == '.html' else viewer.movie(out)}")
+    return 0
