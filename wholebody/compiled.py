@@ -26,6 +26,7 @@ LOOPS = (
     "wholebody.methods.qp.solvers.osqp_solver",
     "wholebody.methods.qp.step_program",
     "wholebody.methods.qp.subproblem",
+    "wholebody.methods.qp.turning",
 )
 """Modules with compiled loops; each has a function `compiled_kernel`, which compiles or loads them."""
 

@@ -18,6 +18,7 @@ from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
 from wholebody.methods.qp.subproblem import Rows
+from wholebody.methods.qp.turning import OFF, Turning
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
@@ -28,7 +29,9 @@ LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
 LARGEST_WITHIN = 0.5
 HEADROOM = 2.5  # pairs within this many times the last step's motion get rows, so that the next may be longer
 UNSEEN = 1e-4  # m: by which turning may bring things nearer than the linearisation says without being looked after
+INSIDE = 5e-6  # m: the same of pairs whose clearance is less; beside coal's accuracy, so that none ends inside
 SPARE = 10.0  # times what turning brings nearer, roughly: a step that leaves all pairs more room is not looked at
+MIDWAY = 4.0  # times that much and more at the end is too much half way too, where a straight way bows by a quarter
 CORRECTIONS = 3  # programs that ask again for what turning brought nearer, before the step is cut
 CUTS = 6  # times that a step is halved before it is given up
 OF_A_FRAME = 1e-4  # m, rad: to which the goals of a frame are met
@@ -119,7 +122,8 @@ class QPTracker:
         self._query_distance = LEAST_WITHIN
         self._alone = OneAtATime("tracker")
         self.workspace = problem.workspace()
-        self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_shortfall`
+        self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_nearer`
+        self._turning = Turning(self.workspace)
         self._set_up()
 
     def step(self, q: Array, measures: bool = True) -> QPStep:
@@ -189,9 +193,13 @@ class QPTracker:
             motion = answer.motion
         share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
         displacement = answer.x.copy() if share == 1.0 else share * answer.x
-        following, curved = None, 0.5 * share**2 * motion * answer.turn
-        if curved > UNSEEN and answer.spare < SPARE * curved:
-            displacement, share, following = self._looked_after(at, displacement, share)
+        following, curved = None, share * motion * (share * answer.turn + OFF)  # roughly, and rather too much
+        if curved > INSIDE and answer.spare < 0.5 * SPARE * curved:
+            unseen = _unseen(at.clearance[: len(at.contacts.distance)])
+            if curved > np.minimum.reduce(unseen, initial=np.inf):
+                bent = self._turning.bent(at, program.rows(at), displacement, unseen)
+                if bent > 0.0:
+                    displacement, share, following = self._looked_after(at, displacement, share, unseen, bent > MIDWAY)
         self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
         if following is None:
             following = pin.integrate(self.workspace.model, q, displacement)
@@ -203,13 +211,17 @@ class QPTracker:
             answer.iterations, answer.by, self._working_set.solver.counted(), share,
         )  # fmt: skip
 
-    def _looked_after(self, at: Passing, displacement: Array, share: float) -> tuple[Array, float, Array]:
+    def _looked_after(
+        self, at: Passing, displacement: Array, share: float, unseen: Array, midway: bool
+    ) -> tuple[Array, float, Array]:
         """A step that turns far is looked at where it ends: what turning brought nearer is asked for, or the step cut.
 
         Args:
             at: where the step begins.
             displacement: (nv,) of the step.
             share: of the program's own displacement.
+            unseen: (k,) metres by which each contact may be nearer than foreseen.
+            midway: whether to look half way too.
 
         Returns:
             The displacement (nv,), its share, and the posture (nq,) where it ends.
@@ -218,8 +230,10 @@ class QPTracker:
         began = np.minimum(contacts.distance, asked)
         rows, groups = self._program.rows(at), None
         for _ in range(CORRECTIONS):
-            short, q = self._shortfall(at, displacement, np.maximum(began, _foreseen(rows, asked, displacement)))
-            if np.maximum.reduce(short, initial=0.0) <= UNSEEN:
+            short, q = self._shortfall(
+                at, displacement, np.maximum(began, _foreseen(rows, asked, displacement)), began, midway
+            )
+            if not (short > unseen).any():
                 return displacement, share, q
             groups = np.zeros(rows.contacts) if groups is None else groups
             groups[rows.contacts - len(short) :] += short
@@ -230,25 +244,35 @@ class QPTracker:
             share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
             displacement = share * again.x
         for _ in range(CUTS):
-            short, q = self._shortfall(at, displacement, began)
-            if np.maximum.reduce(short, initial=0.0) <= UNSEEN:
+            short, q = self._shortfall(at, displacement, began, began, midway)
+            if not (short > unseen).any():
                 return displacement, share, q
             displacement, share = 0.5 * displacement, 0.5 * share
         return 0.0 * displacement, 0.0, at.q.copy()
 
-    def _shortfall(self, at: Passing, displacement: Array, kept: Array) -> tuple[Array, Array]:
+    def _shortfall(
+        self, at: Passing, displacement: Array, kept: Array, began: Array, midway: bool
+    ) -> tuple[Array, Array]:
         """By how much each contact (k,) is nearer after a displacement (nv,) than the distances (k,) it should keep.
 
-        And the posture (nq,) after it.
+        And the posture (nq,) after it. Half way it should keep these or what it began with, whichever is less; what is
+        missing there has to be twice as much at the end.
         """
-        workspace = self.workspace
-        q = pin.integrate(workspace.model, at.q, displacement)
-        near = workspace.near(q, float(np.maximum.reduce(at.clearance, initial=0.0)) + UNSEEN)
+        model, short = self.workspace.model, np.zeros(len(kept))
+        if midway:
+            half = pin.integrate(model, at.q, 0.5 * displacement)
+            short = 2.0 * self._nearer(at, half, np.minimum(kept, began))
+        q = pin.integrate(model, at.q, displacement)
+        return np.maximum(short, self._nearer(at, q, kept)), q
+
+    def _nearer(self, at: Passing, q: Array, kept: Array) -> Array:
+        """By how much each contact (k,) is nearer at a posture (nq,) than the distances (k,) it should keep."""
+        near = self.workspace.near(q, float(np.maximum.reduce(at.clearance, initial=0.0)) + UNSEEN)
         after = self._distance
         after[near.number] = near.distance
         short: Array = np.maximum(kept - after[at.contacts.number], 0.0)
         after[near.number] = np.inf
-        return short, q
+        return short
 
     def _set_up(self) -> None:
         """Take the problem's terms as they are now."""
@@ -277,6 +301,12 @@ class QPTracker:
         """What programs are set up from: kind, weight and number of rows of each goal."""
         rows = self._lineariser.goal_rows()
         return [(type(goal), goal.weight, count) for goal, count in zip(self._lineariser.goals, rows, strict=True)]
+
+
+def _unseen(asked: Array) -> Array:
+    """By how much each contact (k,) may end nearer than its rows say, where this distance (k,) is asked of it."""
+    unseen: Array = np.minimum(np.maximum(asked, INSIDE), UNSEEN)
+    return unseen
 
 
 def _foreseen(rows: Rows, asked: Array, displacement: Array) -> Array:

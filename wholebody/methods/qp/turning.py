@@ -1,0 +1,72 @@
+"""Which steps turn some pair nearer than its rows foresee: those are looked at where they end, and others are not.
+
+Rows are straight and bodies turn. How much nearer a pair gets by that is bounded for each pair by itself, from what the
+joints between the root and its two pieces do; an arm that is far from everything costs nothing, however it turns.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.geometry.contact_rows import BAND, LEVER_DISTANCE
+from wholebody.linearisation import Passing
+from wholebody.methods.qp.subproblem import Rows
+from wholebody.workspace import Workspace
+
+ROOM = 2.0  # times what a pair may get nearer by turning: with more room after a step it is not looked at
+OFF = 6e-3  # rad: by which coal's normal may be off, as it stops within 1e-6 m of the distance
+
+
+class Turning:
+    """Bounds what the steps of one run turn nearer."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        """Take the pieces of a workspace, whose state is where the steps begin."""
+        self._workspace, table = workspace, workspace.table
+        self._kernel = compiled_kernel()
+        points = [swept.points for swept in table.swept]
+        self._reach = np.array(
+            [np.linalg.norm(own, axis=1).max() if len(own) else reach
+             for own, reach in zip(points, table.reach, strict=True)]
+        ).reshape(-1)  # fmt: skip
+        self._point = np.array([len(own) == 1 for own in points], dtype=bool)
+        self._lengths = np.array([ROOM, BAND, LEVER_DISTANCE, OFF])
+
+    def bent(self, at: Passing, rows: Rows, displacement: Array, unseen: Array) -> float:
+        """Largest share of `unseen` by which a pair that may end too near can be nearer than its rows say.
+
+        Args:
+            at: where the step begins, and the workspace's state is.
+            rows: of its program.
+            displacement: (nv,) of the step.
+            unseen: (k,) metres by which each contact may be nearer than its rows say.
+
+        Returns:
+            0 where every pair keeps its distance to `unseen`, and more than 1 where one may not.
+        """
+        state, contacts = self._workspace.state, at.contacts
+        share: float = self._kernel.bent(
+            state.spread(displacement), state.columns, state.column_joint, state.parents, self._workspace.table.joint,
+            self._reach, self._point, contacts.placements, contacts.pair, contacts.distance,
+            at.clearance[: len(unseen)], unseen, displacement, rows.elastic, rows.elastic_violation, rows.contact,
+            rows.contacts - len(unseen), self._lengths,
+        )  # fmt: skip
+        return share
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody.methods.qp import turning_kernel
+
+    none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
+    turning_kernel.bent(
+        np.zeros(1), np.zeros((6, 1)).T, np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp), index, none,
+        np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), np.zeros((0, 2))[:, 0], none,
+        none, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(4),
+    )  # fmt: skip
+    return turning_kernel

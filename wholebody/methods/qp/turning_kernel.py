@@ -1,0 +1,147 @@
+"""Whether a step turns some pair nearer than its rows foresee, as compiled loops: see `turning`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.compiled import compiled
+
+
+@compiled()
+def bent(
+    displacement: Array,
+    columns: Array,
+    column_joint: Indices,
+    parents: Indices,
+    joint: Indices,
+    reach: Array,
+    point: Mask,
+    placement: Array,
+    pair: Indices,
+    distance: Array,
+    asked: Array,
+    unseen: Array,
+    step: Array,
+    elastic: Array,
+    violation: Array,
+    contact: Indices,
+    first: int,
+    lengths: Array,
+) -> float:
+    """Largest share of its `unseen` by which a pair that may end too near can be nearer than its rows say; 0 for none.
+
+    The distance of a pair is at least that of its points to a plane that moves with one of its pieces. To second order
+    a point leaves its tangent by half of its acceleration at constant joint speeds, as seen from the plane.
+
+    Args:
+        displacement: (n,) spread over the columns.
+        columns: (n, 6) of the joint Jacobian at the world's origin.
+        column_joint: (n,) the joint of each column.
+        parents: (njoints,) of the joints.
+        joint: (pieces,) that carries each piece.
+        reach: (pieces,) of the swept points of each piece about its place; infinite for a half-space.
+        point: (pieces,) whether a piece has a single swept point, so that its turn does not matter.
+        placement: (pieces, 4, 3) see `Contacts.placements`.
+        pair: (k, 2) pieces of the contacts.
+        distance: (k,) of the contacts.
+        asked: (k,) clearances.
+        unseen: (k,) by which each may end nearer than its rows say.
+        step: (nv,) the displacement.
+        elastic: (r, nv) elastic rows.
+        violation: (r,) what they are violated by before it.
+        contact: (r,) label of the contact of each row.
+        first: label of the first contact.
+        lengths: room within which a pair counts, in times of what it may be nearer by; how much farther than the
+            witness point the points without rows are; how far beyond its clearance a pair is at most for this to hold;
+            by how many radians its normal may be off.
+    """
+    joints = len(parents)
+    twist, change = np.zeros((joints, 6)), np.zeros((joints, 6))
+    own = np.zeros((joints, 6))
+    for c in range(len(columns)):
+        for i in range(6):
+            own[column_joint[c], i] += columns[c, i] * displacement[c]
+    for j in range(1, joints):
+        # the axes of a joint move with the body that carries it
+        v, s = twist[parents[j]], own[j]
+        for i in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            moved = v[3 + a] * s[b] - v[3 + b] * s[a] + v[a] * s[3 + b] - v[b] * s[3 + a]
+            change[j, i] = change[parents[j], i] + moved
+            change[j, 3 + i] = change[parents[j], 3 + i] + v[3 + a] * s[3 + b] - v[3 + b] * s[3 + a]
+        for i in range(6):
+            twist[j, i] = v[i] + s[i]
+    room = np.empty(len(distance))
+    room[:] = np.inf
+    for r in range(len(violation)):
+        c = contact[r] - first
+        if c >= 0:
+            ahead = -violation[r]
+            for i in range(len(step)):
+                ahead += elastic[r, i] * step[i]
+            room[c] = min(room[c], ahead)
+    worst = 0.0
+    for c in range(len(distance)):
+        nearer, way = np.inf, np.inf
+        round_piece = point[pair[c, 0]] or point[pair[c, 1]]
+        for side in range(2):
+            # a plane that moves with one piece, and the points of the other one; a single point has no plane
+            p, carrier = pair[c, side], joint[pair[c, 1 - side]]
+            if round_piece and not point[p]:
+                continue
+            gone, bend = _seen_from(
+                placement[p, 3], reach[p], twist[joint[p]], change[joint[p]], twist[carrier], change[carrier]
+            )
+            if bend < nearer:
+                nearer, way = bend, gone
+        nearer += lengths[3] * way
+        if nearer <= unseen[c]:
+            continue
+        spare = distance[c] - asked[c]
+        beyond = lengths[1] if spare <= lengths[2] else 0.0
+        if room[c] < lengths[0] * nearer or (not round_piece and spare + beyond < way):
+            worst = max(worst, nearer / unseen[c])
+    return worst
+
+
+@compiled()
+def _seen_from(
+    place: Array, reach: float, own: Array, own_change: Array, carrier: Array, carrier_change: Array
+) -> tuple[float, float]:
+    """Longest way of the points of a piece as seen from another body, and by how much it can bow.
+
+    `place` (3,) is the piece's and `reach` its points' distance from there; twists (6,) at the world's origin and their
+    changes are those of the piece's body and of the body from which it is seen.
+    """
+    speed, bow, spin = np.empty(3), np.empty(3), np.empty(3)
+    turn_square, speed_square, bow_square, spin_square = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        speed[i] = (
+            own[i] - carrier[i] + (own[3 + j] - carrier[3 + j]) * place[k] - (own[3 + k] - carrier[3 + k]) * place[j]
+        )
+        turn_square += (own[3 + i] - carrier[3 + i]) ** 2
+        spin[i] = (
+            own_change[3 + i] - carrier_change[3 + i] - carrier[3 + j] * own[3 + k] + carrier[3 + k] * own[3 + j]
+        )  # fmt: skip
+    own_speed, carrier_speed = np.empty(3), np.empty(3)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        own_speed[i] = own[i] + own[3 + j] * place[k] - own[3 + k] * place[j]
+        carrier_speed[i] = carrier[i] + carrier[3 + j] * place[k] - carrier[3 + k] * place[j]
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        bow[i] = (
+            own_change[i] + own_change[3 + j] * place[k] - own_change[3 + k] * place[j]
+            + own[3 + j] * own_speed[k] - own[3 + k] * own_speed[j]
+            - carrier_change[i] - carrier_change[3 + j] * place[k] + carrier_change[3 + k] * place[j]
+            - carrier[3 + j] * carrier_speed[k] + carrier[3 + k] * carrier_speed[j]
+            - 2.0 * (carrier[3 + j] * speed[k] - carrier[3 + k] * speed[j])
+        )  # fmt: skip
+        speed_square += speed[i] * speed[i]
+        bow_square += bow[i] * bow[i]
+        spin_square += spin[i] * spin[i]
+    far = reach if turn_square + spin_square > 0.0 else 0.0
+    way = np.sqrt(speed_square) + np.sqrt(turn_square) * far
+    return way, 0.5 * (np.sqrt(bow_square) + (np.sqrt(spin_square) + turn_square) * far)
