@@ -91,6 +91,15 @@ def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
         assert [path.read_bytes() for path in once] == [path.read_bytes() for path in again]
 
 
+def test_a_tool_that_does_not_take_a_figure_is_named_in_the_chart(tmp_path: Path) -> None:
+    from wholebody.bench import step as steps
+
+    times = [StepTime(reach, "wholebody", 1, 1, 100.0, 90.0, 20.0) for reach in ("arm, free", "robot, free")]
+    times += [StepTime("arm, free", "mink", 1, 1, 300.0, 290.0, 20.0)]
+    svg, _ = steps.step_times(times, tmp_path / "times")
+    assert svg.is_file()
+
+
 def test_every_tool_has_a_colour_of_its_own() -> None:
     assert set(STEPPING) <= set(plot_style.COLORS)
     assert plot_style.method_style("qp").color == plot_style.COLORS["wholebody"]  # the same method in another chart

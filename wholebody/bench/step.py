@@ -321,6 +321,9 @@ def step_times(times: Sequence[StepTime], path: Path) -> tuple[Path, Path]:
         for place, tool in enumerate(reversed(tools)):
             wall = np.array([time.wall_us for time in times if (time.reach, time.tool) == (reach, tool)])
             color = plot_style.COLORS[tool]
+            if not len(wall):
+                axis.annotate("refused", (0.0, place), (4, 0), ("axes fraction", "data"), "offset points", color=GREY)
+                continue
             least, low, median, high, most = np.quantile(wall, (0.05, 0.25, 0.5, 0.75, 0.95))
             axis.plot([least, most], [place, place], color=color, linewidth=1.6, marker="|", markersize=9)
             axis.barh(place, high - low, left=low, height=0.55, color=color, alpha=0.85)
