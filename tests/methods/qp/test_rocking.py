@@ -45,9 +45,8 @@ def distances(scene, q):
 
 @pytest.fixture(autouse=True)
 def rows_alone(monkeypatch):
-    """What is tested here is the rows alone: steps that turn are not looked at where they end, and hardly damped."""
+    """What is tested here is the rows alone: steps that turn are not looked at where they end."""
     monkeypatch.setattr("wholebody.methods.qp.tracking.UNSEEN", np.inf)
-    monkeypatch.setattr("wholebody.methods.qp.step_program.DAMPING", 1.0)
 
 
 @pytest.mark.parametrize("push", PUSHES.values(), ids=PUSHES.keys())

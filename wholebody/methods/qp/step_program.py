@@ -33,8 +33,7 @@ from wholebody.problem import Problem
 from wholebody.workspace import Workspace
 
 RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
-DAMPING = 10.0  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at obstacles
-OUT_OF_REACH = 1 / 3  # share of a goal's error that a step leaves, from which on it is damped wholly
+DAMPING = 1.0  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at obstacles
 SETTLING = 0.5  # s: measures lessen by 1/e in it: longer = slower to settle, shorter = joints swing about the optimum
 RESTING = 1e-5  # m, rad: a goal missed by less than this, and more than foreseen, rests; less left of one is reached
 LITTLE = 0.1  # damping that makes no difference to how a step looks
@@ -189,7 +188,7 @@ class StepProgram:
         motion, turn = self.motion(at, answer.x)
         remains = self._soft_rows[: self.goals] @ answer.x - self._target[: self.goals]
         left, error = sqrt(remains @ remains), sqrt(at.value[: self.goals] @ at.value[: self.goals])
-        asked = DAMPING * min(1.0, left / (OUT_OF_REACH * max(error, 1e-12))) if left > RESTING else 0.0
+        asked = DAMPING * min(1.0, left / max(error, 1e-12)) if left > RESTING else 0.0
         return Answer(answer.x, motion, turn, worst, spare, answer.exact, answer.iterations, answer.by), damping, asked
 
     def _ends(self) -> Any:
@@ -216,11 +215,11 @@ def numbers_of(scale: float, gain: float) -> Array:
         gain: share of the way to the least measures that a step is to go.
 
     Returns:
-        What `subproblem_kernel.program` takes (10), damping, what is left of a goal times this is damped wholly, what
-        counts as rest, weight of elastic rows, most rows of a contact, force of goals (4), limits of the working set.
+        What `subproblem_kernel.program` takes (10), damping, what counts
+        as rest, weight of elastic rows, most rows of a contact, force of goals (4), limits of the working set.
     """
     program = (scale, LEAST_CURVATURE, PROXIMAL_SHARE, RADIUS, PULL * RADIUS, 0.0, LEVER, BOX * RADIUS, PULL * RADIUS)
-    own = (gain, DAMPING, 1.0 / OUT_OF_REACH, RESTING, ELASTIC_WEIGHT, MOST_ROWS)
+    own = (gain, DAMPING, RESTING, ELASTIC_WEIGHT, MOST_ROWS)
     return np.array([*program, *own, *FORCE, *LIMITS])
 
 

@@ -99,7 +99,7 @@ def solve(
     terms = goals + len(kind)
     sort_rows(
         value[:goals], jacobian[:goals], value[goals:], jacobian[goals:terms], gap, jacobian[terms:], gap_contact,
-        clearance, number, kind, bound, share, numbers[15:19], int(numbers[14]), soft, soft_values, elastic, violated,
+        clearance, number, kind, bound, share, numbers[14:18], int(numbers[13]), soft, soft_values, elastic, violated,
         labels,
     )  # fmt: skip
     last, damping = len(q), least_damping
@@ -113,11 +113,11 @@ def solve(
     for r in range(m):
         shift[r] = soft_values[0, r] - before[last + r] if known else 0.0
     if known:
-        damping = max(damping, numbers[10] * min(1.0, numbers[11] * before[last + m] / error))
+        damping = max(damping, numbers[10] * min(1.0, before[last + m] / error))
         # what a goal that rests is missed by, because the last step was curved; a goal that moves is not run ahead of
         resting = measures
         for r in range(goals):
-            resting = resting and abs(shift[r]) < numbers[12]
+            resting = resting and abs(shift[r]) < numbers[11]
         if not resting:
             for r in range(goals):
                 shift[r] = 0.0
@@ -128,7 +128,7 @@ def solve(
     )  # fmt: skip
     worst = 0.0
     for j in range(k):
-        elastic_weight[j] = numbers[13]
+        elastic_weight[j] = numbers[12]
         worst = max(worst, violated[j])
     if not hot:
         return False, 0, 0.0, 0.0, worst, -np.inf, damping, 0.0
@@ -136,7 +136,7 @@ def solve(
         at_lower[i], at_upper[i] = held[0, i], held[1, i]
     rounds = solve_growing(
         entries[0], entries[1], soft, target, soft_values[1], elastic, least, elastic_weight, entries[2], entries[3],
-        labels[1], pushed, at_lower, at_upper, pushing, chosen, numbers[19:25], work, places, x,
+        labels[1], pushed, at_lower, at_upper, pushing, chosen, numbers[18:24], work, places, x,
     )  # fmt: skip
     if rounds < 0:
         return False, 0, 0.0, 0.0, worst, -np.inf, damping, 0.0
@@ -167,7 +167,7 @@ def solve(
         for i in range(n):
             ahead += elastic[j, i] * x[i]
         spare = min(spare, ahead)
-    asked = numbers[10] * min(1.0, numbers[11] * left / error) if left > numbers[12] else 0.0
+    asked = numbers[10] * min(1.0, left / error) if left > numbers[11] else 0.0
     wide, pieces = len(columns), len(reach)
     for c in range(wide):
         spread[c] = x[joints[c]]
