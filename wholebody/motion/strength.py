@@ -34,7 +34,8 @@ MALE = {
 }
 """Static strength of 25 men, N m, at the percentiles 5, 50 and 95: T. J. Stobbe (1982), "The development of a practical
 strength testing program for industry", University of Michigan; as D. B. Chaffin, G. B. J. Andersson and B. J. Martin,
-"Occupational biomechanics", tabulate it. Shoulder flexion and extension are its horizontal ones."""
+"Occupational biomechanics", tabulate it. Six medians were compared with a second publication of them, the rest was not.
+Shoulder flexion and extension are its horizontal ones."""
 
 FEMALE = {
     "elbow flexion": (16, 41, 55),
