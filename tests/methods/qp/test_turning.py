@@ -52,16 +52,17 @@ def beside_a_plate(figure: wb.Figure, seed: int) -> wb.Problem:
     return wb.Problem(scene, start=start, goals=[wb.Point("tip", goal)], clearance=0.0)
 
 
-def check(problem: wb.Problem, least_distance: Any, steps: int) -> None:
-    """Every step ends outside to `INSIDE`, and its way is free to `ON_ITS_WAY`."""
+def followed(problem: wb.Problem, least_distance: Any, steps: int) -> tuple[float, list[int]]:
+    """Least distance at the end of any step, metres, and numbers of the steps that pass through something."""
     scene, q, tracker = problem.scene, problem.start, wb.QP().tracker(problem, DT)
-    sweep = Sweep(scene.model, scene.geometry)
-    assert least_distance(scene, q) > 0.0
+    sweep, ends, through = Sweep(scene.model, scene.geometry), [], []
     for number in range(steps):
         step = tracker.step(q)
-        assert least_distance(scene, step.q) > -INSIDE, number
-        assert sweep.first_contact(q, step.q, tolerance=ON_ITS_WAY) is None, number
+        ends.append(least_distance(scene, step.q))
+        if sweep.first_contact(q, step.q, tolerance=ON_ITS_WAY) is not None:
+            through.append(number)
         q = step.q
+    return min(ends), through
 
 
 @pytest.mark.parametrize(
@@ -70,13 +71,17 @@ def check(problem: wb.Problem, least_distance: Any, steps: int) -> None:
 def test_no_step_dips_into_the_edge_of_a_thin_plate(free_bodies, least_distance, shape, seed):
     """By 0.12 to 0.24 mm before turning was bounded for each pair by itself."""
     body, offset = SHAPES[shape]
-    check(over_the_edge(free_bodies(body), offset, seed), least_distance, 55)
+    nearest, through = followed(over_the_edge(free_bodies(body), offset, seed), least_distance, 55)
+    assert -INSIDE < nearest < 1e-3  # it comes to the plate, or nothing is tested
+    assert through == []
 
 
 @pytest.mark.parametrize("seed", [8, 45, 49])
 def test_no_arm_dips_into_the_edge_of_a_thin_plate(planar_arm, least_distance, seed):
     """By 0.11 to 1.8 mm before."""
-    check(beside_a_plate(planar_arm((0.4, 0.4, 0.3)), seed), least_distance, 30)
+    nearest, through = followed(beside_a_plate(planar_arm((0.4, 0.4, 0.3)), seed), least_distance, 30)
+    assert -INSIDE < nearest < 1e-3
+    assert through == []
 
 
 def test_what_turns_far_from_everything_is_not_looked_at(free_bodies, monkeypatch):

@@ -11,7 +11,7 @@ from wholebody.arrays import Array
 from wholebody.checks import choice, listed, number, text, whole
 from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
-from wholebody.methods.solve import as_method, method_for_motions
+from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.bisection.gaps import Gaps, hold_between
 from wholebody.motion.bisection.interpolation import Kind
@@ -89,7 +89,7 @@ class Bisection:
                 names = listed(given, f"Bisection: {name}", "['left_elbow']")
                 object.__setattr__(self, name, tuple(text(entry, f"Bisection: {name}") for entry in names))
         number(self.clearance, "Bisection: clearance", 0.0, MOST_CLEARANCE, "m")
-        method_for_motions(self.method) if isinstance(self.method, str) else as_method(self.method)
+        method_for_motions(self.method)
 
     @property
     def name(self) -> str:
