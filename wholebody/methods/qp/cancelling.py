@@ -1,7 +1,7 @@
 """A posture outside of things from one where contact normals cancel.
 
-Two pieces of one segment that overlap one thing from opposite sides push it in opposite directions. Their rows add up to
-nothing, and no descent leaves, although a translation does: the least that separates all pieces of the two
+Two pieces of one segment that overlap one thing from opposite sides push it in opposite directions. Their rows add up
+to nothing, and no descent leaves, although a translation does: the least that separates all pieces of the two
 (`wholebody.geometry.separation`; figure 4b of Schmidl and Lin, "Real-time physically-based interaction between avatars
 and virtual environments"). Damped least squares over the joints realises it.
 """
