@@ -219,6 +219,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Figure.joint_id", Call(arm.joint_id, {"name": "joint1"})
     yield "Figure.joint_names", Call(arm.joint_names, {"names": ["joint1"]})
     yield "Figure.joint_values", Call(arm.joint_values, {"q": q})
+    yield "Figure.placement", Call(arm.placement, {"q": q, "name": "link1"})
     yield "Figure.posture", Call(arm.posture, {"name": arm.postures[0]})
     yield "Figure.reduced", Call(arm.reduced, {"joints": ["joint1"], "posture": q})
     yield "Figure.tangent_bounds", Call(arm.tangent_bounds, {"q": q})
@@ -425,6 +426,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     motion = {"motion": [q, q], "dt": 0.1, "problem": ask, "ghost": [q, q], "repeat": 1}
     yield "Viewer.play", Call(viewer.play, motion)
     yield "Viewer.ghosts", Call(viewer.ghosts, {"postures": [q], "color": (1.0, 0.0, 0.0, 1.0)})
+    yield "Viewer.frames", Call(viewer.frames, {"names": ["link1"], "length": 0.1}, lambda _: viewer.show(q))
     yield "Viewer.look", Call(viewer.look, {"eye": at, "target": (0.0, 0.0, 0.0)}, lambda _: viewer.show(q))
     yield "Viewer.save", Call(viewer.save, {"path": path / "x.html"})
     yield "Parts", Call(Parts, {"parts": {"one": [Part(wb.Sphere(0.1))]}}, Viewer)
