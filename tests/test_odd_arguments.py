@@ -322,6 +322,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Problem.retarget", Call(retarget, {"goals": [wb.Point("link4", at)]})
     yield "solve", Call(wb.solve, {"problem": ask, "method": "qp", "progress": print})
     yield "assess", Call(wb.assess, {"problem": ask, "q": q})
+    checked = {"term": wb.Point("link4", at), "scene": ask.scene, "q": q}
+    yield "check_derivatives", Call(wb.check_derivatives, checked, str)
     yield "simplify", Call(wb.simplify, {"problem": ask, "lock": True})
     part = wb.simplify(ask)
     yield "Simplified.posture", Call(part.posture, {"q": part.problem.start})

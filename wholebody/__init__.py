@@ -26,6 +26,7 @@ from wholebody.version import __version__
 
 if TYPE_CHECKING:
     from wholebody.assessment import Assessment, assess
+    from wholebody.derivatives import DerivativeCheck, check_derivatives
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
     from wholebody.methods.ccd.method import CCD
@@ -100,6 +101,7 @@ __all__ = [
     "ClipCheck",
     "Constraint",
     "DampedLeastSquares",
+    "DerivativeCheck",
     "Discomfort",
     "Displacement",
     "Drag",
@@ -148,6 +150,7 @@ __all__ = [
     "assess",
     "avoid",
     "check",
+    "check_derivatives",
     "equipment",
     "follow_path",
     "load",
@@ -162,6 +165,7 @@ __all__ = [
 
 _MODULES = {
     "wholebody.assessment": "Assessment assess",
+    "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
     "wholebody.methods.ccd.method": "CCD",
