@@ -15,9 +15,8 @@ from wholebody.arrays import Array, Mask
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.feet import foot_points
 from wholebody.motion.ground_forces import ground_forces
-from wholebody.motion.stance import StanceFeet, standing
+from wholebody.motion.stance import StanceFeet, foot_points, standing
 from wholebody.motion.strength import Strength
 from wholebody.tasks.support import low_points
 
