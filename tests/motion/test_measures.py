@@ -11,8 +11,8 @@ import pytest
 
 import wholebody as wb
 from wholebody.motion.feet import slid, sliding
-from wholebody.motion.stance import foot_points
 from wholebody.motion.measures import deviation, foot_sliding, hand_error, jerk_ratio, share_deeper
+from wholebody.motion.stance import foot_points
 
 
 def test_deviation_of_an_arm(planar_arm: Callable[..., Any]) -> None:

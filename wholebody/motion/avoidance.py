@@ -187,7 +187,7 @@ def _report(
         fast = now.speeds[0] if now.speeds else None
         if fast is not None:
             message += f"; {fast.joint} is still faster than its limit of {fast.limit:.3g} rad/s or m/s"
+    changed = int((np.abs(after.q - timed.q) > SAME).any(axis=1).sum())
     return AvoidanceReport(
-        solved, message, method, seconds, result.posture_solves, result.programs,
-        int((np.abs(after.q - timed.q) > SAME).any(axis=1).sum()), missed, result.stretch, after.duration, times, was, now,
+        solved, message, method, seconds, result.posture_solves, result.programs, changed, missed, result.stretch, after.duration, times, was, now,
     )  # fmt: skip
