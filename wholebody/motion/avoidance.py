@@ -189,5 +189,6 @@ def _report(
             message += f"; {fast.joint} is still faster than its limit of {fast.limit:.3g} rad/s or m/s"
     changed = int((np.abs(after.q - timed.q) > SAME).any(axis=1).sum())
     return AvoidanceReport(
-        solved, message, method, seconds, result.posture_solves, result.programs, changed, missed, result.stretch, after.duration, times, was, now,
+        solved, message, method, seconds, result.posture_solves, result.programs, changed, missed, result.stretch,
+        after.duration, times, was, now,
     )  # fmt: skip
