@@ -22,7 +22,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     add_clip(parser)
     parser.add_argument("--method", default="trajectory", metavar="NAME", help="how (default: trajectory)")
     add_equipment(parser)
-    parser.add_argument("--feet", action="store_true", help="hold feet where they stand")
+    parser.add_argument("--no-feet", action="store_true", help="let feet slide that stand; without it they are held")
     parser.add_argument("--out", type=Path, metavar="FILE", help="default: <name>-free.npz, beside FILE")
     parser.set_defaults(run=run)
 
@@ -33,7 +33,6 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     from wholebody.motion.avoidance import as_avoider, avoid
-    from wholebody.motion.stance import StanceFeet
     from wholebody.scene import Scene
 
     method, clip = as_avoider(arguments.method), clip_of(arguments)
@@ -45,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
             clip,
             scene,
             method=method,
-            constraints=[StanceFeet()] if arguments.feet else [],
+            hold_feet=not arguments.no_feet,
             progress=lambda told: bar.update(task, completed=told.share, description=told.note),
         )
     out = arguments.out or arguments.file.with_name(f"{arguments.file.stem}-free.npz")
