@@ -68,12 +68,14 @@ class AssemblyStep(NamedTuple):
         joint_error: largest error of a joint, a constraint or a contact, metres or radians.
         iterations: Newton iterations.
         systems: linear systems solved.
+        taken: whether the bodies moved there.
     """
 
     goal_error: float
     joint_error: float
     iterations: int
     systems: int
+    taken: bool
 
 
 class Assembly(AssemblyJoints):
@@ -266,9 +268,10 @@ class Assembly(AssemblyJoints):
                 early_exit=True,
             )  # fmt: skip
             holds = found.hard <= max(10.0 * HARD_TOLERANCE, float(np.abs(wrong).max(initial=0.0)))
-            if holds and (active.contacts is None or is_free(active.workspace, start, found.x, SHORT)):
+            taken = holds and (active.contacts is None or is_free(active.workspace, start, found.x, SHORT))
+            if taken:
                 self._places = list(found.x.reshape(-1, 7))
-            return AssemblyStep(found.goal, found.hard, found.iterations, found.systems)
+            return AssemblyStep(found.goal, found.hard, found.iterations, found.systems, taken)
 
     def _ready(self, algebra: str | None) -> _Prepared:
         """The equations as they stand; None for the factorisation of the last solve."""
@@ -286,7 +289,7 @@ class Assembly(AssemblyJoints):
 
     def _solid_scene(self) -> Any:
         """The scene; None if nothing has a shape."""
-        return self.scene if self._solids or self._figures else None
+        return self.scene if self.has_shapes else None
 
     def _goal_batches(self) -> list[tuple[Batch, Key]]:
         equations = EquationSet()

@@ -154,6 +154,11 @@ class AssemblyBodies:
         return tuple(self._names)
 
     @property
+    def has_shapes(self) -> bool:
+        """Whether any body has a shape."""
+        return bool(self._solids or self._figures)
+
+    @property
     def colors(self) -> Mapping[str, tuple[float, float, float, float]]:
         """Colors that were given, by body and figure."""
         return dict(self._colors)
