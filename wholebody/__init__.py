@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
     from wholebody.methods.newton.assembly import Assembly
+    from wholebody.methods.newton.assembly_constraint import AssemblyConstraint
+    from wholebody.methods.newton.assembly_solution import AssemblySolution
     from wholebody.methods.newton.method import Newton
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
@@ -87,6 +89,8 @@ __all__ = [
     "CCD",
     "QP",
     "Assembly",
+    "AssemblyConstraint",
+    "AssemblySolution",
     "Assessment",
     "AvoidanceReport",
     "Avoided",
@@ -172,6 +176,8 @@ _MODULES = {
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
     "wholebody.tracking.drag": "Drag",
     "wholebody.methods.newton.assembly": "Assembly",
+    "wholebody.methods.newton.assembly_constraint": "AssemblyConstraint",
+    "wholebody.methods.newton.assembly_solution": "AssemblySolution",
     "wholebody.methods.newton.method": "Newton",
     "wholebody.methods.placo.method": "Placo",
     "wholebody.tracking.path_following": "follow_path",

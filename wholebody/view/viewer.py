@@ -19,6 +19,7 @@ from wholebody.assessment import assess
 from wholebody.errors import InputError
 from wholebody.files import check_writable, write
 from wholebody.geometry.placement import FARTHEST
+from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
 from wholebody.view import style
 from wholebody.view.camera import look
@@ -54,7 +55,7 @@ class Viewer:
 
     def __init__(
         self,
-        scene: ViewedScene,
+        scene: ViewedScene | Assembly,
         *,
         contact_distance: float = 0.005,
         see_through: Collection[str] = (),
@@ -66,7 +67,7 @@ class Viewer:
         """Prepare to show a scene.
 
         Args:
-            scene: a `wholebody.Scene`.
+            scene: a `wholebody.Scene`, or an assembly whose bodies have shapes; its postures are its variables.
             contact_distance: pieces nearer than this are shown as touching, metres.
             see_through: names of things to draw transparent, so that they do not hide the figure.
             names: whether to write the names of things beside them.
@@ -79,17 +80,17 @@ class Viewer:
             InputError: not a scene, or a value of the wrong kind or out of range.
             UnknownNameError: there is no thing of a name in `see_through`.
         """
-        scene = checked_scene(scene)
+        viewed = checked_scene(scene)
         contact_distance = checks.number(contact_distance, "contact_distance", -FARTHEST, FARTHEST, "m")
         see_through = checks.listed(see_through, "see_through", "['table']")
         for name in see_through:
-            checks.known(name, scene.objects, "object", "see_through")
+            checks.known(name, viewed.objects, "object", "see_through")
         checks.flag(names, "names")
         checks.text(title, "title")
         self._host, self._port = checks.text(host, "host"), checks.whole(port, "port", 0, 65535)
         self.title = title
         self._graph = SceneGraph()
-        self._composition = Composition(scene, self._graph, contact_distance, tuple(see_through), names)
+        self._composition = Composition(viewed, self._graph, contact_distance, tuple(see_through), names)
         self._screenshots = Screenshots()
         self._sender: Sender | None = None
         self._camera: Command | None = None
