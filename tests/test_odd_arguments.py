@@ -511,6 +511,12 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
     avoided = {"clip": clip, "scene": wb.Scene(arm), "constraints": [], "progress": lambda told: None}
     yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
+    many = {"clips": [clip], "folder": path / "many", "equipment": ["nothing"], "methods": ["frames"], "jobs": 1}
+    yield "avoid_many", Call(wb.avoid_many, {**many, "constraints": [], "hold_feet": True, "progress": print})
+    yield "avoid_many(figure)", Call(partial(wb.avoid_many, ["walk.npz"], path / "many"), {"figure": arm})
+    clip.write(path / "read.npz")
+    files = {"files": [path / "read.npz"], "folder": path / "many", "figure": arm, "jobs": 1, "progress": print}
+    yield "read_many", Call(wb.read_many, files)
     for method in (wb.Trajectory, wb.PerFrame, wb.Fade, wb.Bisection):
         yield f"{method.__name__}.avoid", Call(method().avoid, avoided)
     settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "solver": "osqp", "iterations": 10}
@@ -593,8 +599,10 @@ ANSWERS = (
     "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "TraceEntry", "Assessment",
     "Task", "Step", "QPStep", "Simplified", "LeftOut",
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
-    "Scene.of_parts", "ClipCheck", "DerivativeCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
+    "Scene.of_parts", "ClipCheck", "DerivativeCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding",
+    "Deviation",
     "Torques", "SphereFilling",
+    "Torques", "SphereFilling", "AvoidedCase", "BatchProgress",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 

@@ -24,6 +24,7 @@ ROOMS = (
         "compiled",
         "pool",
         "runner",
+        "batches",
         "geometry",
         "figures",
         "scene_geometry",

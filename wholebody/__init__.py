@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
     from wholebody.motion.avoidance import AvoidanceReport, Avoided, avoid
+    from wholebody.motion.batch import BatchProgress, avoid_many, read_many
+    from wholebody.motion.batch_table import AvoidedCase
     from wholebody.motion.bisection.method import Bisection
     from wholebody.motion.checking import ClipCheck, check
     from wholebody.motion.clip import Clip
@@ -94,8 +96,10 @@ __all__ = [
     "Assessment",
     "AvoidanceReport",
     "Avoided",
+    "AvoidedCase",
     "Axis",
     "Balance",
+    "BatchProgress",
     "Bisection",
     "Bound",
     "Box",
@@ -153,12 +157,14 @@ __all__ = [
     "__version__",
     "assess",
     "avoid",
+    "avoid_many",
     "check",
     "check_derivatives",
     "equipment",
     "follow_path",
     "load",
     "read_clip",
+    "read_many",
     "read_skeleton",
     "read_task",
     "retarget",
@@ -184,6 +190,8 @@ _MODULES = {
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
     "wholebody.motion.avoidance": "AvoidanceReport Avoided avoid",
+    "wholebody.motion.batch": "BatchProgress avoid_many read_many",
+    "wholebody.motion.batch_table": "AvoidedCase",
     "wholebody.motion.checking": "ClipCheck check",
     "wholebody.motion.bisection.method": "Bisection",
     "wholebody.motion.clip": "Clip",
