@@ -23,8 +23,8 @@ MANY = tuple(float(k) / 64.0 for k in range(1, 64))
 """Shares of a gap at which it is looked at."""
 
 
-def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float]:
-    """Gaps that dip, and the share of each at which it is deepest.
+def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, int]:
+    """Gaps that dip, and the number of the pair that is deepest in each.
 
     Args:
         workspace: of this run alone.
@@ -39,8 +39,14 @@ def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float
         last = gap + 1
         passing = swept.advance(q[last])[1]
         if passing.depth.max(initial=0.0) > DIP:
-            found[gap] = _deepest(workspace, q[gap], q[last], int(passing.number[np.argmax(passing.depth)]))
+            found[gap] = int(passing.number[np.argmax(passing.depth)])
     return found
+
+
+def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float]:
+    """Gaps that dip, and the share of each at which it is deepest; see `dipping`."""
+    found = dipping(workspace, q, gaps)
+    return {gap: _deepest(workspace, q[gap], q[gap + 1], number) for gap, number in found.items()}
 
 
 def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tuple[int, float]]:
