@@ -8,7 +8,7 @@ found, with rows of contact in every frame and at the places between frames that
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,21 +21,23 @@ from wholebody.motion.faults import faults
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.chart import Chart
-from wholebody.motion.trajectory.nodes import Looking, Node
+from wholebody.motion.trajectory.nodes import Looking, Node, Rows, Terms
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
-from wholebody.motion.trajectory.sqp import MET, WindowProgram
+from wholebody.motion.trajectory.sqp import WindowProgram
 from wholebody.motion.windows import Window, windows
 from wholebody.workspace import Workspace
 
-MARGIN = 0.25  # s, before and after what is wrong: in which postures may change; what is left gets twice as much
-ROUNDS = 3  # of looking at the clip, and mending what is wrong
-ADDED = 8  # rounds of sweeping one window, and adding the places that dip
-PROGRAMS = 30  # most of one round of a window
-RADIUS = 0.1  # rad, m: first trust region; postures are nearly free
+MARGIN = 0.1  # s, before and after what is wrong: in which postures may change; what is left gets twice as much
+ROUNDS = 4  # of looking at the clip, and mending what is wrong
+ADDED = 6  # rounds of sweeping one window, and adding the places that dip
+PROGRAMS = 12  # most of one round of a window; more = more that is freed, longer where nothing can be
+RADIUS = 0.05  # rad, m: first trust region; postures are nearly free
+NEAR = 0.03  # m: pairs nearer than this have rows
+ROOM = 3e-4  # m: clearance that a motion that dips is first asked for beyond the others; it doubles
+MOST_ROOM = 5e-3  # m
 SPREAD = 0.06  # s: how far a push at one frame spreads to its neighbours
 NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
-SIDES = (0.0, -0.005, 0.005)  # shares of a gap beside its deepest place that get rows with it
 
 
 class _Left(NamedTuple):
@@ -48,6 +50,28 @@ class _Left(NamedTuple):
 
     wrong: int
     dipping: dict[int, float]
+
+
+class _Looking(Looking):
+    """Looks at what is near, and asks for more room in and beside motions that dip.
+
+    Attributes:
+        room: (n,) metres beyond the clearance, by the window's frames; a place between two frames has that of the
+            first one.
+    """
+
+    def __init__(self, workspace: Workspace, chart: Chart, terms: Sequence[Terms], clearance: float) -> None:
+        super().__init__(workspace, chart, terms, clearance)
+        self.room = np.zeros(len(chart))
+
+    def at(self, node: Node, x: Array, within: float) -> Rows:
+        rows = super().at(node, x, min(within, NEAR))
+        return rows._replace(gap=rows.gap - self.room[node.frame])
+
+    def ask(self, gap: int) -> None:
+        """Ask for more room in a gap, and in the frames at its ends."""
+        for frame in (gap, gap + 1):
+            self.room[frame] = min(2.0 * self.room[frame] + ROOM, MOST_ROOM)
 
 
 class Mender:
@@ -101,19 +125,17 @@ class Mender:
         seams = window.first > 0, window.end < len(q)
         objective = Objective(len(window), np.ones(workspace.model.nv), SPREAD, terms.dt, seams)
         held = [terms.held(frame) for frame in range(window.first, window.end)]
-        looking = Looking(workspace, chart, held, self._clearance)
+        looking = _Looking(workspace, chart, held, self._clearance)
         program = WindowProgram(
             looking, objective, self._limits(window, chart, seams), banded_solver(None)[1], PROGRAMS
         )
         x = np.zeros((len(window), workspace.model.nv))
         found = chart.original.copy()
-        before = best = self._left(found, window)
+        before = best = left = self._left(found, window)
         for _ in range(ADDED):
-            program.add([
-                Node(gap, float(np.clip(share + side, NEAREST, 1.0 - NEAREST)))
-                for gap, share in best.dipping.items()
-                for side in SIDES
-            ])  # fmt: skip
+            program.add([Node(gap, float(np.clip(at, NEAREST, 1.0 - NEAREST))) for gap, at in left.dipping.items()])
+            for gap in left.dipping:
+                looking.ask(gap)
             answer = program.run(x, lambda count, worst: False, RADIUS)
             self.programs += answer.programs
             x, postures, moved = answer.x, chart.original.copy(), (answer.x != 0.0).any(axis=1)
@@ -121,7 +143,7 @@ class Mender:
             left = self._left(postures, window)
             if left.wrong < best.wrong:
                 best, found = left, postures
-            if not left.dipping or not answer.met:
+            if not left.dipping:
                 break
         q[window.first : window.end] = found
         return best.wrong < before.wrong
