@@ -8,7 +8,7 @@ where it was in that frame, and `Freeze("root")` keeps the root's motion.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -44,12 +44,15 @@ class FrameTerms:
     dt: float
     given: tuple[Constraint | Goal | Bound, ...]
     stands: tuple[tuple[str, ...], ...]
+    _resolved: dict[int, tuple[HeldTerm, ...]] = field(init=False, repr=False, default_factory=dict)
 
     def held(self, frame: int) -> tuple[HeldTerm, ...]:
-        """Constraints and goals of a frame, resolved at its original posture."""
-        terms = [term for term in self.given if not isinstance(term, Bound)]
-        feet = held_feet(self.scene.figure, self.stands[frame])
-        return tuple(term.resolve(self.scene, self.q[frame]) for term in (*terms, *feet))
+        """Constraints and goals of a frame, resolved at its original posture: once, because that takes milliseconds."""
+        if frame not in self._resolved:
+            terms = [term for term in self.given if not isinstance(term, Bound)]
+            feet = held_feet(self.scene.figure, self.stands[frame])
+            self._resolved[frame] = tuple(term.resolve(self.scene, self.q[frame]) for term in (*terms, *feet))
+        return self._resolved[frame]
 
     def bounds(self, frame: int, state: State) -> tuple[Array, Array, Array, Array]:
         """Bounds of a frame.
