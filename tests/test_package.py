@@ -31,6 +31,7 @@ ROOMS = (
         "workspace",
         "scene",
         "tasks",
+        "derivatives",
         "term_plan",
         "residual_kernel",
         "coordinate_kernel",

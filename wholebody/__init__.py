@@ -26,11 +26,14 @@ from wholebody.version import __version__
 
 if TYPE_CHECKING:
     from wholebody.assessment import Assessment, assess
+    from wholebody.derivatives import DerivativeCheck, check_derivatives
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
     from wholebody.methods.newton.assembly import Assembly
+    from wholebody.methods.newton.assembly_constraint import AssemblyConstraint
+    from wholebody.methods.newton.assembly_solution import AssemblySolution
     from wholebody.methods.newton.method import Newton
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
@@ -88,6 +91,8 @@ __all__ = [
     "CCD",
     "QP",
     "Assembly",
+    "AssemblyConstraint",
+    "AssemblySolution",
     "Assessment",
     "AvoidanceReport",
     "Avoided",
@@ -104,6 +109,7 @@ __all__ = [
     "ClipCheck",
     "Constraint",
     "DampedLeastSquares",
+    "DerivativeCheck",
     "Discomfort",
     "Displacement",
     "Drag",
@@ -153,6 +159,7 @@ __all__ = [
     "avoid",
     "avoid_many",
     "check",
+    "check_derivatives",
     "equipment",
     "follow_path",
     "load",
@@ -168,12 +175,15 @@ __all__ = [
 
 _MODULES = {
     "wholebody.assessment": "Assessment assess",
+    "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
     "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
     "wholebody.tracking.drag": "Drag",
     "wholebody.methods.newton.assembly": "Assembly",
+    "wholebody.methods.newton.assembly_constraint": "AssemblyConstraint",
+    "wholebody.methods.newton.assembly_solution": "AssemblySolution",
     "wholebody.methods.newton.method": "Newton",
     "wholebody.methods.placo.method": "Placo",
     "wholebody.tracking.path_following": "follow_path",

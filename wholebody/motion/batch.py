@@ -55,6 +55,13 @@ class _Asked(NamedTuple):
     method: Avoider
 
 
+class _Held(NamedTuple):
+    """What holds in every frame of each case."""
+
+    constraints: tuple[Given, ...]
+    feet: bool
+
+
 def avoid_many(
     clips: Iterable[Source],
     folder: str | os.PathLike[str],
@@ -63,6 +70,7 @@ def avoid_many(
     equipment: Iterable[Worn] = (NOTHING,),
     methods: Iterable[str | Avoider] = ("trajectory",),
     constraints: Iterable[Given] = (),
+    hold_feet: bool = True,
     jobs: int = 1,
     cluster: str | None = None,
     progress: Callable[[BatchProgress], Any] | None = None,
@@ -82,6 +90,7 @@ def avoid_many(
             worn together, paths of meshes, which are put on the back, `wb.Equipment`, or tuples of these.
         methods: names or settings, see `avoid`.
         constraints: what holds in every frame of each case, see `avoid`.
+        hold_feet: keep the feet where they stand, see `avoid`.
         jobs: cases at a time.
         cluster: address of a dask scheduler that runs them; None for this machine.
         progress: called with a `BatchProgress` after each case.
@@ -105,6 +114,7 @@ def avoid_many(
         raise InputError(f"{what}: two pieces of equipment are named {checks.shown(twice)}; give each another name")
     worn: dict[str, Worn] = {label(one): one for one in pieces}
     ways = _ways([as_avoider(one) for one in checks.listed(methods, f"{what}: methods", "['trajectory']")])
+    checks.flag(hold_feet, f"{what}: hold_feet")
     jobs = checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS)
     if cluster is not None:
         checks.text(cluster, f"{what}: cluster")
@@ -115,18 +125,19 @@ def avoid_many(
             dressed(owner, one)  # what does not fit is said before anything is computed
     table = BatchTable(checks.path(folder, f"{what}: folder"))
     marks, faults = _originals(sources, figure, table, jobs, cluster)
+    held = _Held(tuple(given), hold_feet)
     asked = [
-        _Asked(AvoidedCase(name, wears, way, asked=_fingerprint(marks[name], one, method, given)), one, method)
+        _Asked(AvoidedCase(name, wears, way, asked=_fingerprint(marks[name], one, method, held)), one, method)
         for name in sources
         for wears, one in worn.items()
         for way, method in ways.items()
     ]
-    return _freed(asked, sources, faults, table, given, figure, jobs, cluster, progress)
+    return _freed(asked, sources, faults, table, held, figure, jobs, cluster, progress)
 
 
 def _freed(
     asked: Sequence[_Asked], sources: Mapping[str, Clip | Path], faults: Mapping[str, str], table: BatchTable,
-    constraints: Sequence[Given], figure: Figure | None, jobs: int, cluster: str | None,
+    held: _Held, figure: Figure | None, jobs: int, cluster: str | None,
     progress: Callable[[BatchProgress], Any] | None,
 ) -> tuple[AvoidedCase, ...]:  # fmt: skip
     rows = {each.row.stem: row for each in asked if (row := table.done(each.row.asked)) is not None}
@@ -153,7 +164,7 @@ def _freed(
 
     def work() -> Iterator[Job]:
         for each in waiting:
-            yield Job(each, _case, (clip_of(each.row.clip), each.worn, each.method, tuple(constraints)), ENDLESS)
+            yield Job(each, _case, (clip_of(each.row.clip), each.worn, each.method, held), ENDLESS)
 
     for outcome in run_batch(work(), jobs, cluster) if waiting else ():
         each = outcome.job.name
@@ -166,12 +177,12 @@ def _freed(
     return tuple(rows[each.row.stem] for each in asked)
 
 
-def _case(
-    clip: Clip, worn: Worn, method: Avoider, constraints: Sequence[Given]
-) -> tuple[dict[str, Any], Array | None, float]:
+def _case(clip: Clip, worn: Worn, method: Avoider, held: _Held) -> tuple[dict[str, Any], Array | None, float]:
     """Free a clip, in a process of its own: the fields of its row, and its postures with their time step."""
     try:
-        avoided = avoid(clip, dressed(clip.figure, worn), method=method, constraints=constraints)
+        avoided = avoid(
+            clip, dressed(clip.figure, worn), method=method, constraints=held.constraints, hold_feet=held.feet
+        )
     except WholebodyError as error:
         return {"outcome": "refused", "message": str(error)}, None, clip.dt
     return _measured(clip, avoided), avoided.clip.q, avoided.clip.dt
@@ -320,9 +331,9 @@ def _mark(source: Clip | Path, figure: Figure | None) -> str:
         return _hash(str(error))
 
 
-def _fingerprint(mark: str, worn: Worn, method: Avoider, constraints: Sequence[Given]) -> str:
+def _fingerprint(mark: str, worn: Worn, method: Avoider, held: _Held) -> str:
     bytes_of_mesh = read_bytes(worn, "mesh") if isinstance(worn, str) and is_file(worn) else None
-    return _hash(mark, worn, bytes_of_mesh, method, tuple(constraints), __version__)
+    return _hash(mark, worn, bytes_of_mesh, method, held, __version__)
 
 
 def _hash(*values: Any) -> str:

@@ -39,7 +39,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         help="how (default: trajectory); repeated, each in turn",
     )
     add_equipment(parser)
-    parser.add_argument("--feet", action="store_true", help="hold feet where they stand")
+    parser.add_argument("--no-feet", action="store_true", help="let feet slide that stand; without it they are held")
     parser.add_argument(
         "--out", type=Path, metavar="OUT",
         help="the file to write (default: <name>-free.npz, beside FILE); of a batch a folder (default: freed)",
@@ -59,7 +59,6 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.motion.avoidance import as_avoider, avoid
     from wholebody.motion.reading import read_clip
     from wholebody.motion.ready_equipment import dressed
-    from wholebody.motion.stance import StanceFeet
 
     (file,) = arguments.files
     out = check_writable(arguments.out or file.with_name(f"{file.stem}-free.npz"))
@@ -70,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
             clip,
             scene,
             method=method,
-            constraints=[StanceFeet()] if arguments.feet else [],
+            hold_feet=not arguments.no_feet,
             progress=lambda told: _ignored(tell(told.share, told.note)),
         )
     _tell(Console(), avoided, avoided.clip.write(out))
@@ -107,7 +106,6 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
     from rich.console import Console
 
     from wholebody.motion.batch import BatchProgress, avoid_many
-    from wholebody.motion.stance import StanceFeet
 
     console, folder = Console(), arguments.out or Path(FOLDER)
     count = len(arguments.files) * len(methods) * len(worn)
@@ -120,8 +118,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
 
             rows = avoid_many(
                 arguments.files, folder, figure=figure_of(arguments), equipment=worn, methods=methods,
-                constraints=[StanceFeet()] if arguments.feet else [], jobs=jobs_of(arguments),
-                cluster=arguments.cluster, progress=said,
+                hold_feet=not arguments.no_feet, jobs=jobs_of(arguments), cluster=arguments.cluster, progress=said,
             )  # fmt: skip
     except KeyboardInterrupt:
         console.print(
