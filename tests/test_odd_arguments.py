@@ -511,8 +511,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
     avoided = {"clip": clip, "scene": wb.Scene(arm), "constraints": [], "progress": lambda told: None}
     yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
-    many = {"clips": [clip], "folder": path / "many", "equipment": ["nothing"], "methods": ["frames"], "jobs": 1}
-    yield "avoid_many", Call(wb.avoid_many, {**many, "constraints": [], "hold_feet": True, "progress": print})
+    many = {"clips": [], "folder": path / "many", "equipment": ["nothing"], "methods": ["frames"], "jobs": 1}
+    yield "avoid_many", Call(wb.avoid_many, {**many, "hold_feet": True, "progress": print})
+    given = {"clips": [clip], "constraints": []}
+    yield "avoid_many(case)", Call(partial(wb.avoid_many, folder=path / "many", methods=["frames"]), given)
     yield "avoid_many(figure)", Call(partial(wb.avoid_many, ["walk.npz"], path / "many"), {"figure": arm})
     clip.write(path / "read.npz")
     files = {"files": [path / "read.npz"], "folder": path / "many", "figure": arm, "jobs": 1, "progress": print}
