@@ -200,8 +200,15 @@ class Drag(Generic[Answer]):
 
     @property
     def q(self) -> Array:
-        """(nq,) the present posture; of an assembly (7 n,) its variables."""
+        """(nq,) the present posture, which may be set; of an assembly (7 n,) its variables."""
         return self._run.q
+
+    @q.setter
+    def q(self, q: Array) -> None:
+        if isinstance(self._run, AssemblyDrag):
+            self._run.assembly.place(q)
+        else:
+            self._run.q = q
 
     @property
     def problem(self) -> Problem | Assembly:

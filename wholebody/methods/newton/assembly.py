@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -31,6 +31,9 @@ from wholebody.methods.newton.patterns import Patterns
 from wholebody.methods.newton.system import System
 from wholebody.pool import OneAtATime
 from wholebody.tasks.inputs import point
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 FINEST = 1e-12  # m, rad: least tolerance; below it only rounding remains
 FRAME_TOLERANCE = 1e-4  # m, rad: of the goals in the frames of a drag

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -37,6 +37,8 @@ from wholebody.tasks.base import Bound, Constraint
 from wholebody.tasks.inputs import target_placement
 
 if TYPE_CHECKING:
+    from typing_extensions import Self
+
     Color = tuple[float, float, float, float]
 
 WORLD = "world"

@@ -48,10 +48,11 @@ def solids(shape: ShapeLike | None, where: str) -> tuple[Solid, ...]:
     if shape is None:
         return ()
     listed = [shape] if isinstance(shape, Shape) else checks.listed(shape, f"{where}: shape", "[wb.Box((1, 1, 1))]")
-    found = []
+    found: list[Solid] = []
     for entry in listed:
-        one, at = entry if isinstance(entry, tuple) and len(entry) == 2 else (entry, (0.0, 0.0, 0.0))
-        checks.instance(one, Shape, f"{where}: shape", "give wb.Box, wb.Sphere or another, or (shape, placement)")
+        given, at = entry if isinstance(entry, tuple) and len(entry) == 2 else (entry, (0.0, 0.0, 0.0))
+        mend = "give wb.Box, wb.Sphere or another, or (shape, placement)"
+        one: Shape = checks.instance(given, Shape, f"{where}: shape", mend)
         found.append((one, placement(at, f"{where}: shape")))
         if _reach(found[-1:]) == float("inf"):
             raise InputError(f"{where}: a body cannot be a half-space; add it as a thing, or give a wb.Box")
@@ -74,7 +75,7 @@ def _reach(of: Iterable[Solid]) -> float:
 
 def body_owner(name: str, body: int, of: Iterable[Solid]) -> Owner:
     """The pieces of a body."""
-    pieces = []
+    pieces: list[tuple[str, Any, Any]] = []
     for shape, at in of:
         for piece in shape.pieces():
             pieces.append((f"{name}:{len(pieces)}", at * piece.placement, piece.geometry))
@@ -145,8 +146,8 @@ class LooseBodies:
                 if other.body != one.body and tested(other, one):
                     self.geometry.addCollisionPair(pin.CollisionPair(first, second))
         index_of = {piece.name: index for index, piece in enumerate(pieces)}
-        for one, other in pairs:
-            self.geometry.addCollisionPair(pin.CollisionPair(*sorted((index_of[one], index_of[other]))))
+        for pair in pairs:
+            self.geometry.addCollisionPair(pin.CollisionPair(*sorted(index_of[name] for name in pair)))
 
     def frame_id(self, name: str) -> int:
         """Index of the frame of a body or segment with pieces.

@@ -85,7 +85,7 @@ def solved(
 
     With `nearest`, the factorisation of the system's KKT matrix, they end at the place nearest to `before`.
     """
-    found = reach(active_system, before, tolerance=tolerance, iterations=iterations, kind=kind)
+    found = reach(active_system, before, tolerance=tolerance, iterations=iterations, kind=kind, settle=True)
     system, x = active_system.system, found.x
     nearness: tuple[float, ...] = ()
     if nearest is not None and found.met:
