@@ -102,14 +102,10 @@ def names_of(term: AssemblyConstraint, label: str) -> list[str]:
     Raises:
         InputError: there are none, or one is twice in the list.
     """
-    names = [
-        text(name, f"{label}: a name in bodies")
-        for name in listed(getattr(term, "bodies", ()), f"{label}: bodies", "('crank',)")
-    ]
+    given = getattr(term, "bodies", ())
+    names = [text(name, f"{label}: a name in bodies") for name in listed(given, f"{label}: bodies", "('crank',)")]
     if not names or len(set(names)) < len(names):
-        raise InputError(
-            f"{label}: bodies is {shown(getattr(term, 'bodies', ()))}; name at least one body, and each once"
-        )
+        raise InputError(f"{label}: bodies is {shown(given)}; name at least one body, and each once")
     return names
 
 
