@@ -21,7 +21,7 @@ X, Y, Z = np.eye(3)
 
 LOOSE = {
     "left side": (0.0, 0.5 * (WIDTH - THICK), 0.5 * HEIGHT),  # this part is in place already
-    "right side": (0.25, -0.95, 0.46, *pin.Quaternion(pin.rpy.rpyToMatrix(0.5, 0.25, 0.5)).coeffs()),
+    "right side": (0.25, -0.95, 0.48, *pin.Quaternion(pin.rpy.rpyToMatrix(0.5, 0.25, 0.5)).coeffs()),
     "lowest board": (0.75, 0.35, 0.06, *pin.Quaternion(pin.rpy.rpyToMatrix(0.12, 0.0, 0.5)).coeffs()),
     "low board": (0.95, -0.25, 0.12, *pin.Quaternion(pin.rpy.rpyToMatrix(-0.1, 0.15, -0.6)).coeffs()),
     "high board": (0.70, -0.50, 0.35, *pin.Quaternion(pin.rpy.rpyToMatrix(0.6, 0.3, 0.3)).coeffs()),
@@ -80,7 +80,7 @@ def attach_right_side(assembly: wb.Assembly) -> None:
 
 def drag(assembly: wb.Assembly, name: str) -> list[NDArray[np.float64]]:
     """Drag a part to its place; the states of all parts, frame by frame."""
-    states, there = [assembly.variables()], in_place(name)
+    states, there = [assembly.q], in_place(name)
     dragged = wb.Drag(assembly.drop_goals().frame_goal(name, there))
     for offset in (*WAYS[name], (0.0, 0.0, 0.0)):
         begin, end = assembly.placement(name), pin.SE3(there.rotation, there.translation + np.array(offset))
@@ -102,7 +102,7 @@ def assemble(assembly: wb.Assembly) -> tuple[list[dict[str, pin.SE3]], list[NDAr
         WholebodyError: a part cannot be attached.
     """
     stages = [{name: assembly.placement(name) for name in assembly.bodies}]
-    motion = [assembly.variables()]
+    motion = [assembly.q]
     for name in (*LEVELS, "right side"):
         motion += drag(assembly, name)[1:]
         if name in LEVELS:
@@ -138,9 +138,8 @@ def main(
     """Assemble, report and draw."""
     print("A shelf of six parts:")
     stages, motion = assemble(build())
-    print(
-        f"  parts pass through each other or the floor in {passes_through(build().scene, motion)} of {len(motion)} steps"
-    )
+    passed = passes_through(build().scene, motion)
+    print(f"  parts pass through each other or the floor in {passed} of {len(motion)} steps")
     if pictures:
         draw(motion, out)
     return stages, motion

@@ -14,8 +14,8 @@ import wholebody as wb
 from wholebody.view.filmstrip import write_filmstrip
 
 APART = 1.15  # m: between the two people, who face each other
-BOX = (0.40, 0.34, 0.26)  # m
-SIDEWAYS, LOW, HIGH = 0.20, 0.98, 1.22  # m: the box's middle goes from one side to the other, over the post
+BOX = (0.40, 0.30, 0.22)  # m
+SIDEWAYS, LOW, HIGH = 0.25, 1.00, 1.20  # m: the box's middle goes from one side to the other, over the post
 POST = 0.98  # m: its top, above the box's underside on either side
 GRIP = 0.10  # m: of the hands from the box's middle, along the line between the people
 AWAY = 0.006  # m: of the palms from the box's sides when they take hold
@@ -68,7 +68,7 @@ def carry(made: wb.Assembly) -> tuple[list[Array], float]:
     """Drag the box level up, across and down; the states, and how far the box is from its goal at the end, metres."""
     path = [(-SIDEWAYS, LOW), (-SIDEWAYS, HIGH), (SIDEWAYS, HIGH), (SIDEWAYS, LOW)]
     made.frame_goal("box", made.placement("box"))
-    drag, states = wb.Drag(made), [made.variables()]
+    drag, states = wb.Drag(made), [made.q]
     for begin, end in pairwise(path):
         for share in np.linspace(0.0, 1.0, FRAMES + 1)[1:]:
             y, z = np.array(begin) + share * (np.array(end) - begin)

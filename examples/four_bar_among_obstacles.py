@@ -85,7 +85,7 @@ def build() -> wb.Assembly:
 
 def turn(assembly: wb.Assembly, angles: Array) -> list[Array]:
     """Drag the crank's tip through angles until something stops it; the states, the first one included."""
-    drag, states = wb.Drag(assembly), [assembly.variables()]
+    drag, states = wb.Drag(assembly), [assembly.q]
     for angle in angles:
         frame = drag.to(CRANK * np.array((np.cos(angle), 0.0, np.sin(angle))))
         states.append(frame.q)
@@ -103,7 +103,7 @@ def free(assembly: wb.Assembly, states: list[Array]) -> bool:
 def main(out: Path = Path("pictures"), pictures: bool = True) -> tuple[wb.Assembly, list[Array]]:
     """Turn once with the post away, then against the post; compare with the closed forms, and draw."""
     made = build()
-    before = made.variables()
+    before = made.q
     states = turn(made, np.linspace(0.0, 2.0 * np.pi, STEPS + 1)[1:])
     face = made.placement("slider").translation[0] - 0.5 * SLIDER[0]
     print(f"A four-bar linkage among obstacles: {len(states) - 2} frames of a turn")
