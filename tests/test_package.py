@@ -27,6 +27,7 @@ ROOMS = (
         "geometry",
         "figures",
         "scene_geometry",
+        "moving_scene",
         "workspace",
         "scene",
         "tasks",
