@@ -28,6 +28,7 @@ ROOMS = (
         "figures",
         "scene_geometry",
         "moving_scene",
+        "moving_things",
         "workspace",
         "scene",
         "tasks",
