@@ -63,6 +63,14 @@ class Scene:
         scene._built = built
         return scene
 
+    def __repr__(self) -> str:
+        carried = [name for name, thing in self._objects.items() if thing.segment is not None]
+        around = [name for name, thing in self._objects.items() if thing.segment is None]
+        lines = [f"Scene of {self.figure!r}"]
+        lines.append(f"  things around it: {checks.some(around) or 'none'}")
+        lines.append(f"  carried: {checks.some(carried) or 'nothing'}")
+        return "\n".join(lines)
+
     # ---- contents
 
     @property

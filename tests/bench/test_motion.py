@@ -13,6 +13,7 @@ from wholebody.bench.motion import cases, measuring, report
 from wholebody.bench.motion.measuring import CHECKED, MotionRow
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
+from wholebody.motion.ready_equipment import dressed
 
 NAME = "sword cut"
 
@@ -31,7 +32,7 @@ def test_synthetic_clips_collide_are_smooth_and_within_limits(name: str) -> None
 
 @pytest.mark.parametrize("worn", cases.EQUIPMENT)
 def test_equipment_is_attached(worn: str) -> None:
-    scene = cases.dressed(wb.load("human"), worn)
+    scene = dressed(wb.load("human"), worn)
     assert all(thing.segment is not None for thing in scene.objects.values())
     assert bool(scene.objects) == (worn != "nothing")
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wholebody.bench.motion.cases import SYNTHETIC, WEAPON, dressed, recorded, synthetic
+from wholebody.bench.motion.cases import SYNTHETIC, WEAPON, recorded, synthetic
 from wholebody.bench.tables import read_rows, write_rows
 from wholebody.errors import InputError, WholebodyError
 from wholebody.files import make_folder
@@ -133,6 +133,7 @@ def measured(row: MotionRow, path: str) -> MotionRow:
     from wholebody.figures import load
     from wholebody.motion.checking import check
     from wholebody.motion.reading import read_clip
+    from wholebody.motion.ready_equipment import dressed
 
     figure = load(FIGURE)
     scene, clip = dressed(figure, row.equipment), read_clip(path, figure)
