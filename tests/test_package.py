@@ -25,6 +25,7 @@ ROOMS = (
         "pool",
         "runner",
         "geometry",
+        "matter",
         "figures",
         "scene_geometry",
         "workspace",
@@ -44,7 +45,7 @@ ROOMS = (
         "simplification",
         "methods",
     ),
-    *("tracking", "motion", "taskfile", "view", "bench", "doctor", "cli"),
+    *("tracking", "motion", "dynamics", "taskfile", "view", "bench", "doctor", "cli"),
 )
 """From the ground up; a room imports only from those before it, also where only type checkers look."""
 DOCUMENTED = {"_replace", "_asdict", "_fields", "_exit", "_SubParsersAction"}

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from wholebody.assessment import Assessment, assess
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+    from wholebody.matter.body import Body
+    from wholebody.matter.materials import Material
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
     from wholebody.methods.newton.assembly import Assembly
@@ -92,6 +94,7 @@ __all__ = [
     "Axis",
     "Balance",
     "Bisection",
+    "Body",
     "Bound",
     "Box",
     "Capsule",
@@ -116,6 +119,7 @@ __all__ = [
     "Hold",
     "Hull",
     "InputError",
+    "Material",
     "Measure",
     "Mesh",
     "MissingPackageError",
@@ -164,6 +168,8 @@ _MODULES = {
     "wholebody.assessment": "Assessment assess",
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
+    "wholebody.matter.body": "Body",
+    "wholebody.matter.materials": "Material",
     "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
     "wholebody.tracking.drag": "Drag",
