@@ -26,6 +26,7 @@ ROOMS = (
         "runner",
         "batches",
         "geometry",
+        "matter",
         "figures",
         "scene_geometry",
         "moving_scene",
