@@ -65,7 +65,7 @@ class Trajectory:
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
         q: Array = np.array(clip.q)
         _, solve = banded_solver(self.solver)
-        with scene.lend() as workspace:
+        with scene.borrow() as workspace:
             watch.tell(0.0, "looking for collisions")
             depths, wrong, gaps = faults(workspace, terms, q, self.clearance)
             wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
