@@ -20,6 +20,7 @@ def test_constants_are_those_of_the_method_and_of_what_methods_share() -> None:
     found, _ = ablation.constants("qp")
     by_name = {(each.module, each.name): each.value for each in found}
     assert by_name["wholebody.methods.starts", "SPREADS"] == starts.SPREADS
+    assert "wholebody.methods.qp.solvers.osqp_solver" in {each.module for each in found}  # folders within too
     assert all(not each.module.startswith("wholebody.methods.newton") for each in found)
 
 

@@ -92,7 +92,7 @@ def constants(method: str) -> tuple[list[Constant], list[str]]:
     Modules whose constants are compiled in and cannot be changed are the second part.
     """
     package = import_module(f"wholebody.methods.{method}")
-    names = [f"{package.__name__}.{found.name}" for found in pkgutil.walk_packages(package.__path__)]
+    names = [found.name for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")]
     names = [name for name in names if not name.endswith(".tracking")]  # no step is asked for here
     found: list[Constant] = []
     compiled: list[str] = []

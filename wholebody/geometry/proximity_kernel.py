@@ -59,7 +59,8 @@ def outer_gap(placement: Array, reach: Array, extent: Array, a: int, b: int) -> 
         apart = abs(placement[a, 3, k] - placement[b, 3, k])
         square += apart * apart
         boxes = max(boxes, apart - extent[a, k] - extent[b, k])
-    return max(boxes, np.sqrt(square) - reach[a] - reach[b])
+    gap: float = max(boxes, np.sqrt(square) - reach[a] - reach[b])
+    return gap
 
 
 @compiled()
