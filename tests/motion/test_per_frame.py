@@ -9,8 +9,8 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
+from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import FrameTerms
-from wholebody.motion.per_frame import Follower
 
 DT = 1 / 30
 
