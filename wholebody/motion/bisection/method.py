@@ -13,7 +13,7 @@ from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
-from wholebody.motion.bisection.gaps import hold_between
+from wholebody.motion.bisection.holds import hold_between
 from wholebody.motion.bisection.interpolation import Kind
 from wholebody.motion.bisection.key_frames import key_frames
 from wholebody.motion.bisection.path_planes import ANKLES, ELBOWS
@@ -45,7 +45,7 @@ class Bisection:
 
     Frames that overlap make groups. The middle frame of a group gets the posture of least effort from the original one
     that is free; the others of the group are interpolated; then both halves are looked at again. What still dips
-    between two frames gets larger margins. The postures outside of the groups and their buffers stay as they are.
+    between two frames gets rows of contact there. Postures outside of the groups and their buffers stay as they are.
 
     Attributes:
         evaluation: frames that characterise the motion. They are corrected first and never interpolated; so are the
