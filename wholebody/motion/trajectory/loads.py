@@ -2,7 +2,8 @@
 
 A clip may need more than the strength of a joint already, and may lean farther than its feet reach. So the bounds are:
 no joint more than its strength or than the largest torque that the original clip needs of it in this direction; and the
-zero moment point in no frame farther outside of an edge of its support than it is there in the original.
+zero moment point in no frame farther outside of an edge of its support than it is there in the original. A clip that
+may be slowed keeps to the strength of a joint if the original slowed as far as may be does.
 
 Differences of postures amplify noise, so recordings are filtered first (`wholebody.motion.torques.smoothed`). Rows are
 those of the filtered original with the deviation on it, which is smooth itself.
@@ -42,11 +43,14 @@ class LoadBounds(NamedTuple):
     Attributes:
         lower: (nv,) least torques, N m; -inf for none.
         upper: (nv,) largest torques.
+        slowed: (2, nv) least and largest torques of a clip that may be slowed: strength, if the original slowed by as
+            much as can be keeps to it, or else `lower` and `upper`.
         outside: for each frame (e,) by how far it may lean outside of each edge of its support, metres.
     """
 
     lower: Array
     upper: Array
+    slowed: Array
     outside: tuple[Array, ...]
 
 
@@ -72,7 +76,9 @@ class ClipLoads:
         self.dynamics, self.stands = dynamics, stands
 
     @classmethod
-    def original(cls, clip: Clip, feet: Mapping[str, Mask], strength: Strength, terms: FrameTerms) -> ClipLoads:
+    def original(
+        cls, clip: Clip, feet: Mapping[str, Mask], strength: Strength, terms: FrameTerms, stretch: float = 1.0
+    ) -> ClipLoads:
         """Those of an original clip, whose own loads are among the bounds.
 
         Args:
@@ -80,14 +86,16 @@ class ClipLoads:
             feet: foot -> (n,) frames in which it stands.
             strength: of the person.
             terms: what is held.
+            stretch: by which factor the clip may be slowed.
         """
         dynamics = InverseDynamics(clip.figure, tuple(feet), FRICTION)
         base = smoothed(clip, CUTOFF).q
         lower, upper = torque_limits(clip.figure, strength)
         # Where a foot is held beside its place, the original stands in its own.
         own, stands = soles_of(dynamics, base, feet, terms)
-        found = cls(clip, dynamics, own, LoadBounds(lower, upper, tuple(np.zeros(len(each.normals)) for each in own)))
-        bounds = found._widened()
+        inside = tuple(np.zeros(len(each.normals)) for each in own)
+        found = cls(clip, dynamics, own, LoadBounds(lower, upper, np.array([lower, upper]), inside))
+        bounds = found._widened(stretch)
         outside = [
             far if here is stand else np.full(len(stand.normals), far.max(initial=0.0))
             for far, here, stand in zip(bounds.outside, own, stands, strict=True)
@@ -144,18 +152,12 @@ class ClipLoads:
         return TimedRows(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
     def _timed(self, frame: int, b: float, change: float) -> TimedRows:
-        dynamics, stand, nv = self.dynamics, self.stands[frame], self.figure.model.nv
-        q, none = self.base[frame], np.zeros(nv)
-        v, a = self.motion(*self.base[frame - 1 : frame + 2])
-        still = dynamics.free_torque(q, none, none)
-        torques = np.array(
-            [still, dynamics.free_torque(q, v, a) - still, 0.5 * (dynamics.free_torque(q, none, v) - still)]
-        )
+        dynamics, stand = self.dynamics, self.stands[frame]
         now = np.array([1.0, b, change])
-        torques, wrenches = dynamics.grounded(q, torques, now, stand)
+        torques, wrenches = self._parts(frame, now)
         gaps = [[], [], []]  # type: list[list[Array]]
         for number, torque in enumerate(torques):
-            for bound, sign in ((self.bounds.upper, -1.0), (self.bounds.lower, 1.0)):
+            for bound, sign in zip(self.bounds.slowed, (1.0, -1.0), strict=True):
                 limit = np.where(np.isfinite(bound), np.abs(bound), np.inf)
                 gaps[number].append(LENGTH * (sign * torque / limit + (1.0 if number == 0 else 0.0)))
         if len(stand.normals) and now @ wrenches[:, 2] >= LIGHT * dynamics.weight:
@@ -167,16 +169,31 @@ class ClipLoads:
         near = now @ rows < NEAR
         return TimedRows(np.full(int(near.sum()), frame, dtype=np.intp), rows[0, near], rows[1, near], rows[2, near])
 
-    def _widened(self) -> LoadBounds:
+    def _parts(self, frame: int, shares: Array) -> tuple[Array, Array]:
+        """Torques (3, nv) and wrenches (3, 6): constant, and factors of b and of its derivative; see `timed`."""
+        q, none = self.base[frame], np.zeros(self.figure.model.nv)
+        v, a = self.motion(*self.base[frame - 1 : frame + 2])
+        still = self.dynamics.free_torque(q, none, none)
+        moved = self.dynamics.free_torque(q, v, a) - still
+        pushed = 0.5 * (self.dynamics.free_torque(q, none, v) - still)
+        return self.dynamics.grounded(q, np.array([still, moved, pushed]), shares, self.stands[frame])
+
+    def _widened(self, stretch: float) -> LoadBounds:
         """The bounds, and the loads of these postures where they are beyond them."""
+        least, most = self.bounds.slowed
+        slow = np.array([1.0, 1.0 / stretch**2, 0.0])
         lower, upper, outside = self.bounds.lower, self.bounds.upper, list(self.bounds.outside)
         for frame in range(1, len(self.base) - 1):
             v, a = self.motion(*self.base[frame - 1 : frame + 2])
             found = self.dynamics.loads(self.base[frame], v, a, self.stands[frame])
             lower, upper = np.minimum(lower, found.torque), np.maximum(upper, found.torque)
+            torque = slow @ self._parts(frame, slow)[0]
+            least, most = np.minimum(least, torque), np.maximum(most, torque)
             leaning = self.leaning(self.stands[frame], found)
             outside[frame] = np.maximum(outside[frame], -leaning) if len(leaning) else outside[frame]
-        return LoadBounds(lower, upper, tuple(outside))
+        limits = self.bounds.slowed
+        slowed = [np.where(least < limits[0], lower, limits[0]), np.where(most > limits[1], upper, limits[1])]
+        return LoadBounds(lower, upper, np.array(slowed), tuple(outside))
 
 
 class WindowLoads:

@@ -88,7 +88,9 @@ class Trajectory:
             loads = None
             if self.dynamics is not None:
                 stands = standing_feet(clip, usual_feet(scene.figure, constraints))
-                loads = ClipLoads.original(Clip(scene.figure, clip.q, clip.dt), stands, self.dynamics, terms)
+                loads = ClipLoads.original(
+                    Clip(scene.figure, clip.q, clip.dt), stands, self.dynamics, terms, self.stretch
+                )
             run = ClipRun(self, terms, workspace, solve, clip.q, self.stretch, loads)
             q, missed = self._freed(run, terms, workspace, clip.q, watch)
             new = None if watch.ended else self._timing(q, terms, workspace.state, solve, loads)
