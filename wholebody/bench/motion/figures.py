@@ -101,7 +101,8 @@ def carrying(figure: Figure) -> Array:
 
 DRAWINGS = (
     Drawing("4.1", "a walk, with a sphere at the torso's side", WALK, lambda _: "side_sphere"),
-    Drawing("4.2", "a vertical jump, with a sphere at the torso's side", JUMP, lambda _: "side_sphere", span=(0.4, 2.0)),
+    Drawing("4.2", "a vertical jump, with a sphere at the torso's side", JUMP, lambda _: "side_sphere",
+            span=(0.4, 2.0)),
     Drawing("4.3", "the take-off of the jump, with pouches", JUMP, lambda _: "pouches", views=(FRONT, SLANTED),
             span=(0.6, 1.2)),
     Drawing("4.4", "a walk with a weapon in both hands, with pouches, hands free", WALK, weapon, armed=True,
