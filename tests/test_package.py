@@ -28,6 +28,8 @@ ROOMS = (
         "geometry",
         "figures",
         "scene_geometry",
+        "moving_scene",
+        "moving_things",
         "workspace",
         "scene",
         "tasks",
