@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from wholebody.motion.clip import Clip
 from wholebody.motion.equipment import Equipment
 from wholebody.motion.frame_terms import Given
 from wholebody.motion.reading import read_clip
-from wholebody.motion.ready_equipment import Worn, dressed
+from wholebody.motion.ready_equipment import Worn, dressed, equipment
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import Freeze, Hold, Point
@@ -79,6 +79,12 @@ class Drawing:
     feet: bool = True
 
 
+def belt(figure: Figure) -> tuple[Equipment, ...]:
+    """Pouches that rest on the hips too, into which a crouch presses them."""
+    hips = ("pelvis", "left_thigh", "right_thigh")
+    return tuple(replace(pouch, rests_on=(*pouch.rests_on, *hips)) for pouch in equipment("pouches", figure))
+
+
 def weapon(figure: Figure) -> Worn:
     """Pouches, and a rod in the right hand that points to the left one."""
     q = carrying(figure)
@@ -89,7 +95,7 @@ def weapon(figure: Figure) -> Worn:
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along).matrix()
     at = hand.actInv(pin.SE3(turn, right.translation + 0.4 * along))
     rod = Equipment("weapon", Capsule(*WEAPON), "right_hand", at, ARMS, (0.15, 0.15, 0.17, 1.0))
-    return ("pouches", rod)
+    return (*belt(figure), rod)
 
 
 def carrying(figure: Figure) -> Array:
@@ -103,7 +109,7 @@ DRAWINGS = (
     Drawing("4.1", "a walk, with a sphere at the torso's side", WALK, lambda _: "side_sphere"),
     Drawing("4.2", "a vertical jump, with a sphere at the torso's side", JUMP, lambda _: "side_sphere",
             span=(0.4, 2.0)),
-    Drawing("4.3", "the take-off of the jump, with pouches", JUMP, lambda _: "pouches", views=(FRONT, SLANTED),
+    Drawing("4.3", "the take-off of the jump, with pouches", JUMP, belt, views=(FRONT, SLANTED),
             span=(0.6, 1.2)),
     Drawing("4.4", "a walk with a weapon in both hands, with pouches, hands free", WALK, weapon, armed=True,
             views=(FRONT, SLANTED)),
