@@ -26,6 +26,7 @@ examples:
   wholebody clip avoid walk.bvh --equipment pack
   wholebody clip avoid walk.bvh run.bvh --equipment pack --equipment vest_plate+pouches --jobs 4 --out freed"""
 METHOD, WORN, FOLDER = "trajectory", "nothing", "freed"
+WIDE = 120  # letters that a line of a batch's table needs
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -107,7 +108,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
 
     from wholebody.motion.batch import BatchProgress, avoid_many
 
-    console, folder = Console(), arguments.out or Path(FOLDER)
+    console, folder = Console(width=max(WIDE, Console().width)), arguments.out or Path(FOLDER)
     count = len(arguments.files) * len(methods) * len(worn)
     try:
         with bar("reading the motions", count) as tell:
@@ -135,7 +136,9 @@ def _table(console: Console, rows: tuple[AvoidedCase, ...]) -> None:
 
     from wholebody.cli.tables import table
 
-    made = table("motion", "wears", "method", "", "collide", "after", "dips", "deepest mm", "deviation mm", "s a s")
+    made = table(
+        "motion", "wears", "method", "", "collide", "after", "dips", "deepest mm", "deviation mm", "s a second"
+    )
     for column in made.columns[1:4]:
         column.justify = "left"
     for row in rows:
