@@ -65,6 +65,7 @@ class Drawing:
         span: seconds of the clip, from and to.
         armed: whether both hands carry a weapon.
         feet: whether feet that stand are held.
+        shown: method whose answer the picture shows.
     """
 
     number: str
@@ -77,6 +78,7 @@ class Drawing:
     span: tuple[float, float] = (0.0, 1.8)
     armed: bool = False
     feet: bool = True
+    shown: str = "trajectory"
 
 
 def belt(figure: Figure) -> tuple[Equipment, ...]:
@@ -112,13 +114,13 @@ DRAWINGS = (
     Drawing("4.3", "the take-off of the jump, with pouches", JUMP, belt, views=(FRONT, SLANTED),
             span=(0.6, 1.2)),
     Drawing("4.4", "a walk with a weapon in both hands, with pouches, hands free", WALK, weapon, armed=True,
-            views=(FRONT, SLANTED)),
+            views=(FRONT, SLANTED), shown="bisection"),
     Drawing("4.5", "the same, with the grip of both hands held", WALK, weapon, armed=True, views=(FRONT, SLANTED),
-            constraints=(Hold(HANDS[1], relative_to=HANDS[0]),)),
+            constraints=(Hold(HANDS[1], relative_to=HANDS[0]),), shown="bisection"),
     Drawing("4.6", "from prone to standing, all joints free to move", RISE, lambda _: "nothing",
-            (*METHODS, Bisection(frozen=())), views=(SIDE, SLANTED), span=(1.4, 2.8), feet=False),
+            (*METHODS, Bisection(frozen=())), views=(SIDE, SLANTED), span=(1.4, 2.8), feet=False, shown="bisection 2"),
     Drawing("4.7", "the same, with the feet that stand held", RISE, lambda _: "nothing",
-            views=(SIDE, SLANTED), span=(1.4, 2.8)),
+            views=(SIDE, SLANTED), span=(1.4, 2.8), shown="bisection"),
 )  # fmt: skip
 
 
@@ -154,7 +156,9 @@ def redraw(drawing: Drawing, recordings: Mapping[str, Path], figure: Figure, fol
         hold_feet=drawing.feet, jobs=jobs,
     )  # fmt: skip
     after = {row.method: read_clip(folder / name / row.file, figure) for row in rows if row.file}
-    shown = after["bisection 2" if "bisection 2" in after else "trajectory"]
+    if drawing.shown not in after:
+        raise InputError(f"figure {drawing.number}: there is no clip by {drawing.shown}, which its picture shows")
+    shown = after[drawing.shown]
     strip = _strip(drawing, dressed(figure, worn), before, shown, folder / f"{name}.png")
     return Redrawn(drawing, strip, _curves(drawing, before, after, shown, folder / f"{name}-curves")[0], rows)
 
