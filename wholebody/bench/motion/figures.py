@@ -97,7 +97,7 @@ def weapon(figure: Figure) -> Worn:
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along).matrix()
     at = hand.actInv(pin.SE3(turn, right.translation + 0.4 * along))
     rod = Equipment("weapon", Capsule(*WEAPON), "right_hand", at, ARMS, (0.15, 0.15, 0.17, 1.0))
-    return (*belt(figure), rod)
+    return ("pouches", rod)
 
 
 def carrying(figure: Figure) -> Array:
