@@ -127,7 +127,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
         )
         raise
     _table(console, rows)
-    console.print(f"written: {folder}", highlight=False, markup=False)
+    console.print(f"written: {folder}", highlight=False, markup=False, soft_wrap=True)
     return 0 if all(row.outcome == "free" for row in rows) else 1
 
 
@@ -156,4 +156,4 @@ def _table(console: Console, rows: tuple[AvoidedCase, ...]) -> None:
     for row in rows:
         if row.outcome != "free":
             where = f"{row.clip}, {row.equipment}, {row.method}"
-            console.print(f"{where}: {row.message}", highlight=False, markup=False)
+            console.print(f"{where}: {row.message}", highlight=False, markup=False, soft_wrap=True)
