@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from wholebody.derivatives import DerivativeCheck, check_derivatives
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+    from wholebody.matter.body import Body
+    from wholebody.matter.materials import Material
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
     from wholebody.methods.newton.assembly import Assembly
@@ -101,6 +103,7 @@ __all__ = [
     "Balance",
     "BatchProgress",
     "Bisection",
+    "Body",
     "Bound",
     "Box",
     "Capsule",
@@ -126,6 +129,7 @@ __all__ = [
     "Hold",
     "Hull",
     "InputError",
+    "Material",
     "Measure",
     "Mesh",
     "MissingPackageError",
@@ -178,6 +182,8 @@ _MODULES = {
     "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
+    "wholebody.matter.body": "Body",
+    "wholebody.matter.materials": "Material",
     "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
     "wholebody.tracking.drag": "Drag",

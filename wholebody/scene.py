@@ -19,6 +19,10 @@ from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.geometry.shapes import Shape
+from wholebody.matter.body import Body
+from wholebody.matter.inertia import mass_properties
+from wholebody.matter.materials import DEFAULT, Material
+from wholebody.matter.materials import material as to_material
 from wholebody.scene_geometry import Motion, SceneGeometry, SceneObject, assemble
 from wholebody.workspace import Workspace, lent
 
@@ -26,6 +30,8 @@ if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.geometry.continuous.sweep import FirstContact
     from wholebody.geometry.penetration import ObjectPenetration
+
+SHAPES = "give wb.Box, wb.Sphere, wb.Mesh or another"
 
 
 class Scene:
@@ -139,6 +145,8 @@ class Scene:
         name: str,
         at: Any = (0.0, 0.0, 0.0),
         color: Sequence[float] | None = None,
+        body: Body | None = None,
+        material: Material | str | None = None,
     ) -> Scene:
         """Add a thing to the world.
 
@@ -147,14 +155,24 @@ class Scene:
             name: a name that nothing else in the scene has.
             at: (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3.
             color: red, green, blue and, if wanted, alpha, each from 0 to 1.
+            body: its mass, material and velocity, if it moves by itself.
+            material: of a thing that does not; wood if none is given.
 
         Returns:
             The scene, so that calls can be chained.
 
         Raises:
-            InputError: the name exists already, or the shape, placement or color is invalid.
+            InputError: the name exists already, the shape, placement or color is invalid, or a half-space has a body.
+            UnknownNameError: there is no such material.
         """
-        return self._put(self._new_name(name), shape, at, color)
+        name = self._new_name(name)
+        if body is not None:
+            checks.instance(body, Body, f"{name!r}: body", "give wb.Body(density=700)")
+            if material is not None:
+                raise InputError(f"{name!r} has a body and a material; give the body's: wb.Body(material=...)")
+            mass_properties(checks.instance(shape, Shape, repr(name), SHAPES), body, name)
+        made_of = DEFAULT if material is None else to_material(material, f"{name!r}: material")
+        return self._put(name, shape, at, color, body=body, material=made_of if body is None else body.stuff)
 
     def attach(
         self,
@@ -237,14 +255,23 @@ class Scene:
         return self
 
     def _put(
-        self, name: str, shape: Shape, at: Any, color: Any, to: str | None = None, rests_on: tuple[str, ...] = ()
+        self,
+        name: str,
+        shape: Shape,
+        at: Any,
+        color: Any,
+        to: str | None = None,
+        rests_on: tuple[str, ...] = (),
+        body: Body | None = None,
+        material: Material = DEFAULT,
     ) -> Scene:
         checks.text(name, "the name of an object")
-        checks.instance(shape, Shape, repr(name), "give wb.Box, wb.Sphere, wb.Mesh or another")
+        checks.instance(shape, Shape, repr(name), SHAPES)
         place = to_placement(at, f"{name!r}: at")
         painted = None if color is None else checks.color(color, f"{name!r}: color")
         with self._lock:
-            self._objects[self._new_name(name)] = SceneObject(name, shape, place, to, painted, rests_on)
+            thing = SceneObject(name, shape, place, to, painted, rests_on, body=body, material=material)
+            self._objects[self._new_name(name)] = thing
             self._changed()
         return self
 

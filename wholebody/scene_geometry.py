@@ -15,11 +15,13 @@ from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Joints, PairTable, Proximity
+from wholebody.matter.materials import DEFAULT, Material
 from wholebody.pool import Pool
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.geometry.shapes import Shape
+    from wholebody.matter.body import Body
 
 T = TypeVar("T")
 
@@ -50,6 +52,8 @@ class SceneObject:
         segment: the segment that carries it; None for a thing in the world.
         color: red, green, blue, alpha from 0 to 1, or None for the viewer's choice.
         rests_on: segments and carried things that a carried thing is not tested against.
+        body: mass and velocity of a thing that `wholebody.dynamics` moves; None for one that it does not.
+        material: what it is made of; a body's own.
         motion: how it came to its placement; None if it was put there.
     """
 
@@ -59,6 +63,8 @@ class SceneObject:
     segment: str | None = None
     color: tuple[float, float, float, float] | None = None
     rests_on: tuple[str, ...] = ()
+    body: Body | None = None
+    material: Material = DEFAULT
     motion: Motion | None = None
 
 

@@ -56,9 +56,17 @@ class ContactRows(NamedTuple):
 class ContactRowBuilder:
     """Builds contact rows for all near pairs at once. It remembers no posture, so any number of runs may share one."""
 
-    def __init__(self, table: PairTable) -> None:
-        """Lay the swept points and faces of all pieces in flat tables."""
-        self.table = table
+    def __init__(self, table: PairTable, most_ends: int = MOST_ENDS, same_normal: float = SAME_NORMAL) -> None:
+        """Lay the swept points and faces of all pieces in flat tables.
+
+        Args:
+            table: the pieces and pairs.
+            most_ends: rows of one contact beside its witness row.
+            same_normal: cosine of the angle to a face's normal within which coal's may be meant to be it.
+        """
+        self.table, self.most_ends = table, most_ends
+        self._lengths = LENGTHS.copy()
+        self._lengths[4] = same_normal
         shapes = table.swept
         self._points = np.vstack([swept.points for swept in shapes] or [np.zeros((0, 3))])
         self._point_count = np.array([len(swept.points) for swept in shapes], dtype=np.intp)
@@ -93,7 +101,7 @@ class ContactRowBuilder:
                 f"contacts among {len(contacts.placements)} pieces are not among these {len(self.table.joint)}; ask "
                 "the scene that they come from"
             )
-        most = len(contacts.distance) * (1 + MOST_ENDS)
+        most = len(contacts.distance) * (1 + self.most_ends)
         wrench, gap = np.empty((most, 6)), np.empty(most)
         contact, joints = np.empty(most, dtype=np.intp), np.empty((most, 2), dtype=np.intp)
         asked = np.full(contacts.distance.shape, clearance, dtype=float)  # not a view: numba takes it for another type
@@ -106,7 +114,7 @@ class ContactRowBuilder:
     def write(
         self, contacts: Contacts, clearance: Array, wrench: Array, gap: Array, contact: Indices, joints: Indices
     ) -> int:
-        """Write the rows of all contacts into arrays with room for ``k * (1 + MOST_ENDS)`` rows; how many there are.
+        """Write the rows of all contacts into arrays with room for ``k * (1 + most_ends)`` rows; how many there are.
 
         Args:
             contacts: the near pairs of the same pieces.
@@ -120,7 +128,7 @@ class ContactRowBuilder:
             contacts.pair, contacts.distance, contacts.normal, contacts.point_a, contacts.point_b, contacts.number,
             contacts.placements, clearance, self._extended, self.table.joint, self._points, self._point_start,
             self._point_count, self._faces, self._face_start, self._face_count, self._radius, self._axis,
-            self._is_capsule, LENGTHS, MOST_ENDS, wrench, gap, contact, joints,
+            self._is_capsule, self._lengths, self.most_ends, wrench, gap, contact, joints,
         )  # fmt: skip
         return count
 
