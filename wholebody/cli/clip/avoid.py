@@ -122,9 +122,8 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
                 hold_feet=not arguments.no_feet, jobs=jobs_of(arguments), cluster=arguments.cluster, progress=said,
             )  # fmt: skip
     except KeyboardInterrupt:
-        console.print(
-            f"ended; {folder} keeps what is done, and the same command goes on", highlight=False, markup=False
-        )
+        said_last = f"ended; {folder} keeps what is done, and the same command goes on"
+        console.print(said_last, highlight=False, markup=False, soft_wrap=True)
         raise
     _table(console, rows)
     console.print(f"written: {folder}", highlight=False, markup=False, soft_wrap=True)
