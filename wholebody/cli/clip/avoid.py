@@ -28,6 +28,7 @@ examples:
   wholebody clip avoid walk.bvh --equipment pack
   wholebody clip avoid walk.bvh run.bvh --equipment pack --equipment vest_plate+pouches --jobs 4 --out freed"""
 METHOD, WORN, FOLDER = "trajectory", "nothing", "freed"
+WIDE = 120  # letters that a line of a batch's table needs
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -149,7 +150,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
 
     from wholebody.motion.batch import BatchProgress, avoid_many
 
-    console, folder = Console(), arguments.out or Path(FOLDER)
+    console, folder = Console(width=max(WIDE, Console().width)), arguments.out or Path(FOLDER)
     ways = [_method(name, arguments) for name in methods]
     count = len(arguments.files) * len(methods) * len(worn)
     try:
@@ -165,12 +166,11 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
                 hold_feet=not arguments.no_feet, jobs=jobs_of(arguments), cluster=arguments.cluster, progress=said,
             )  # fmt: skip
     except KeyboardInterrupt:
-        console.print(
-            f"ended; {folder} keeps what is done, and the same command goes on", highlight=False, markup=False
-        )
+        said_last = f"ended; {folder} keeps what is done, and the same command goes on"
+        console.print(said_last, highlight=False, markup=False, soft_wrap=True)
         raise
     _table(console, rows)
-    console.print(f"written: {folder}", highlight=False, markup=False)
+    console.print(f"written: {folder}", highlight=False, markup=False, soft_wrap=True)
     return 0 if all(row.outcome == "free" for row in rows) else 1
 
 
@@ -179,7 +179,9 @@ def _table(console: Console, rows: tuple[AvoidedCase, ...]) -> None:
 
     from wholebody.cli.tables import table
 
-    made = table("motion", "wears", "method", "", "collide", "after", "dips", "deepest mm", "deviation mm", "s a s")
+    made = table(
+        "motion", "wears", "method", "", "collide", "after", "dips", "deepest mm", "deviation mm", "s a second"
+    )
     for column in made.columns[1:4]:
         column.justify = "left"
     for row in rows:
@@ -197,4 +199,4 @@ def _table(console: Console, rows: tuple[AvoidedCase, ...]) -> None:
     for row in rows:
         if row.outcome != "free":
             where = f"{row.clip}, {row.equipment}, {row.method}"
-            console.print(f"{where}: {row.message}", highlight=False, markup=False)
+            console.print(f"{where}: {row.message}", highlight=False, markup=False, soft_wrap=True)
