@@ -159,7 +159,8 @@ class Assembly(AssemblyJoints):
         Raises:
             InputError: there is no such goal, or the target is not one.
         """
-        self._goals[self.goal_index(goal)] = self._goals[goal].moved(target)
+        index = self.goal_index(goal)
+        self._goals[index] = self._goals[index].moved(target)
         return self
 
     def goal_index(self, goal: int) -> int:
@@ -243,7 +244,7 @@ class Assembly(AssemblyJoints):
             x, solution = solved(
                 self.bodies, active, start,
                 tolerance=tolerance, iterations=iterations, kind=inequalities,
-                nearest=prepared.nearest() if nearest else None, scene=self._solid_scene(), to_scene=self.to_scene,
+                nearest=prepared.nearest() if nearest else None, scene=self._solid_scene(), to_scene=self._to_scene,
             )  # fmt: skip
             self._places = list(x.reshape(-1, 7))
             return solution
@@ -278,7 +279,7 @@ class Assembly(AssemblyJoints):
 
     def _is_free(self, active: AssemblySystem, before: Array, after: Array) -> bool:
         """Whether the motion of a frame passes through nothing."""
-        return is_free(active.workspace, self.to_scene(before), self.to_scene(after), SHORT)
+        return is_free(active.workspace, self._to_scene(before), self._to_scene(after), SHORT)
 
     def _ready(self, algebra: str | None) -> _Prepared:
         """The equations as they stand; None for the factorisation of the last solve."""
@@ -287,7 +288,7 @@ class Assembly(AssemblyJoints):
         if found is None or (found.algebra, found.revision) != (name, self.revision):
             held, count, weight = self._held(), len(self._places), self._weight()
             active = AssemblySystem(
-                held, list(self._figures.values()), self._solid_scene(), self.to_scene, self.clearance,
+                held, list(self._figures.values()), self._solid_scene(), self._to_scene, self.clearance,
                 Patterns(count, weight, name),
             )  # fmt: skip
             self._analysed = self.structures

@@ -193,9 +193,9 @@ class AssemblyBodies:
     @property
     def q(self) -> Array:
         """(nq,) the present posture of `scene`: seven numbers for each body, and the posture of each figure."""
-        return self.to_scene(self.variables())
+        return self._to_scene(self.variables())
 
-    def to_scene(self, variables: Array) -> Array:
+    def _to_scene(self, variables: Array) -> Array:
         """The posture (nq,) of `scene` at variables (7 n,); the same numbers if there are no figures."""
         if not self._figures:
             return variables
