@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.arrays import Array
-from wholebody.checks import choice, flag, known, number, whole
+from wholebody.checks import choice, flag, known, number, shown, whole
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.geometry.placement import PlacementLike
@@ -131,7 +131,7 @@ class Assembly(AssemblyJoints):
 
     def point_goal(self, body: str, target: ArrayLike, *, place: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
         """Move a point of a body, (3,) in its frame, to a position in the world (3,), if possible."""
-        what = f"the goal of {body!r}"
+        what = f"the goal of {shown(body)}"
         index, local = self._moved(body, what)
         offset = local * pin.SE3(np.eye(3), point(place, f"{what}: place"))
         self._goals.append(AssemblyGoal(what, index, offset, to_target(target, False, what), whole=False))
@@ -139,7 +139,7 @@ class Assembly(AssemblyJoints):
 
     def frame_goal(self, body: str, target: PlacementLike) -> Self:
         """Move a body to a placement in the world, if possible."""
-        what = f"the goal of {body!r}"
+        what = f"the goal of {shown(body)}"
         index, local = self._moved(body, what)
         self._goals.append(AssemblyGoal(what, index, local, to_target(target, True, what), whole=True))
         return self
