@@ -26,8 +26,11 @@ from wholebody.version import __version__
 
 if TYPE_CHECKING:
     from wholebody.assessment import Assessment, assess
+    from wholebody.derivatives import DerivativeCheck, check_derivatives
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+    from wholebody.matter.body import Body
+    from wholebody.matter.materials import Material
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
     from wholebody.methods.newton.assembly import Assembly
@@ -38,6 +41,8 @@ if TYPE_CHECKING:
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
     from wholebody.motion.avoidance import AvoidanceReport, Avoided, avoid
+    from wholebody.motion.batch import BatchProgress, avoid_many, read_many
+    from wholebody.motion.batch_table import AvoidedCase
     from wholebody.motion.bisection.method import Bisection
     from wholebody.motion.checking import ClipCheck, check
     from wholebody.motion.clip import Clip
@@ -93,9 +98,12 @@ __all__ = [
     "Assessment",
     "AvoidanceReport",
     "Avoided",
+    "AvoidedCase",
     "Axis",
     "Balance",
+    "BatchProgress",
     "Bisection",
+    "Body",
     "Bound",
     "Box",
     "Capsule",
@@ -104,6 +112,7 @@ __all__ = [
     "ClipCheck",
     "Constraint",
     "DampedLeastSquares",
+    "DerivativeCheck",
     "Discomfort",
     "Displacement",
     "Drag",
@@ -120,6 +129,7 @@ __all__ = [
     "Hold",
     "Hull",
     "InputError",
+    "Material",
     "Measure",
     "Mesh",
     "MissingPackageError",
@@ -151,11 +161,14 @@ __all__ = [
     "__version__",
     "assess",
     "avoid",
+    "avoid_many",
     "check",
+    "check_derivatives",
     "equipment",
     "follow_path",
     "load",
     "read_clip",
+    "read_many",
     "read_skeleton",
     "read_task",
     "retarget",
@@ -166,8 +179,11 @@ __all__ = [
 
 _MODULES = {
     "wholebody.assessment": "Assessment assess",
+    "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
+    "wholebody.matter.body": "Body",
+    "wholebody.matter.materials": "Material",
     "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
     "wholebody.tracking.drag": "Drag",
@@ -180,6 +196,8 @@ _MODULES = {
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
     "wholebody.motion.avoidance": "AvoidanceReport Avoided avoid",
+    "wholebody.motion.batch": "BatchProgress avoid_many read_many",
+    "wholebody.motion.batch_table": "AvoidedCase",
     "wholebody.motion.checking": "ClipCheck check",
     "wholebody.motion.bisection.method": "Bisection",
     "wholebody.motion.clip": "Clip",

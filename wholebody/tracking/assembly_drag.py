@@ -10,6 +10,7 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_solution import AssemblySolution
+from wholebody.moving_things import Collision
 
 GOAL_MOVES = (np.inf, 0.01, 0.002)  # m, rad: moves of the goal in a frame, tried until the motion is free
 
@@ -22,12 +23,14 @@ class DragFrame(NamedTuple):
         error: largest remaining goal error, metres or radians.
         iterations: iterations of the method.
         seconds: wall time.
+        collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
     """
 
     q: Array
     error: float
     iterations: int
     seconds: float
+    collisions: tuple[Collision, ...] = ()
 
 
 class AssemblyDrag:

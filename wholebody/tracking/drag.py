@@ -20,6 +20,7 @@ from wholebody.methods.base import Method, Tracker, goal_error
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_solution import AssemblySolution
 from wholebody.methods.solve import method_for_motions
+from wholebody.moving_things import Collision, FrameMotion
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.solution import Solution
@@ -56,6 +57,7 @@ class ProblemDrag:
         self._alone = OneAtATime("drag")
         moving_goal(problem, goal)
         self._number = goal
+        self._motion: FrameMotion | None = None
         self.q: Array = problem.scene.figure.clamp(problem.start)
 
     def to(self, target: Any) -> DragFrame:
@@ -68,13 +70,18 @@ class ProblemDrag:
         with self._alone:
             retarget(self.problem, self._number, target)
             self._workspace.refresh()
+            collisions: tuple[Collision, ...] = ()
             if np.isinf(self.tracker.unswept):
                 step = self.tracker.frame(self.q)
-                self.q, iterations = step.q, step.iterations
+                self.q, iterations, collisions = step.q, step.iterations, getattr(step, "collisions", ())
             else:
+                before, self._motion = self.q, self._workspace.next_frame()
                 iterations = self._followed()
+                if self._motion is not None:
+                    collisions = self._motion.collisions(((0.0, before), (1.0, self.q)))
+                    self._workspace.keep(self._motion, collisions)
             error = goal_error(self.problem, self._workspace, self.q)
-            return DragFrame(self.q, error, iterations, time.perf_counter() - began)
+            return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions)
 
     def finish(self) -> Solution:
         """Meet the present goal with the method's full accuracy, and assess the posture."""
@@ -105,9 +112,7 @@ class ProblemDrag:
                 continue  # the goal is nearer than that, and was tried already
             step = self.tracker.frame(self.q)
             spent, q = spent + step.iterations, self._bounded(step.q)
-            if is_free(self._workspace, self.q, q, self.tracker.unswept) and (
-                not deep or _depth(self._workspace, q) <= GRAZE
-            ):
+            if self._is_free(q, self.tracker.unswept) and (not deep or _depth(self._workspace, q) <= GRAZE):
                 self.q = q
                 break
             tried.append(q)
@@ -115,6 +120,12 @@ class ProblemDrag:
             if deep:
                 self._leave(tried, deep)
         return spent
+
+    def _is_free(self, q: Array, unswept: float) -> bool:
+        """Whether the motion to the posture q (nq,) is free, with things that move meanwhile; see `is_free`."""
+        if self._motion is not None:
+            return self._motion.first_contact(self.q, q, GRAZE) is None
+        return is_free(self._workspace, self.q, q, unswept)
 
     def _bounded(self, q: Array) -> Array:
         """The motion towards the posture q (nq,), as far as the velocity bounds allow in a frame."""
@@ -143,7 +154,7 @@ class ProblemDrag:
         ends = [*(self._bounded(q) for q in self.tracker.ways_out(self.q)), *tried]
         depths = [_depth(self._workspace, q) for q in ends]
         out = [
-            (not is_free(self._workspace, self.q, q, 0.0), depth, number)
+            (not self._is_free(q, 0.0), depth, number)
             for number, (depth, q) in enumerate(zip(depths, ends, strict=True))
             if depth < deep
         ]
@@ -162,7 +173,8 @@ class Drag(Generic[Answer]):
     "qp" solves one quadratic program a frame, seldom up to three; "newton" takes a few Newton steps. Other methods
     solve every frame anew from the present posture, "ccd" to a millimetre. No method restarts from other postures. If
     the motion to a posture penetrates something, the goal moves by a shorter distance, or not in that frame. If a thing
-    was moved into the figure, the figure first leaves it.
+    was moved into the figure, the figure first leaves it. Of things that move (`Scene.move` with `over`) "qp" gets out
+    of the way as they come; the others meet them where they end. What they could not avoid is named in the answer.
 
     A drag of an assembly moves the assembly itself, by a few Newton steps a frame.
     """
