@@ -420,7 +420,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Assembly.add", Call(assembly().add, {"shape": wb.Sphere(0.1), "name": "ball", "at": at}, solve_parts)
     yield "Assembly.add_things", Call(assembly().add_things, {"scene": there}, solve_parts)
     solid = wb.Assembly().body("rod", shape=wb.Sphere(0.1)).add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 0.0))
-    yield "Assembly.move", Call(solid.move, {"name": "ball", "at": at})
+    yield "Assembly.move", Call(solid.move, {"name": "ball", "at": at, "over": 0.1})
     yield "Assembly.ignore", Call(solid.ignore, {"first": "rod", "second": "ball"})
     surface = {"body": "pin", "place": at, "of": "ball"}
     yield "Assembly.on_surface", Call(solid.body("pin").on_surface, surface)
@@ -449,7 +449,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Assembly.spherical", Call(assembly().spherical, ball, solve_parts)
     solving = {"tolerance": 1e-4, "iterations": 5, "algebra": "auto", "inequalities": "slack", "nearest": False}
     yield "Assembly.solve", Call(assembly().solve, solving)
-    for method in ("system", "variables"):
+    for method in ("system", "variables", "prepare"):
         yield f"Assembly.{method}", Call(getattr(assembly(), method), {})
 
     looked = {"scene": there, "contact_distance": 0.01, "see_through": ["ball"], "names": True, "title": "x"}

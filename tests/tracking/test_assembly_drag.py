@@ -78,3 +78,29 @@ def test_the_viewer_takes_an_assembly(tmp_path: object) -> None:
     assert "lamp" in page
     with pytest.raises(wb.InputError, match="shape"):
         viewer.show(made.q[:7])
+
+
+@pytest.mark.parametrize("speed", [1.0, 5.0, 12.0, 20.0])
+def test_a_plate_that_flies_by_pushes_a_ball_or_is_named(speed: float) -> None:
+    dt = 1.0 / 60.0
+    made = wb.Assembly().body("ball", (0, 0, 0), shape=wb.Sphere(0.05))
+    made.add(wb.Box((0.001, 0.4, 0.4)), name="plate", at=(-0.5, 0, 0)).frame_goal("ball", (0, 0, 0))
+    drag, x, named = wb.Drag(made), -0.5, False
+    while x < 0.5:
+        x += speed * dt
+        made.move("plate", at=(x, 0, 0), over=dt)
+        frame = drag.to((0, 0, 0))
+        named = named or bool(frame.collisions)
+        assert named or frame.q[0] - x > 0.0505 - 1e-4 or x < 0.0
+    for collision in frame.collisions:
+        assert {collision.first, collision.second} == {"ball", "plate"}
+
+
+def test_a_plate_through_a_body_that_cannot_give_way_is_named() -> None:
+    made = wb.Assembly().body("ball", (0, 0, 0), shape=wb.Sphere(0.05)).body("rod", (0, 0, 0.3))
+    made.add(wb.Box((0.001, 0.4, 0.4)), name="plate", at=(-0.1, 0, 0))
+    made.spherical("world", "ball", at=(0, 0, 0)).point_goal("ball", (0, 0, 0))
+    drag = wb.Drag(made)
+    made.move("plate", at=(0.1, 0, 0), over=1.0 / 60.0)
+    frame = drag.to((0, 0, 0))
+    assert [{one.first, one.second} for one in frame.collisions] == [{"ball", "plate"}]
