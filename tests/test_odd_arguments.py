@@ -219,6 +219,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Figure.joint_id", Call(arm.joint_id, {"name": "joint1"})
     yield "Figure.joint_names", Call(arm.joint_names, {"names": ["joint1"]})
     yield "Figure.joint_values", Call(arm.joint_values, {"q": q})
+    yield "Figure.placement", Call(arm.placement, {"q": q, "name": "link1"})
     yield "Figure.posture", Call(arm.posture, {"name": arm.postures[0]})
     yield "Figure.reduced", Call(arm.reduced, {"joints": ["joint1"], "posture": q})
     yield "Figure.tangent_bounds", Call(arm.tangent_bounds, {"q": q})
@@ -321,6 +322,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Problem.retarget", Call(retarget, {"goals": [wb.Point("link4", at)]})
     yield "solve", Call(wb.solve, {"problem": ask, "method": "qp", "progress": print})
     yield "assess", Call(wb.assess, {"problem": ask, "q": q})
+    checked = {"term": wb.Point("link4", at), "scene": ask.scene, "q": q}
+    yield "check_derivatives", Call(wb.check_derivatives, checked, str)
     yield "simplify", Call(wb.simplify, {"problem": ask, "lock": True})
     part = wb.simplify(ask)
     yield "Simplified.posture", Call(part.posture, {"q": part.problem.start})
@@ -425,6 +428,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     motion = {"motion": [q, q], "dt": 0.1, "problem": ask, "ghost": [q, q], "repeat": 1}
     yield "Viewer.play", Call(viewer.play, motion)
     yield "Viewer.ghosts", Call(viewer.ghosts, {"postures": [q], "color": (1.0, 0.0, 0.0, 1.0)})
+    yield "Viewer.frames", Call(viewer.frames, {"names": ["link1"], "length": 0.1}, lambda _: viewer.show(q))
     yield "Viewer.look", Call(viewer.look, {"eye": at, "target": (0.0, 0.0, 0.0)}, lambda _: viewer.show(q))
     yield "Viewer.save", Call(viewer.save, {"path": path / "x.html"})
     yield "Parts", Call(Parts, {"parts": {"one": [Part(wb.Sphere(0.1))]}}, Viewer)
@@ -507,6 +511,14 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
     avoided = {"clip": clip, "scene": wb.Scene(arm), "constraints": [], "progress": lambda told: None}
     yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
+    many = {"clips": [], "folder": path / "many", "equipment": ["nothing"], "methods": ["frames"], "jobs": 1}
+    yield "avoid_many", Call(wb.avoid_many, {**many, "hold_feet": True, "progress": print})
+    given = {"clips": [clip], "constraints": []}
+    yield "avoid_many(case)", Call(partial(wb.avoid_many, folder=path / "many", methods=["frames"]), given)
+    yield "avoid_many(figure)", Call(partial(wb.avoid_many, ["walk.npz"], path / "many"), {"figure": arm})
+    clip.write(path / "read.npz")
+    files = {"files": [path / "read.npz"], "folder": path / "many", "figure": arm, "jobs": 1, "progress": print}
+    yield "read_many", Call(wb.read_many, files)
     for method in (wb.Trajectory, wb.PerFrame, wb.Fade, wb.Bisection):
         yield f"{method.__name__}.avoid", Call(method().avoid, avoided)
     settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "solver": "osqp", "iterations": 10}
@@ -589,8 +601,10 @@ ANSWERS = (
     "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "TraceEntry", "Assessment",
     "Task", "Step", "QPStep", "Simplified", "LeftOut",
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
-    "Scene.of_parts", "ClipCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
+    "Scene.of_parts", "ClipCheck", "DerivativeCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding",
+    "Deviation",
     "Torques", "SphereFilling",
+    "Torques", "SphereFilling", "AvoidedCase", "BatchProgress",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 

@@ -26,6 +26,7 @@ from wholebody.version import __version__
 
 if TYPE_CHECKING:
     from wholebody.assessment import Assessment, assess
+    from wholebody.derivatives import DerivativeCheck, check_derivatives
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
     from wholebody.matter.body import Body
@@ -33,11 +34,15 @@ if TYPE_CHECKING:
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
     from wholebody.methods.newton.assembly import Assembly
+    from wholebody.methods.newton.assembly_constraint import AssemblyConstraint
+    from wholebody.methods.newton.assembly_solution import AssemblySolution
     from wholebody.methods.newton.method import Newton
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
     from wholebody.motion.avoidance import AvoidanceReport, Avoided, avoid
+    from wholebody.motion.batch import BatchProgress, avoid_many, read_many
+    from wholebody.motion.batch_table import AvoidedCase
     from wholebody.motion.bisection.method import Bisection
     from wholebody.motion.checking import ClipCheck, check
     from wholebody.motion.clip import Clip
@@ -88,11 +93,15 @@ __all__ = [
     "CCD",
     "QP",
     "Assembly",
+    "AssemblyConstraint",
+    "AssemblySolution",
     "Assessment",
     "AvoidanceReport",
     "Avoided",
+    "AvoidedCase",
     "Axis",
     "Balance",
+    "BatchProgress",
     "Bisection",
     "Body",
     "Bound",
@@ -103,6 +112,7 @@ __all__ = [
     "ClipCheck",
     "Constraint",
     "DampedLeastSquares",
+    "DerivativeCheck",
     "Discomfort",
     "Displacement",
     "Drag",
@@ -151,11 +161,14 @@ __all__ = [
     "__version__",
     "assess",
     "avoid",
+    "avoid_many",
     "check",
+    "check_derivatives",
     "equipment",
     "follow_path",
     "load",
     "read_clip",
+    "read_many",
     "read_skeleton",
     "read_task",
     "retarget",
@@ -166,6 +179,7 @@ __all__ = [
 
 _MODULES = {
     "wholebody.assessment": "Assessment assess",
+    "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
     "wholebody.matter.body": "Body",
@@ -174,12 +188,16 @@ _MODULES = {
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
     "wholebody.tracking.drag": "Drag",
     "wholebody.methods.newton.assembly": "Assembly",
+    "wholebody.methods.newton.assembly_constraint": "AssemblyConstraint",
+    "wholebody.methods.newton.assembly_solution": "AssemblySolution",
     "wholebody.methods.newton.method": "Newton",
     "wholebody.methods.placo.method": "Placo",
     "wholebody.tracking.path_following": "follow_path",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
     "wholebody.motion.avoidance": "AvoidanceReport Avoided avoid",
+    "wholebody.motion.batch": "BatchProgress avoid_many read_many",
+    "wholebody.motion.batch_table": "AvoidedCase",
     "wholebody.motion.checking": "ClipCheck check",
     "wholebody.motion.bisection.method": "Bisection",
     "wholebody.motion.clip": "Clip",

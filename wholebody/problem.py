@@ -98,6 +98,16 @@ class Problem:
             self._check_terms(state)
             self.clearances = self._clearances(workspace)
 
+    def __repr__(self) -> str:
+        asked = [*self.goals, *self.constraints, *self.bounds]
+        return (
+            f"Problem of {self.scene.figure.name!r} among {len(self.scene.objects)} things, "
+            f"{len(self.clearances)} pairs, clearance {1e3 * self.clearance:g} mm\n"
+            f"  goals: {checks.some(map(_in_words, asked[: len(self.goals)])) or 'none'}\n"
+            f"  constraints: {checks.some(map(_in_words, asked[len(self.goals) :])) or 'none'}; "
+            f"measures: {checks.some(map(_in_words, self.measures)) or 'none'}"
+        )
+
     def retarget(self, goals: Iterable[Goal]) -> None:
         """Replace the goals, for a goal that moves from frame to frame; everything else stays.
 
@@ -234,6 +244,12 @@ def _start(scene: Scene, start: Array | str | None) -> Array:
     if np.abs(normal - q).max(initial=0.0) > UNIT_TOLERANCE:
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(normal)
+
+
+def _in_words(term: Any) -> str:
+    """Class of a term, and its frame if it has one."""
+    frame = getattr(term, "frame", None)
+    return f"{type(term).__name__}({frame})" if isinstance(frame, str) else type(term).__name__
 
 
 def _clearance(value: float) -> float:

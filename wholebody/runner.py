@@ -15,6 +15,8 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -27,6 +29,7 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 """Environment of a process whose libraries compute on one core."""
 
 FULL = 2e9  # bytes: a process that holds more should be replaced; placo never frees a robot (some 6 MB)
+ORPHANED = 1.0  # s: how often a process looks whether its parent is still there
 LONGEST_WORDS = 200  # most characters kept of the last line that a process wrote
 
 _START = (
@@ -66,7 +69,7 @@ class Job(NamedTuple):
         name: any value by which the caller identifies the job; it is not sent to the process.
         function: called in the process.
         arguments: of the function.
-        seconds: time to the deadline, unless the job moves it.
+        seconds: time to the deadline, unless the job moves it; 0 for none.
     """
 
     name: Any
@@ -251,11 +254,27 @@ def tell(note: Any) -> None:
         _parent.send((False, note))
 
 
+def end_with_parent() -> None:
+    """End this process when its parent has ended, also in the middle of a job."""
+    threading.Thread(target=_end_after, args=(os.getppid(),), daemon=True).start()
+
+
+def _end_after(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(ORPHANED)
+    os._exit(1)
+
+
 def serve(descriptor: int) -> None:
-    """Do jobs until the parent has ended; the main loop of a process of `Child`."""
+    """Do jobs until the parent has ended; the main loop of a process of `Child`.
+
+    Ctrl-C reaches all processes of a terminal; the parent decides what it ends.
+    """
     global _parent
     _parent = Connection(descriptor)
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
     try:
         while True:
             seconds, packed = _parent.recv()

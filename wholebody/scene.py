@@ -23,7 +23,7 @@ from wholebody.matter.body import Body
 from wholebody.matter.inertia import mass_properties
 from wholebody.matter.materials import DEFAULT, Material
 from wholebody.matter.materials import material as to_material
-from wholebody.scene_geometry import SceneGeometry, SceneObject, assemble
+from wholebody.scene_geometry import Motion, SceneGeometry, SceneObject, assemble
 from wholebody.workspace import Workspace, lent
 
 if TYPE_CHECKING:
@@ -68,6 +68,14 @@ class Scene:
         scene._objects = {thing.name: thing for thing in objects}
         scene._built = built
         return scene
+
+    def __repr__(self) -> str:
+        carried = [name for name, thing in self._objects.items() if thing.segment is not None]
+        around = [name for name, thing in self._objects.items() if thing.segment is None]
+        lines = [f"Scene of {self.figure!r}"]
+        lines.append(f"  things around it: {checks.some(around) or 'none'}")
+        lines.append(f"  carried: {checks.some(carried) or 'nothing'}")
+        return "\n".join(lines)
 
     # ---- contents
 
@@ -204,21 +212,34 @@ class Scene:
             )
         return self._put(name, shape, at, color, to, rests)
 
-    def move(self, name: str, *, at: Any) -> Scene:
+    def move(self, name: str, *, at: Any, over: float | None = None) -> Scene:
         """Move a thing to a new placement in the world, or in its segment's frame.
+
+        With `over` it moves there from where it is, during the next frame of a tracker, a drag or a frame loop: its
+        centre goes straight, and it turns about its centre. What it meets on the way counts. Without `over` it is put
+        there, whatever is in between. If it is moved more than once before that frame, the frame sees one motion, from
+        where the frame before saw it to where it is.
+
+        Args:
+            name: of the thing.
+            at: its placement; as for `add`.
+            over: seconds that the motion takes, the time of a frame; None for a thing that is put there.
 
         Raises:
             UnknownNameError: there is no such object.
-            InputError: the placement cannot be read.
+            InputError: the placement cannot be read, or the time is not positive and finite.
         """
         place = to_placement(at, f"{checks.shown(name)}: at")
+        seconds = None if over is None else checks.time_step(over, f"move {checks.shown(name)}: over")
         with self._lock:
-            moved = self._objects[name] = replace(self._object(name), placement=place)
+            thing = self._object(name)
+            motion = None if seconds is None else Motion(thing.placement, seconds)
+            moved = self._objects[name] = replace(thing, placement=place, motion=motion)
             if self._built is not None:
                 base = moved.placement
                 if moved.segment is not None:
                     base = self.model.frames[self.frame_id(moved.segment)].placement * base
-                self._built.place(name, base)
+                self._built.place(name, base, moving=motion is not None)
         return self
 
     def remove(self, name: str) -> Scene:
@@ -249,7 +270,7 @@ class Scene:
         place = to_placement(at, f"{name!r}: at")
         painted = None if color is None else checks.color(color, f"{name!r}: color")
         with self._lock:
-            thing = SceneObject(name, shape, place, to, painted, rests_on, body, material)
+            thing = SceneObject(name, shape, place, to, painted, rests_on, body=body, material=material)
             self._objects[self._new_name(name)] = thing
             self._changed()
         return self
@@ -300,7 +321,9 @@ class Scene:
             near = workspace.near(q, 0.0).nearest_first()
             return object_penetrations(workspace.geometry, near.placements, workspace.owners, near.pair)
 
-    def sweep(self, q0: Array, q1: Array, tolerance: float = 1e-4) -> FirstContact | None:
+    def sweep(
+        self, q0: Array, q1: Array, tolerance: float = 1e-4, *, moves: Mapping[str, tuple[Any, Any]] | None = None
+    ) -> FirstContact | None:
         """First contact of the motion from q0 to q1, both (nq,), along pin.interpolate; None if there is none.
 
         The test is continuous and finds objects of any thickness. See `wholebody.geometry.continuous.sweep`.
@@ -309,16 +332,38 @@ class Scene:
             q0: start of the motion.
             q1: its end.
             tolerance: depth up to which an overlap is no contact, metres.
+            moves: thing to its placements at the start and at the end, as for `add`, if it moves at the same time: its
+                centre straight, and turning about it. All others stay where they are. Things that meet each other are
+                not looked at.
 
         Raises:
             InputError: postures of the wrong shape, not finite or with a quaternion that is not of unit length; a
-                tolerance below 1e-5 m.
+                tolerance below 1e-5 m; placements that cannot be read.
+            UnknownNameError: `moves` names no object.
         """
         nq = self.model.nq
         begin, end = checks.posture(q0, nq, "q0"), checks.posture(q1, nq, "q1")
         tolerance = checks.number(tolerance, "tolerance", 1e-5, FARTHEST, "m")
         with self.lend() as workspace:
-            return workspace.sweep.first_contact(begin, end, tolerance=tolerance)
+            if not moves:
+                return workspace.sweep.first_contact(begin, end, tolerance=tolerance)
+            frame = workspace.frame({name: self._way(name, way) for name, way in moves.items()})
+            found = frame.first_contact(begin, end, tolerance)
+            return None if found is None else replace(found, q=found.q[:nq])
+
+    def _way(self, name: str, way: tuple[Any, Any]) -> tuple[pin.SE3, pin.SE3]:
+        thing = self._object(name)
+        if not isinstance(way, (tuple, list)) or len(way) != 2:
+            raise InputError(
+                f"moves: {name!r} has {checks.shown(way)}; give two placements, at the start and at the end"
+            )
+        start, end = (
+            to_placement(at, f"moves: {name!r} at the {when}") for at, when in zip(way, ("start", "end"), strict=True)
+        )
+        if thing.segment is None:
+            return start, end
+        base = self.model.frames[self.frame_id(thing.segment)].placement
+        return base * start, base * end
 
     def _build(self) -> SceneGeometry:
         built = self._built

@@ -222,3 +222,17 @@ def test_the_command_frees_a_file(tmp_path: Path, human: Figure, capsys: pytest.
     free = wb.read_clip(tmp_path / "arm-free.npz", human)
     assert wb.check(free).free
     assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "none"]) == 2
+
+
+def test_an_answer_is_told_in_three_lines() -> None:
+    human = wb.load("human")
+    standing = human.posture("standing")
+    inside = human.with_joints(standing, {"right_shoulder_abduction": -0.3})
+    freed = wb.avoid(wb.Clip(human, [standing, inside, standing], 0.5, "an arm"), method="fade")  # type: ignore[arg-type]
+    lines = str(freed).splitlines()
+    assert len(lines) == 3
+    assert lines[0].startswith("an arm, free: nothing collides")
+    assert "frames in collision 1 before, 0 after" in lines[1]
+    assert lines[2].startswith("fade: ")
+    assert str(freed.report) == str(freed).removeprefix("an arm, ")
+    assert len(repr(freed)) < 200

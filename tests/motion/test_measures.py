@@ -10,8 +10,9 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.motion.feet import foot_points, slid, sliding
+from wholebody.motion.feet import slid, sliding
 from wholebody.motion.measures import deviation, foot_sliding, hand_error, jerk_ratio, share_deeper
+from wholebody.motion.stance import foot_points
 
 
 def test_deviation_of_an_arm(planar_arm: Callable[..., Any]) -> None:

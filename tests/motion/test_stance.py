@@ -7,7 +7,8 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.state import State
-from wholebody.motion.stance import standing
+from wholebody.motion.measures import foot_sliding
+from wholebody.motion.stance import held_feet, standing
 
 
 @pytest.fixture(scope="module")
@@ -26,14 +27,16 @@ def kicking(human: wb.Figure) -> np.ndarray:
 
 def test_a_foot_that_swings_does_not_stand(human: wb.Figure) -> None:
     found = standing(human, kicking(human), 1 / 30)
-    assert found["right_foot"].all()
-    assert found["left_foot"][:8].all()
-    assert found["left_foot"][22:].all()
-    assert not found["left_foot"][11:19].any()
+    assert set(found) == {f"{side}_{point}" for side in ("left", "right") for point in ("heel", "ball", "toe_tip")}
+    for point in ("heel", "ball", "toe_tip"):
+        assert found[f"right_{point}"].all()
+        assert found[f"left_{point}"][:8].all()
+        assert found[f"left_{point}"][22:].all()
+        assert not found[f"left_{point}"][11:19].any()
 
 
-def test_standing_feet_stay_where_they_were(human: wb.Figure) -> None:
-    """A leg that passes through the other one is moved; the foot that stands is not."""
+def legs_that_cross(human: wb.Figure) -> wb.Clip:
+    """The left leg passes through the right one, on which the figure stands."""
     q0 = human.posture("standing")
     wave = np.sin(np.pi * np.arange(30) / 29) ** 2
     q = np.array(
@@ -42,8 +45,14 @@ def test_standing_feet_stay_where_they_were(human: wb.Figure) -> None:
             for one in wave
         ]
     )
-    clip = wb.Clip(human, q, 1 / 30)
-    avoided = wb.avoid(clip, constraints=[wb.StanceFeet(["right_foot"])])
+    return wb.Clip(human, q, 1 / 30)
+
+
+@pytest.mark.parametrize("constraints", [[wb.StanceFeet(["right_foot"])], []])
+def test_standing_feet_stay_where_they_were(human: wb.Figure, constraints: list[wb.StanceFeet]) -> None:
+    """They do by default too; the leg that passes through the other one is moved."""
+    clip = legs_that_cross(human)
+    avoided = wb.avoid(clip, constraints=constraints)
     assert avoided.report.before.colliding
     assert avoided.report.solved, avoided.report.message
     state = State(human.model)
@@ -51,6 +60,20 @@ def test_standing_feet_stay_where_they_were(human: wb.Figure) -> None:
     for before, after in zip(clip.q, avoided.clip.q, strict=True):
         places = [pin_frame.copy() for pin_frame in (state.update(one).frame(foot) for one in (before, after))]
         assert np.linalg.norm(places[0].translation - places[1].translation) < 1e-4
+
+
+def test_feet_slide_where_they_may(human: wb.Figure) -> None:
+    clip = legs_that_cross(human)
+    avoided = wb.avoid(clip, hold_feet=False)
+    assert avoided.report.solved
+    assert foot_sliding(clip, avoided.clip) > 1e-3
+
+
+def test_points_of_one_foot_hold_its_orientation_and_one_alone_does_not(human: wb.Figure) -> None:
+    held = held_feet(human, ("left_heel", "left_ball", "right_ball", "right_toe_tip"))
+    assert [(one.frame, one.orientation) for one in held] == [
+        ("left_heel", True), ("right_ball", False), ("right_toe_tip", False)
+    ]  # fmt: skip
 
 
 def test_a_figure_without_feet_says_so() -> None:

@@ -104,8 +104,8 @@ class ContactRowBuilder:
         most = len(contacts.distance) * (1 + self.most_ends)
         wrench, gap = np.empty((most, 6)), np.empty(most)
         contact, joints = np.empty(most, dtype=np.intp), np.empty((most, 2), dtype=np.intp)
-        asked = np.broadcast_to(np.asarray(clearance, dtype=float), contacts.distance.shape)
-        count = self.write(contacts, np.ascontiguousarray(asked), wrench, gap, contact, joints)
+        asked = np.full(contacts.distance.shape, clearance, dtype=float)  # not a view: numba takes it for another type
+        count = self.write(contacts, asked, wrench, gap, contact, joints)
         return ContactRows(
             gap[:count].copy(), wrench[:count].copy(), contact[:count].copy(), joints[:count, 0].copy(),
             joints[:count, 1].copy(),
@@ -138,11 +138,11 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.geometry import patch_kernel
 
-    none, points, table = np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros((0, 10))
+    none, points, lengths = np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros(0)
     pair, faces, placement = np.zeros((0, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros((0, 4, 3))
     patch_kernel.contact_rows(
-        pair, table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], none, placement, np.zeros(0),
-        np.zeros(0, dtype=bool), none, points, none, none, faces, none, none, np.zeros(0), points,
-        np.zeros(0, dtype=bool), LENGTHS, MOST_ENDS, np.zeros((0, 6)), np.zeros(0), none, pair,
+        pair, lengths, points, points, points, none, placement, lengths, np.zeros(0, dtype=bool), none, points, none,
+        none, faces, none, none, lengths, points, np.zeros(0, dtype=bool), LENGTHS, MOST_ENDS, np.zeros((0, 6)),
+        lengths, none, pair,
     )  # fmt: skip
     return patch_kernel

@@ -4,22 +4,27 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import import_module
 from types import MappingProxyType
 
-from wholebody.checks import instance, listed, shown
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.checks import flag, instance, listed, shown
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.motion.avoider import Avoider, MethodResult, Progress, check_input
 from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
+from wholebody.motion.stance import StanceFeet, has_feet
 from wholebody.motion_assessment import limit_violation
 from wholebody.scene import Scene
 
 COLLISION = 1e-4  # m: a frame, or the motion between two, that is deeper collides
 HELD = 1e-3  # m, rad: by which what is held may be missed in a solved clip
 ROUNDING = 1e-6  # rad, m: by which limits may be missed
+SAME = 1e-9  # rad, m: a posture that is no farther from another one is the same
 
 METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
@@ -32,7 +37,7 @@ METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
 """Methods by name: module and class of the settings."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class AvoidanceReport:
     """What a method did to a clip, and what it left.
 
@@ -44,8 +49,11 @@ class AvoidanceReport:
         seconds: wall time of the method, without the judgement.
         posture_solves: how many postures were solved for on their own.
         programs: how many quadratic programs were solved.
-        frames_changed: how many frames are others than before.
+        frames_changed: how many postures are others than those of the clip before at the same place of its timing.
         missed: largest miss of a constraint in any frame, metres or radians.
+        stretch: factor by which the clip was slowed most, anywhere; 1 where its timing is as it was.
+        duration: of the answer, seconds.
+        times: (m,) seconds of the clip as it was at which each frame of the answer is.
         before: the check of the clip as it was.
         after: the check of the answer.
     """
@@ -58,11 +66,29 @@ class AvoidanceReport:
     programs: int
     frames_changed: int
     missed: float
-    before: ClipCheck = field(repr=False)
-    after: ClipCheck = field(repr=False)
+    stretch: float
+    duration: float
+    times: Array
+    before: ClipCheck
+    after: ClipCheck
+
+    def __str__(self) -> str:
+        """Three lines: what is left, before and after, and what it took."""
+        was, now = self.before, self.after
+        return (
+            f"{'free' if self.solved else 'not free'}: {self.message}\n"
+            f"frames in collision {was.colliding} before, {now.colliding} after; deepest {1e3 * was.deepest:.2f} mm "
+            f"before, {1e3 * now.deepest:.2f} mm after; {now.dips} dips between frames\n"
+            f"{self.method}: {self.seconds:.2f} s, {self.programs} programs, {self.posture_solves} postures; "
+            f"{self.frames_changed} of {len(now.clip)} frames changed"
+        )
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"AvoidanceReport({self.method!r}, solved={self.solved}, {self.message!r})"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Avoided:
     """The answer of `avoid`.
 
@@ -73,6 +99,14 @@ class Avoided:
 
     clip: Clip
     report: AvoidanceReport
+
+    def __str__(self) -> str:
+        """The name of the clip, and the three lines of its report."""
+        return f"{self.clip.name}, {self.report}"
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"Avoided({self.clip.name!r}, {self.report!r})"
 
 
 def avoider_named(name: str) -> Avoider:
@@ -108,6 +142,7 @@ def avoid(
     *,
     method: str | Avoider = "trajectory",
     constraints: Iterable[Given] = (),
+    hold_feet: bool = True,
     progress: Progress | None = None,
 ) -> Avoided:
     """Free a clip of collisions of the figure with itself, with what it carries, and with what stands around.
@@ -117,8 +152,9 @@ def avoid(
         scene: its figure with carried things, and the things around; None for the figure alone.
         method: "trajectory", "frames", "fade", "bisection", or configured, such as `wb.Trajectory(clearance=0.005)`.
         constraints: what holds in every frame. What a term takes from the start it takes from the original posture of
-            its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has. See also
-            `wb.StanceFeet`.
+            its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has.
+        hold_feet: keep the feet of a figure that has some where they stand, as `wb.StanceFeet()` does, unless
+            `constraints` has a `wb.StanceFeet` of its own; False lets them slide.
         progress: called with an `AvoidProgress` now and then; the method ends with what it has if it returns True.
 
     Returns:
@@ -134,11 +170,13 @@ def avoid(
     check_input(clip, scene, progress)
     chosen = as_avoider(method)
     given: tuple[Given, ...] = tuple(listed(constraints, "avoid: constraints", "[wb.Freeze('root')]"))
+    if flag(hold_feet, "avoid: hold_feet") and not any(isinstance(term, StanceFeet) for term in given):
+        given = (*given, StanceFeet()) if has_feet(scene.figure) else given
     terms = frame_terms(scene, clip.q, clip.dt, given)
     began = time.perf_counter()
     result = chosen.avoid(clip, scene, given, progress)
     seconds = time.perf_counter() - began
-    found = Clip(clip.figure, result.q, clip.dt if result.dt is None else result.dt, clip.name)
+    found = clip.with_q(result.q)
     return Avoided(found, _report(clip, found, terms, result, chosen.name, seconds))
 
 
@@ -147,12 +185,12 @@ def _report(
 ) -> AvoidanceReport:
     scene = terms.scene
     was, now = check(before, scene, depth=COLLISION), check(after, scene, depth=COLLISION)
-    changed, missed = len(after), 0.0
-    if len(before) == len(after):
-        changed = int((before.q != after.q).any(axis=1).sum())
-        if terms.holds:
-            state = scene.state(after.q[0])
-            missed = max(terms.missed(frame, state.update(q)) for frame, q in enumerate(after.q))
+    times = before.times if result.times is None else result.times
+    timed = terms if result.times is None else terms.at(times)
+    missed = 0.0
+    if timed.holds:
+        state = scene.state(after.q[0])
+        missed = max(timed.missed(frame, state.update(q)) for frame, q in enumerate(after.q))
     beyond = limit_violation(scene.figure, after.q)
     left = [] if not result.message else [result.message]
     if now.colliding:
@@ -167,6 +205,13 @@ def _report(
     if not (solved or left):
         left = ["something collides between two frames that collide"]
     message = "; ".join(left) if left else "nothing collides, in the frames and between them, to 0.1 mm"
+    if result.times is not None:
+        message += f"; slowed from {before.duration:.2f} to {after.duration:.2f} s, by {result.stretch:.3g} at most"
+        fast = now.speeds[0] if now.speeds else None
+        if fast is not None:
+            message += f"; {fast.joint} is still faster than its limit of {fast.limit:.3g} rad/s or m/s"
+    changed = int((np.abs(after.q - timed.q) > SAME).any(axis=1).sum())
     return AvoidanceReport(
-        solved, message, method, seconds, result.posture_solves, result.programs, changed, missed, was, now
-    )
+        solved, message, method, seconds, result.posture_solves, result.programs, changed, missed, result.stretch,
+        after.duration, times, was, now,
+    )  # fmt: skip

@@ -37,14 +37,16 @@ class MethodResult(NamedTuple):
         posture_solves: how many postures were solved for, each on its own.
         programs: how many quadratic programs were solved.
         message: what did not succeed, one sentence; empty where all did.
-        dt: seconds from frame to frame; None where it stays.
+        times: (n,) seconds of the clip as it was at which each frame is; None where the timing stays.
+        stretch: factor by which the clip was slowed most, anywhere.
     """
 
     q: Array
     posture_solves: int = 0
     programs: int = 0
     message: str = ""
-    dt: float | None = None
+    times: Array | None = None
+    stretch: float = 1.0
 
 
 class Avoider(Protocol):

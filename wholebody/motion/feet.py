@@ -11,10 +11,7 @@ from numpy.typing import NDArray
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip_contacts import runs
-from wholebody.motion.stance import StanceFeet, standing
-
-POINTS = ("heel", "ball", "toe_tip")
-"""Ends of the names of frames that are points of a foot."""
+from wholebody.motion.stance import StanceFeet, foot_points, standing
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +30,6 @@ class Sliding:
     stands: NDArray[np.bool_] = field(repr=False)
     distance: float
     at: int
-
-
-def foot_points(figure: Figure) -> tuple[str, ...]:
-    """Names of the frames of a figure that are points of feet; none where the figure does not name any."""
-    return tuple(name for name in figure.frames if name.endswith(POINTS))
 
 
 def paths(figure: Figure, q: Array, frames: tuple[str, ...]) -> Array:

@@ -23,10 +23,12 @@ class GroundForces(NamedTuple):
     Attributes:
         forces: (points, 3) force on each point of the soles, N, in the world.
         missing: (6,) what the ground cannot give of the wrench: force N, moment N m about the wrench's point.
+        split: (3 points, 6) derivative of the forces with respect to the wrench, while the same edges bear.
     """
 
     forces: Array
     missing: Array
+    split: Array
 
 
 def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -> GroundForces:
@@ -42,7 +44,7 @@ def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -
         friction: coefficient of friction, more than 0.
     """
     if len(points) == 0:
-        return GroundForces(np.zeros((0, 3)), wrench.copy())
+        return GroundForces(np.zeros((0, 3)), wrench.copy(), np.zeros((0, 6)))
     around = 2.0 * np.pi * np.arange(CONE_EDGES) / CONE_EDGES
     edges = np.column_stack([friction * np.cos(around), friction * np.sin(around), np.ones(CONE_EDGES)])
     directions = np.tile(edges, (len(points), 1))
@@ -53,4 +55,10 @@ def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -
     stacked = np.vstack([columns, EVENNESS * np.eye(columns.shape[1])])
     found, _ = nnls(stacked, np.concatenate([wrench / scale, np.zeros(columns.shape[1])]))
     forces = (found[:, None] * directions).reshape(len(points), CONE_EDGES, 3).sum(axis=1) * scale
-    return GroundForces(forces, wrench - columns @ (found * scale))
+    bears = found > 0.0
+    active = columns[:, bears]
+    # The answer on the edges that bear is that of linear least squares with EVENNESS.
+    solved = np.linalg.solve(active.T @ active + EVENNESS**2 * np.eye(active.shape[1]), active.T)
+    split = np.zeros((len(points), 3, 6))
+    np.add.at(split, np.flatnonzero(bears) // CONE_EDGES, directions[bears][:, :, None] * solved[:, None, :])
+    return GroundForces(forces, wrench - columns @ (found * scale), split.reshape(-1, 6))

@@ -12,21 +12,41 @@ from wholebody.arrays import Array, Mask
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
+from wholebody.tasks import Hold
 
 FEET = ("left_foot", "right_foot")
+POINTS = ("heel", "ball", "toe_tip")
+"""Ends of the names of frames that are points of a foot."""
+
 LOWEST_SHARE = 0.02  # of the frames: how many may be lower than what counts as the ground, because they are errors
+
+
+def foot_points(figure: Figure) -> tuple[str, ...]:
+    """Names of the frames of a figure that are points of feet; none where the figure does not name any."""
+    return tuple(name for name in figure.frames if name.endswith(POINTS))
+
+
+def _usual(figure: Figure) -> tuple[str, ...]:
+    return foot_points(figure) or tuple(name for name in FEET if name in (*figure.frames, *figure.segments))
+
+
+def has_feet(figure: Figure) -> bool:
+    """Whether a figure that may move about has frames that `StanceFeet` finds by itself."""
+    return figure.root == "free" and bool(_usual(figure))
 
 
 @dataclass(frozen=True)
 class StanceFeet:
     """Hold every foot that stands where it was: a constraint for `wb.avoid`.
 
-    A foot stands where it is slow and near its lowest height in the clip.
+    A frame stands where it is slow and near its lowest height in the clip. Of a foot of which one point stands, this
+    point is held, and the foot may turn about it; of a foot of which two stand, the orientation is held too.
 
     Attributes:
-        feet: frames of the feet; None for the figure's "left_foot" and "right_foot".
-        speed: largest speed of a standing foot, m/s.
-        height: largest height of a standing foot above its lowest, metres.
+        feet: frames of the feet; None for the figure's heels, balls and tips of the toes, or without these for its
+            "left_foot" and "right_foot".
+        speed: largest speed of a standing frame, m/s.
+        height: largest height of a standing frame above its lowest, metres.
         least: shortest stand, seconds; shorter ones are moments of a swing.
 
     Raises:
@@ -57,7 +77,7 @@ class StanceFeet:
             for name in self.feet:
                 figure.frame_id(name)
             return tuple(self.feet)
-        found = tuple(name for name in FEET if name in (*figure.frames, *figure.segments))
+        found = _usual(figure)
         if not found:
             raise InputError(f"StanceFeet: {figure.name} has no frames {' or '.join(FEET)}; name the feet")
         return found
@@ -86,6 +106,21 @@ def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None
         stand = (speeds[:, number] <= settings.speed) & (height <= lowest + settings.height)
         found[name] = _long(stand, shortest)
     return found
+
+
+def held_feet(figure: Figure, stand: Sequence[str]) -> tuple[Hold, ...]:
+    """What holds the feet of which some frames stand; a term that is not resolved keeps what is at the start.
+
+    A frame that is not the only one of its segment, or that is no point of a foot, is held with its orientation.
+    """
+    joints = [figure.model.frames[figure.frame_id(name)].parentJoint for name in stand]
+    found = []
+    for number, (name, joint) in enumerate(zip(stand, joints, strict=True)):
+        if not name.endswith(POINTS):
+            found.append(Hold(name))
+        elif joint not in joints[:number]:
+            found.append(Hold(name, orientation=joints.count(joint) > 1))
+    return tuple(found)
 
 
 def _speeds(places: Array, dt: float) -> Array:

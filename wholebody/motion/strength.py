@@ -57,6 +57,9 @@ FEMALE = {
 }
 """As `MALE`, of 22 women."""
 
+LARGEST_EFFORT = 1e9
+"""N m, N: an effort limit beyond it stands for none."""
+
 SEXES = {"male": MALE, "female": FEMALE}
 
 DIRECTIONS: Mapping[str, tuple[str | None, str | None]] = {
@@ -121,6 +124,21 @@ class Strength:
             return np.inf
         logs = np.log(SEXES[self.sex][name])
         return float(np.exp(np.interp(ndtri(self.percentile / 100.0), ndtri(np.array(PERCENTILES) / 100.0), logs)))
+
+
+def torque_limits(figure: Figure, strength: Strength) -> tuple[Array, Array]:
+    """Least and largest torques (nv,) of a figure's joints, N m; infinite where none is known.
+
+    Those of a person are published strength; those of a figure whose joints have none are the effort limits of its
+    description.
+    """
+    lower, upper = strength.limits(figure)
+    if np.isfinite(lower).any() or np.isfinite(upper).any():
+        return lower, upper
+    effort = np.array(figure.model.effortLimit, dtype=float).reshape(-1)
+    known = (effort > 0.0) & (effort < LARGEST_EFFORT)
+    known[[joint.nq != joint.nv for joint in list(figure.model.joints)[1:] for _ in range(joint.nv)]] = False
+    return np.where(known, -effort, -np.inf), np.where(known, effort, np.inf)
 
 
 def _kind(joint: str) -> str:

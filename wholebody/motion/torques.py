@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,26 +14,17 @@ from wholebody.arrays import Array, Mask
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.feet import foot_points
-from wholebody.motion.ground_forces import ground_forces
-from wholebody.motion.stance import StanceFeet, standing
-from wholebody.motion.strength import Strength
-from wholebody.tasks.support import low_points
+from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, foot_wrenches
+from wholebody.motion.soles import standing_feet
+from wholebody.motion.stance import FEET
+from wholebody.motion.strength import Strength, torque_limits
 
-ROOT_SIZE = 6
-FEET = ("left_foot", "right_foot")
 CUTOFF = 6.0
 """Hz: noise of recordings lies above, most of walking below (D. A. Winter, "Biomechanics and motor control of human
 movement", chapter 2.2.4: 4 to 6 Hz for walking)."""
 
 ORDER = 2
 """Of the Butterworth filter; it runs forward and backward, so without delay and with twice this order (Winter)."""
-
-SOLE = 0.02
-"""Metres above a sole's lowest point up to which its corners bear force: soles are rounded, recordings uneven."""
-
-SPREAD_CORNERS = 12
-"""Most points of one foot: the outermost ones in as many directions. Fewer cut off the ends of a rounded sole."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +45,11 @@ class Torques:
         supported: (n,) whether a foot stands in the frame.
         missing: (n, 6) what the ground cannot give of the wrench that the motion needs: force, N, and moment about the
             centre of mass, N m, in the world. Zero for a motion that is possible on these feet.
-        lower: (nv,) least torque of each joint, N m; -inf without a published strength.
-        upper: (nv,) largest torque of each joint, N m; inf without a published strength.
+        outside: (n,) by how far the zero moment point of the motion is outside of the support polygon, metres; 0
+            inside, where no foot stands, and in frames that press with less than a fifth of the weight.
+        lower: (nv,) least torque of each joint, N m: published strength of a person, effort limits of a robot; -inf
+            where none is known.
+        upper: (nv,) largest torque of each joint, N m; inf where none is known.
     """
 
     figure: Figure
@@ -69,6 +62,7 @@ class Torques:
     center_of_pressure: Array = field(repr=False)
     supported: Mask = field(repr=False)
     missing: Array = field(repr=False)
+    outside: Array = field(repr=False)
     lower: Array = field(repr=False)
     upper: Array = field(repr=False)
 
@@ -98,7 +92,7 @@ class Torques:
         share = self.share
         frame, column = (int(k) for k in np.unravel_index(np.argmax(share), share.shape))
         names = {self.figure.model.joints[self.figure.joint_id(name)].idx_v: name for name in self.figure.joints}
-        first = "no joint has a published strength"
+        first = "no joint has a known strength"
         if np.isfinite(self.lower).any():
             first = (
                 f"{names[column]} needs {abs(self.torque[frame, column]):.0f} N m, {share[frame, column]:.0%} of its "
@@ -131,7 +125,8 @@ def torques(
         clip: the motion.
         feet: segments that may stand; the figure's own of these. A foot stands while its heel, ball or tip of the toes
             is low and slow; without frames of such names, while its own frame is.
-        strength: of the person, for `lower`, `upper` and `share`; a man of median strength if left out.
+        strength: of the person, for `lower`, `upper` and `share`; a man of median strength if left out. For figures
+            whose joints have no published strength, such as robots, the effort limits of their descriptions count.
         friction: coefficient of friction of the ground.
         cutoff: Hz of the low-pass filter (Butterworth, zero lag) that takes the noise of recordings out before
             differences amplify it; None for none. It is not used where the frame rate is less than four times of it.
@@ -157,42 +152,51 @@ def torques(
         figure.frame_id(name)
     if not sum(inertia.mass for inertia in figure.model.inertias[1:]) > 0.0:
         raise InputError(f"torques: {figure.name} has no mass; give its segments masses")
-    moved = smoothed(clip, cutoff)
-    v, a = moved.velocities(), moved.accelerations()
-    free = figure.root == "free"
-    stands = _stands(clip, feet) if free else {}
-    soles = _Soles(figure, tuple(stands))
+    stands = standing_feet(clip, feet) if figure.root == "free" else {}
+    return clip_torques(clip, stands, strength, friction, cutoff)
+
+
+def clip_torques(
+    clip: Clip, stands: Mapping[str, Mask], strength: Strength, friction: float, cutoff: float | None
+) -> Torques:
+    """Torques of a clip that stands on given feet in given frames; see `torques`.
+
+    Args:
+        clip: the motion.
+        stands: foot -> (n,) frames in which it stands.
+        strength: of the person.
+        friction: coefficient.
+        cutoff: Hz, or None.
+    """
+    figure, steady = clip.figure, smoothed(clip, cutoff)
+    v, a = steady.velocities(), steady.accelerations()
+    dynamics = InverseDynamics(figure, tuple(stands), friction)
     count, nv = len(clip), figure.model.nv
-    torque, missing = np.zeros((count, nv)), np.zeros((count, ROOT_SIZE))
+    torque, missing = np.zeros((count, nv)), np.zeros((count, ROOT))
     force, moment, pressure = (np.zeros((count, len(stands), 3)) for _ in range(3))
-    both = np.zeros((count, 3))
-    data = figure.model.createData()
+    both, outside = np.zeros((count, 3)), np.zeros(count)
     for k in range(count):
-        torque[k] = pin.rnea(figure.model, data, moved.q[k], v[k], a[k])
-        if not free:
+        stand = dynamics.stand(steady.q[k], [bool(marks[k]) for marks in stands.values()])
+        loads = dynamics.loads(steady.q[k], v[k], a[k], stand)
+        torque[k] = loads.torque
+        if not dynamics.free:
             continue
-        pin.computeJointJacobians(figure.model, data, moved.q[k])
-        center = np.array(pin.centerOfMass(figure.model, data, moved.q[k]))
-        needed = data.oMi[1].act(pin.Force(torque[k, :ROOT_SIZE])).vector
-        needed[3:] -= np.cross(center, needed[:3])
-        points, owner = soles.points(data, [bool(stands[name][k]) for name in stands])
-        found = ground_forces(needed, center, points, friction)
-        missing[k] = found.missing
-        for foot in range(len(stands)):
-            mine = owner == foot
-            force[k, foot] = found.forces[mine].sum(axis=0)
-            pressure[k, foot] = _pressure(found.forces[mine], points[mine])
-            jacobian = pin.getJointJacobian(figure.model, data, soles.joints[foot], pin.ReferenceFrame.WORLD)
-            turning = np.cross(points[mine], found.forces[mine]).sum(axis=0)
-            moment[k, foot] = turning - np.cross(pressure[k, foot], force[k, foot])
-            torque[k] -= jacobian.T @ np.concatenate([force[k, foot], turning])
-        both[k] = _pressure(found.forces, points)
-    lower, upper = strength.limits(figure)
+        forces = loads.ground.forces
+        missing[k] = loads.ground.missing
+        for foot, total in enumerate(foot_wrenches(forces, stand, dynamics.soles)):
+            mine = stand.owner == foot
+            force[k, foot] = total[:3]
+            pressure[k, foot] = _pressure(forces[mine], stand.points[mine])
+            moment[k, foot] = total[3:] - np.cross(pressure[k, foot], total[:3])
+        both[k] = _pressure(forces, stand.points)
+        outside[k] = dynamics.outside(loads, stand)
+    lower, upper = torque_limits(figure, strength)
     supported: Mask = np.zeros(count, dtype=bool)
     for marks in stands.values():
         supported[marks] = True
-    names = tuple(stands)
-    return Torques(figure, clip.dt, torque, names, force, moment, pressure, both, supported, missing, lower, upper)
+    return Torques(
+        figure, clip.dt, torque, tuple(stands), force, moment, pressure, both, supported, missing, outside, lower, upper
+    )
 
 
 def smoothed(clip: Clip, cutoff: float | None = CUTOFF) -> Clip:
@@ -234,65 +238,4 @@ def _pressure(forces: Array, points: Array) -> Array:
     if load <= 0.0:
         return np.zeros(3)
     found: Array = forces[:, 2] @ points / load
-    return found
-
-
-def _stands(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:
-    """In which frames (n,) each foot stands."""
-    figure = clip.figure
-    found: dict[str, Mask] = {}
-    for name in feet:
-        joint = figure.model.frames[figure.frame_id(name)].parentJoint
-        points = tuple(
-            point
-            for point in foot_points(figure)
-            if joint in figure.model.supports[figure.model.frames[figure.frame_id(point)].parentJoint]
-        )
-        marks = standing(figure, clip.q, clip.dt, StanceFeet(points or (name,)))
-        found[name] = np.any(list(marks.values()), axis=0)
-    if not found:
-        raise InputError(f"torques: {figure.name} has no segments {' or '.join(FEET)}; name its feet with feet=[...]")
-    return found
-
-
-class _Soles:
-    """Points of feet that bear force: the lowest corners of their pieces, toes included."""
-
-    def __init__(self, figure: Figure, feet: tuple[str, ...]) -> None:
-        self._figure = figure
-        self.joints = []
-        self._pieces: list[list[Any]] = []
-        for foot in feet:
-            joint = figure.model.frames[figure.frame_id(foot)].parentJoint
-            pieces = [
-                piece for piece in figure.geometry.geometryObjects if joint in figure.model.supports[piece.parentJoint]
-            ]
-            if joint == 0 or not pieces:
-                raise InputError(f"torques: {foot} has no pieces to stand on; name segments with geometry as feet")
-            self.joints.append(joint)
-            self._pieces.append(pieces)
-
-    def points(self, data: pin.Data, stand: list[bool]) -> tuple[Array, Any]:
-        """Points (n, 3) in the world of the feet that stand, and the number of each one's foot (n,)."""
-        points, owner = [np.zeros((0, 3))], [np.zeros(0, dtype=int)]
-        for foot, stands in enumerate(stand):
-            if not stands:
-                continue
-            lows = np.vstack(
-                [
-                    low_points(piece.geometry, data.oMi[piece.parentJoint] * piece.placement)
-                    for piece in self._pieces[foot]
-                ]
-            )
-            lows = _outermost(lows[lows[:, 2] <= lows[:, 2].min() + SOLE])
-            points.append(lows)
-            owner.append(np.full(len(lows), foot))
-        return np.vstack(points), np.concatenate(owner)
-
-
-def _outermost(points: Array) -> Array:
-    """The points that are farthest in the horizontal plane in evenly spread directions."""
-    around = 2.0 * np.pi * np.arange(SPREAD_CORNERS) / SPREAD_CORNERS
-    far = np.argmax(points[:, :2] @ np.array([np.cos(around), np.sin(around)]), axis=0)
-    found: Array = points[np.unique(far)]
     return found

@@ -21,6 +21,7 @@ from wholebody.errors import InputError
 from wholebody.geometry.proximity import PENETRATION
 from wholebody.methods.inputs import SEED
 from wholebody.methods.qp.method import QP
+from wholebody.moving_things import Collision, FrameMotion
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
@@ -48,6 +49,9 @@ def check_scene(scene: object, what: str) -> None:
 
 class FrameLoop:
     """Computes the posture of a figure that follows a tracker, frame by frame, without penetration.
+
+    Things may be moved between frames. One that moves during a frame (`Scene.move` with `over`) is met on its way: with
+    "qp" the figure gets out of its way as it comes. What could not be avoided is named in the frame.
 
     Attributes:
         scene: the figure among things.
@@ -92,6 +96,7 @@ class FrameLoop:
         if unreadable:
             raise InputError(f"frame 0: {unreadable}; begin with a posture of {scene.figure.name}")
         self.shown, self._note = free_start(scene, q, rigid)
+        self._workspace = scene.workspace()
         self._strategy = self._strategy_for(overlap, dt, seed, rigid)
         self._kept_from_passing(self._strategy.resolve(self.shown, self.shown))  # one-time set-up
 
@@ -107,13 +112,19 @@ class FrameLoop:
         began = _clocks()
         goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
         unreadable = _unreadable(self.scene, goal)
+        self._workspace.refresh()
+        motion = self._workspace.next_frame()
         if unreadable:
-            return self._shown(Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{unreadable}; the figure stays"), began)
-        resolution = self._strategy.resolve(self.shown, self._readable(goal))
-        # Simulated objects would move here, after the driven ones.
-        return self._shown(self._kept_from_passing(resolution), began)
+            resolution = Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{unreadable}; the figure stays", swept=True)
+        else:
+            resolution = self._strategy.resolve(self.shown, self._readable(goal))
+        if motion is not None:
+            return self._shown(*self._kept_from_moving(resolution, motion), began=began)
+        return self._shown(self._kept_from_passing(resolution), began=began)
 
-    def _shown(self, resolution: Resolution, began: tuple[float, float]) -> Frame:
+    def _shown(
+        self, resolution: Resolution, collisions: tuple[Collision, ...] = (), *, began: tuple[float, float]
+    ) -> Frame:
         note = "; ".join(part for part in (self._note, resolution.note) if part)
         note = f"frame {self.count}: {note}" if note else ""
         self.shown, self._note, self.count = np.array(resolution.candidates[0]), "", self.count + 1
@@ -121,6 +132,7 @@ class FrameLoop:
         return Frame(
             self.shown, wall, cpu, resolution.contact_seconds, resolution.solve_seconds,
             resolution.iterations, resolution.joints, resolution.pairs, note,
+            collisions,
         )  # fmt: skip
 
     def _readable(self, goal: Array) -> Array:
@@ -151,6 +163,32 @@ class FrameLoop:
             note = "; ".join(part for part in (note, stop) if part)
         spent = resolution.contact_seconds + time.perf_counter() - began
         return resolution._replace(candidates=(q,), contact_seconds=spent, note=note)
+
+    def _kept_from_moving(
+        self, resolution: Resolution, motion: FrameMotion
+    ) -> tuple[Resolution, tuple[Collision, ...]]:
+        """The first posture to which the motion is free of things that move meanwhile, or else the least deep.
+
+        Returns:
+            The resolution with this posture, and what could not be avoided, which its note names.
+        """
+        began, start = time.perf_counter(), (0.0, self.shown)
+        nearest = resolution.candidates[-1]
+        ways: list[tuple[tuple[float, Array], ...]] = [resolution.path] if resolution.path else []
+        ends = [*resolution.candidates, *(pin.interpolate(self.scene.model, self.shown, nearest, s) for s in SHARES)]
+        ways += [(start, (1.0, np.asarray(q))) for q in [*ends, self.shown]]
+        best, found, least = ways[0], tuple[Collision, ...](), np.inf
+        for way in ways:
+            collisions = motion.collisions(way)
+            depth = sum(one.depth for one in collisions)
+            if depth < least:
+                best, found, least = way, collisions, depth
+            if not collisions:
+                break
+        self._workspace.keep(motion, found)
+        note = "; ".join(part for part in (resolution.note, *map(str, found)) if part)
+        spent = resolution.contact_seconds + time.perf_counter() - began
+        return resolution._replace(candidates=(best[-1][1],), contact_seconds=spent, note=note), found
 
     def _strategy_for(self, overlap: str, dt: float, seed: int, rigid: bool) -> OverlapStrategy:
         if overlap == "qp":

@@ -75,10 +75,12 @@ class QPStrategy:
         self._pace.begin(shown)
         q = shown
         candidates: list[Array] = []
+        path: list[tuple[float, Array]] = []
         while len(candidates) < STEPS:
             step = self._tracker.step(q)
             q = self._into_cones(step.q)  # rows are exact to first order only, and have one edge at a corner of a cone
             candidates.append(q)
+            path += [*step.path[:-1], (1.0, q)] if step.path else [(1.0, q)] if path else []
             if np.abs(step.displacement).max() < SETTLED or not step.rows:
                 break
         contacts = workspace.near(q, 1.01 * CLEARANCE)
@@ -86,7 +88,9 @@ class QPStrategy:
         queried = proximity.seconds - queried
         whole = time.perf_counter() - began
         joints = len(candidates) * (self.scene.model.njoints - 1) if pairs else 0
-        return Resolution(tuple(candidates[::-1]), queried, whole - queried, len(candidates), joints, pairs, "")
+        return Resolution(
+            tuple(candidates[::-1]), queried, whole - queried, len(candidates), joints, pairs, "", path=tuple(path)
+        )
 
 
 def weights(scene: Scene, rigid: bool) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
+from wholebody.moving_things import Collision
 
 Counts = NDArray[np.intp]
 
@@ -28,6 +29,7 @@ class Frame(NamedTuple):
             per frame of table 2 of Schmidl and Lin; 0 if the figure is displaced as a whole.
         pairs: number of pairs of pieces that were kept apart or separated.
         note: "" or a report of unusual events.
+        collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
     """
 
     q: Array
@@ -39,6 +41,7 @@ class Frame(NamedTuple):
     joints: int
     pairs: int
     note: str
+    collisions: tuple[Collision, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

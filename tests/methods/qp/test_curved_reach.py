@@ -37,7 +37,7 @@ def test_how_a_pull_bends_is_the_second_derivative_of_the_place():
         ]
         pin.computeJointJacobians(model, data, q)
         total, place = np.zeros((model.nv, model.nv)), data.oMi[joint].act(point)
-        add_bending(total, data.J, np.ones(model.nv), place, force, np.zeros(3))
+        add_bending(total, data.J.T, np.ones(model.nv), place, force, np.zeros(3))
         assert total == pytest.approx(np.array(second), abs=1e-6)
 
 

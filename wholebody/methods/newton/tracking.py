@@ -108,7 +108,9 @@ class NewtonTracker:
                 kind=self._settings.inequalities,
                 early_exit=True,
             )
-            return NewtonStep(active_system.posture(found.x), found.iterations, found.systems, active_system.structures)
+            return NewtonStep(
+                active_system.posture(found.x), found.iterations, found.systems, active_system.patterns.structures
+            )
 
     def frame(self, q: Array, tolerance: float | None = None) -> NewtonStep:
         """One frame of a motion: the same as `step`."""
@@ -143,7 +145,7 @@ class NewtonTracker:
     @property
     def laid_out(self) -> tuple[int, float]:
         """Number of patterns, and the processor's time of their analysis [s]."""
-        return self._course.structures, self._course.laying
+        return self._course.patterns.structures, self._course.patterns.laying
 
     def _lay_out(self) -> None:
         problem = self.problem

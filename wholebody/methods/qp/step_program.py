@@ -93,13 +93,17 @@ class StepProgram:
         self._joints = np.concatenate(
             [state.spread(places).astype(np.intp), state.column_joint, state.parents, workspace.table.joint]
         )
-        # without goals the measures are the task
-        gain = min(1.0, dt / SETTLING) if self.goals else 1.0
-        self._numbers = numbers_of(self._subproblem.scale, gain)
+        self.take(dt)
         self._before = np.zeros(state.model.nq + self._soft + 2)
         """See `tracking_kernel.solve`."""
         self._after = self._before.copy()
         self._grow(64)
+
+    def take(self, seconds: float) -> None:
+        """Make the next steps take so long, for what measures do meanwhile."""
+        # without goals the measures are the task
+        gain = min(1.0, seconds / SETTLING) if self.goals else 1.0
+        self._numbers = numbers_of(self._subproblem.scale, gain)
 
     def solve(self, at: Passing, measures: bool) -> Answer:
         """The answer of the step from where the workspace's state is, and its pieces' placements.

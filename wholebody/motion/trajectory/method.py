@@ -6,17 +6,21 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody import checks
 from wholebody.arrays import Array
+from wholebody.figures.state import State
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import faults
-from wholebody.motion.frame_terms import Given, frame_terms
-from wholebody.motion.trajectory.banded_qp import banded_solver
+from wholebody.motion.frame_terms import FrameTerms, Given, between, frame_terms
+from wholebody.motion.trajectory.banded_qp import Answer, BandedQP, banded_solver
+from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
 from wholebody.motion.trajectory.window_run import ClipRun
 from wholebody.motion.windows import windows
 from wholebody.scene import Scene
+from wholebody.workspace import Workspace
 
 LOOKED = 0.1  # share of the progress that looking for collisions counts for
 
@@ -33,6 +37,9 @@ class Trajectory:
         margin: seconds before and after a collision in which frames may be changed.
         solver: "piqp", "osqp", or None for piqp where it is installed, else osqp.
         iterations: most quadratic programs of one attempt at a window.
+        stretch: factor by which the clip may be slowed, at most and anywhere, so that joints keep to their speed
+            limits. The postures stay on their path, and the clip gets more frames of the same time step. 1 keeps the
+            timing; joints that the clip moves faster than their limits then stay as fast.
 
     Raises:
         InputError: a value out of range.
@@ -45,6 +52,7 @@ class Trajectory:
     margin: float = 0.5
     solver: str | None = None
     iterations: int = 40
+    stretch: float = 1.0
 
     def __post_init__(self) -> None:
         """Check the settings."""
@@ -52,6 +60,7 @@ class Trajectory:
         checks.number(self.time, "Trajectory: time", 0.0, 100.0, "s")
         checks.number(self.margin, "Trajectory: margin", 0.0, 100.0, "s")
         checks.whole(self.iterations, "Trajectory: iterations", 1, 10_000)
+        checks.number(self.stretch, "Trajectory: stretch", 1.0, 100.0)
         banded_solver(self.solver)
 
     @property
@@ -63,29 +72,59 @@ class Trajectory:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
         check_input(clip, scene, progress)
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
-        q: Array = np.array(clip.q)
         _, solve = banded_solver(self.solver)
         with scene.lend() as workspace:
-            watch.tell(0.0, "looking for collisions")
-            depths, wrong, gaps = faults(workspace, terms, q, self.clearance)
-            wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
-            margin = max(3, round(self.margin / clip.dt))
-            found = windows(wrong, margin)
-            run = ClipRun(self, terms, workspace, solve)
-            total, done, missed = max(1, sum(map(len, found))), 0, []
-            for window in found:
-                begun, note = done, f"frames {window.first} to {window.end - 1}"
-                share = len(window) / total
-                cancelled = self._teller(watch, begun / total, share, note)
-                freed = run.window(window, depths, gaps, cancelled)
-                q[window.first : window.end] = freed.q
-                if watch.ended:
-                    break
-                if freed.missed:
-                    missed.append(f"{note}: {freed.missed}")
-                done += len(window)
-        message = "the caller ended it" if watch.ended else "; ".join(missed)
-        return MethodResult(q, run.posture_solves, run.programs, message)
+            run = ClipRun(self, terms, workspace, solve, clip.q, self.stretch)
+            q, missed = self._freed(run, terms, workspace, clip.q, watch)
+            new = None if watch.ended else self._timing(q, terms, workspace.state, solve)
+            if new is None:
+                return MethodResult(q, run.posture_solves, run.programs, _said(watch, missed))
+            # On the same path nothing is new but chords, which cut its corners; what they touch is freed from there.
+            slower = terms.at(new.times)
+            passed = between(scene.model, q, new.times / clip.dt)
+            again = ClipRun(self, slower, workspace, solve, passed)
+            q, left = self._freed(again, slower, workspace, passed, watch)
+        return MethodResult(
+            q, run.posture_solves + again.posture_solves, run.programs + again.programs, _said(watch, [*missed, *left]),
+            times=new.times, stretch=new.largest,
+        )  # fmt: skip
+
+    def _freed(
+        self, run: ClipRun, terms: FrameTerms, workspace: Workspace, reference: Array, watch: Watch
+    ) -> tuple[Array, list[str]]:
+        """Postures (n, nq) that are free, as near as can be to reference postures (n, nq), and what is missed."""
+        q: Array = np.array(reference)
+        watch.tell(0.0, "looking for collisions")
+        depths, wrong, gaps = faults(workspace, terms, reference, self.clearance)
+        wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
+        found = windows(wrong, max(3, round(self.margin / terms.dt)))
+        total, done, missed = max(1, sum(map(len, found))), 0, []
+        for window in found:
+            begun, note = done, f"frames {window.first} to {window.end - 1}"
+            cancelled = self._teller(watch, begun / total, len(window) / total, note)
+            freed = run.window(window, depths, gaps, cancelled)
+            q[window.first : window.end] = freed.q
+            if watch.ended:
+                break
+            if freed.missed:
+                missed.append(f"{note}: {freed.missed}")
+            done += len(window)
+        return q, missed
+
+    def _timing(self, q: Array, terms: FrameTerms, state: State, solve: Callable[[BandedQP], Answer]) -> Timing | None:
+        """The new timing of postures (n, nq); None where it stays."""
+        stretch = allowance(len(q), self.stretch)
+        if stretch <= 1.0 or len(q) < 2:
+            return None
+        model, gaps = terms.scene.model, range(len(q) - 1)
+        steps = np.array([pin.difference(model, q[gap], q[gap + 1]) for gap in gaps])
+        bounds = [terms.step_bounds(gap, state) for gap in gaps]
+        most = speed_bounds(steps, np.array([one[0] for one in bounds]), np.array([one[1] for one in bounds]))
+        return timing(slowed(most, terms.dt, stretch, solve), terms.dt)
 
     def _teller(self, watch: Watch, begun: float, share: float, note: str) -> Callable[[float], bool]:
         return lambda part: watch.tell(LOOKED + (1.0 - LOOKED) * (begun + share * part), note)
+
+
+def _said(watch: Watch, missed: list[str]) -> str:
+    return "the caller ended it" if watch.ended else "; ".join(missed)

@@ -9,7 +9,7 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.motion.dips import dips, sampled_dips
-from wholebody.motion.frame_terms import FrameTerms, speed_limits
+from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.chart import Chart
 from wholebody.motion.trajectory.nodes import Looking, Node
@@ -77,8 +77,9 @@ class ClipRun:
     """
 
     def __init__(
-        self, settings: Settings, terms: FrameTerms, workspace: Workspace, solve: Callable[[BandedQP], Answer]
-    ) -> None:
+        self, settings: Settings, terms: FrameTerms, workspace: Workspace, solve: Callable[[BandedQP], Answer],
+        reference: Array, rate: float = 1.0,
+    ) -> None:  # fmt: skip
         """Take what is needed.
 
         Args:
@@ -86,8 +87,11 @@ class ClipRun:
             terms: original postures, and what is held.
             workspace: of this run alone.
             solve: solves one program.
+            reference: (n, nq) postures that the deviations are from.
+            rate: factor of the speed limits, for a clip that will be slowed by as much.
         """
         self._settings, self._terms, self._workspace, self._solve = settings, terms, workspace, solve
+        self._reference, self._rate = reference, rate
         self._carried = Carried(terms, settings.clearance)
         self._programs = 0
         self._weights = np.ones(workspace.model.nv)
@@ -112,7 +116,7 @@ class ClipRun:
             cancel: told the share done; true ends the attempt, and the window stays as it was.
         """
         terms = self._terms
-        chart = Chart(self._workspace.model, np.array(terms.q[window.first : window.end]))
+        chart = Chart(self._workspace.model, np.array(self._reference[window.first : window.end]))
         seams = window.first > 0, window.end < len(terms.q)
         objective = Objective(len(window), self._weights, self._settings.time, terms.dt, seams)
         limits = self._limits(window, chart, seams)
@@ -183,14 +187,13 @@ class ClipRun:
         limits = self._terms.scene.figure.limits
         lower[:, limits.idx_v] = limits.lower - chart.original[:, limits.idx_q]
         upper[:, limits.idx_v] = limits.upper - chart.original[:, limits.idx_q]
-        steps, fastest = chart.steps, np.tile(speed_limits(self._terms.scene, self._terms.dt), (count - 1, 1))
-        slowest = -fastest
+        steps, slowest, fastest = chart.steps, np.zeros((count - 1, nv)), np.zeros((count - 1, nv))
         for frame in range(count):
             bounds = self._terms.bounds(window.first + frame, self._workspace.state)
             lower[frame], upper[frame] = np.maximum(lower[frame], bounds[0]), np.minimum(upper[frame], bounds[1])
             if frame < count - 1:
-                slowest[frame] = np.maximum(slowest[frame], bounds[2])
-                fastest[frame] = np.minimum(fastest[frame], bounds[3])
+                limits_here = self._terms.step_bounds(window.first + frame, self._workspace.state)
+                slowest[frame], fastest[frame] = (self._rate * bound for bound in limits_here)
         for seam, frame in zip(seams, (0, -1), strict=True):
             if seam:
                 lower[frame], upper[frame] = 0.0, 0.0

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from functools import lru_cache
+from importlib import import_module
+from importlib.machinery import PathFinder
+from importlib.util import find_spec, module_from_spec
 from typing import Any
 
 import numpy as np
@@ -19,6 +23,7 @@ RHO = 0.1  # OSQP's step length at the beginning; it adapts
 ROUNDS = (25, 50, 100, 200, 400)  # iterations, until an active set read off the multipliers settles
 HOT_ROUNDS = 2  # of them with a hot start: more take several times as long as semismooth Newton steps
 FAR = 1e30  # OSQP's infinity
+EXTENSION = "osqp.ext_builtin"
 
 
 class OSQPSolver(QPSolver):
@@ -165,10 +170,17 @@ def _structure(n: int, m: int, slots: int, pattern: bytes) -> tuple[Any, Any, ND
 
 @lru_cache(maxsize=1)
 def extension() -> Any:
-    """OSQP's compiled module: its Python class around it takes five times as long as 25 iterations."""
-    import osqp
+    """OSQP's compiled module, without the package around it, which loads jinja2 and asyncio to write C code.
 
-    return osqp.OSQP().ext
+    The package's Python class takes five times as long as 25 iterations.
+    """
+    package = find_spec("osqp")
+    found = None if package is None else PathFinder.find_spec(EXTENSION, package.submodule_search_locations)
+    if EXTENSION in sys.modules or found is None or found.loader is None:
+        return import_module(EXTENSION)
+    module = sys.modules[EXTENSION] = module_from_spec(found)
+    found.loader.exec_module(module)
+    return module
 
 
 @lru_cache(maxsize=1)

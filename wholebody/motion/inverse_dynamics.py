@@ -1,0 +1,235 @@
+"""Inverse dynamics of one frame on its feet: torques, the wrench that the ground has to give, and derivatives of both.
+
+The torques of a motion in the air are those of the recursive Newton-Euler algorithm (Featherstone 2008, chapter 5).
+Those of a free root are the wrench that the ground has to give. It is split over the soles, and each foot's part acts
+on the joints through the foot's Jacobian.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array, Indices
+from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
+from wholebody.motion.ground_forces import GroundForces, ground_forces
+from wholebody.motion.soles import Soles
+from wholebody.tasks.support import convex_polygon, edges
+
+ROOT = 6  # degrees of freedom of a free root
+LIGHT = 0.2
+"""Share of the weight: with less vertical force, in a take-off or landing, the zero moment point says little."""
+
+
+class Stand(NamedTuple):
+    """Where a frame stands.
+
+    Attributes:
+        points: (p, 3) points of the soles that bear force, metres.
+        owner: (p,) number of the foot of each.
+        corners: (e, 2) of the support polygon, anticlockwise; none where there is no area.
+        normals: (e, 2) inward normals of its edges.
+        offsets: (e,) inside, ``normals @ place >= offsets``, metres.
+        height: of the ground, metres.
+    """
+
+    points: Array
+    owner: Indices
+    corners: Array
+    normals: Array
+    offsets: Array
+    height: float
+
+    def margins(self, place: Array) -> Array:
+        """(e,) distances of a place (2,) from the edges, metres; positive inside."""
+        found: Array = self.normals @ place - self.offsets
+        return found
+
+
+class Loads(NamedTuple):
+    """Loads of one frame.
+
+    Attributes:
+        torque: (nv,) of the joints, N m, after the ground's forces; the root's part is what is missing.
+        wrench: (6,) that the ground has to give: force N, and moment about the world's origin N m.
+        ground: what it gives; about the centre of mass.
+        center: (3,) centre of mass, metres.
+    """
+
+    torque: Array
+    wrench: Array
+    ground: GroundForces
+    center: Array
+
+
+class Derivatives(NamedTuple):
+    """Derivatives with respect to posture (tangent), velocity and acceleration, while feet stand where they stand.
+
+    Attributes:
+        torque: three arrays (nv, nv).
+        place: three arrays (2, nv), of the zero moment point.
+    """
+
+    torque: tuple[Array, Array, Array]
+    place: tuple[Array, Array, Array]
+
+
+class InverseDynamics:
+    """Loads of frames of one figure.
+
+    Attributes:
+        soles: of its feet.
+        weight: N.
+    """
+
+    def __init__(self, figure: Figure, feet: Sequence[str], friction: float) -> None:
+        """Take a figure.
+
+        Args:
+            figure: with mass.
+            feet: that may stand; none for a root that is fixed.
+            friction: coefficient of friction of the ground.
+        """
+        self._model, self._data, self._friction = figure.model, figure.model.createData(), friction
+        self.soles = Soles(figure, tuple(feet))
+        self.weight = float(pin.computeTotalMass(self._model) * np.linalg.norm(self._model.gravity.linear))
+        self.free = figure.root == "free"
+
+    def stand(self, q: Array, feet: Sequence[bool]) -> Stand:
+        """Where a posture (nq,) stands, on some of the feet."""
+        pin.forwardKinematics(self._model, self._data, q)
+        points, owner = self.soles.points(self._data, list(feet))
+        corners, height = np.zeros((0, 2)), 0.0
+        if len(points):
+            height = float(points[:, 2].min())
+            with suppress(InputError):  # the points lie on a line, which bears no moment about itself
+                corners = convex_polygon(points[:, :2])
+        normals, offsets = edges(corners) if len(corners) else (np.zeros((0, 2)), np.zeros(0))
+        return Stand(points, owner, corners, normals, offsets, height)
+
+    def loads(self, q: Array, v: Array, a: Array, stand: Stand) -> Loads:
+        """Loads of a posture (nq,) with its velocity and acceleration (nv,)."""
+        model, data = self._model, self._data
+        torque = np.array(pin.rnea(model, data, q, v, a))
+        center = np.array(pin.centerOfMass(model, data, q))
+        if not self.free:
+            return Loads(torque, np.zeros(6), ground_forces(np.zeros(6), center, np.zeros((0, 3)), 1.0), center)
+        pin.computeJointJacobians(model, data, q)
+        wrench = np.array(data.oMi[1].act(pin.Force(torque[:ROOT])).vector)
+        ground = self.split(wrench, center, stand)
+        for joint, total in zip(self.soles.joints, foot_wrenches(ground.forces, stand, self.soles), strict=True):
+            torque -= pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.WORLD).T @ total
+        return Loads(torque, wrench, ground, center)
+
+    def split(self, wrench: Array, center: Array, stand: Stand) -> GroundForces:
+        """The ground's forces for a wrench (6,) about the world's origin."""
+        return ground_forces(moved(wrench, center), center, stand.points, self._friction)
+
+    def outside(self, loads: Loads, stand: Stand) -> float:
+        """By how far the zero moment point is outside of where a frame stands, metres; 0 where that says little."""
+        if not len(stand.normals) or loads.wrench[2] < LIGHT * self.weight:
+            return 0.0
+        place = zero_moment_point(loads.wrench, stand.height)
+        if (stand.margins(place) >= 0.0).all():
+            return 0.0
+        ends = np.roll(stand.corners, -1, axis=0) - stand.corners
+        along = np.einsum("ij,ij->i", place - stand.corners, ends) / np.einsum("ij,ij->i", ends, ends)
+        nearest = stand.corners + np.clip(along, 0.0, 1.0)[:, None] * ends
+        return float(np.linalg.norm(place - nearest, axis=1).min())
+
+    def derivatives(self, q: Array, v: Array, a: Array, stand: Stand) -> Derivatives:
+        """Derivatives of `loads` and of the zero moment point."""
+        model, data, nv = self._model, self._data, self._model.nv
+        here = self.loads(q, v, a, stand)
+        parts = [np.array(part) for part in pin.computeRNEADerivatives(model, data, q, v, a)]
+        parts[2] = np.triu(parts[2]) + np.triu(parts[2], 1).T
+        none = np.zeros((2, nv))
+        if not self.free:
+            return Derivatives((parts[0], parts[1], parts[2]), (none, none, none))
+        J = np.array(pin.computeJointJacobians(model, data, q))
+        action = np.asarray(data.oMi[1].toDualActionMatrix())
+        wrenches = [action @ part[:ROOT] for part in parts]
+        for column in range(ROOT):  # the axes of the root turn with it
+            twist = pin.Motion(J[:, column])
+            wrenches[0][:, column] += twist.cross(pin.Force(here.wrench)).vector
+        shift = moving(here.center)
+        bent = foot_wrenches(here.ground.forces, stand, self.soles)
+        for foot, joint in enumerate(self.soles.joints):
+            mine = np.repeat(stand.owner == foot, 3)
+            if not mine.any():
+                continue
+            jacobian = np.array(pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.WORLD))
+            given = jacobian.T @ point_map(stand.points[stand.owner == foot]) @ here.ground.split[mine] @ shift
+            for part, wrench in zip(parts, wrenches, strict=True):
+                part -= given @ wrench
+            parts[0] -= self._turning(J, joint, bent[foot])
+        return Derivatives((parts[0], parts[1], parts[2]), _place_derivatives(here.wrench, wrenches, stand.height))
+
+    def _turning(self, J: Array, joint: int, wrench: Array) -> Array:
+        """(nv, nv) derivative with respect to posture of a fixed wrench's moments about the axes of a chain.
+
+        Axis i is carried along by every joint j before it: its derivative is the motion product of axis j with axis i.
+        """
+        model, force = self._model, pin.Force(wrench)
+        found, before = np.zeros((model.nv, model.nv)), []
+        for number in model.supports[joint]:
+            own = model.joints[number]
+            columns = range(own.idx_v, own.idx_v + own.nv) if number else range(0)
+            before += [(column, pin.Motion(J[:, column])) for column in columns]
+            for late in columns:
+                turned = pin.Motion(J[:, late])
+                for early, axis in before:
+                    found[late, early] = axis.cross(turned).dot(force)
+        return found
+
+
+def foot_wrenches(forces: Array, stand: Stand, soles: Soles) -> list[Array]:
+    """(6,) force and moment about the world's origin of the ground on each foot."""
+    found = []
+    for foot in range(len(soles.joints)):
+        mine = stand.owner == foot
+        turning = np.cross(stand.points[mine], forces[mine]).sum(axis=0)
+        found.append(np.concatenate([forces[mine].sum(axis=0), turning]))
+    return found
+
+
+def zero_moment_point(wrench: Array, height: float) -> Array:
+    """(2,) where the ground gives a wrench (6,), about the world's origin, without a horizontal moment; metres.
+
+    Vukobratovic and Borovac 2004, "Zero-moment point - thirty five years of its life". The vertical force is not zero.
+    """
+    force, turning = wrench[:3], wrench[3:]
+    found: Array = np.array([-turning[1] + height * force[0], turning[0] + height * force[1]]) / force[2]
+    return found
+
+
+def moved(wrench: Array, center: Array) -> Array:
+    """A wrench (6,) about another point than the world's origin."""
+    found: Array = np.concatenate([wrench[:3], wrench[3:] - np.cross(center, wrench[:3])])
+    return found
+
+
+def moving(center: Array) -> Array:
+    """(6, 6) the matrix of `moved`."""
+    found = np.eye(6)
+    found[3:, :3] = -pin.skew(center)
+    return found
+
+
+def point_map(points: Array) -> Array:
+    """(6, 3p) from forces on points (p, 3) to their sum and their moment about the world's origin."""
+    return np.hstack([np.vstack([np.eye(3), pin.skew(point)]) for point in points])
+
+
+def _place_derivatives(wrench: Array, wrenches: Sequence[Array], height: float) -> tuple[Array, Array, Array]:
+    place = zero_moment_point(wrench, height) if wrench[2] != 0.0 else np.zeros(2)
+    low = np.zeros((2, 6))  # zero_moment_point times the vertical force is linear
+    low[0, 4], low[0, 0], low[1, 3], low[1, 1] = -1.0, height, 1.0, height
+    down = wrench[2] if wrench[2] != 0.0 else np.inf
+    found = [(low @ part - np.outer(place, part[2])) / down for part in wrenches]
+    return found[0], found[1], found[2]

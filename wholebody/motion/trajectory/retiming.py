@@ -1,0 +1,159 @@
+"""Timing of a clip: the same postures one after the other, passed more slowly where something does not hold.
+
+Along a path q(s), with s the time of the clip as it is, the rate ds/dt and its square b(s) say how fast it is passed; b
+is 1 for the clip as it is. Then ``dq/dt = q'(s) sqrt(b)`` and ``d2q/dt2 = q''(s) b + q'(s) b'(s) / 2``. So bounds on
+speeds are bounds on b, and torques are linear in b and its derivative (Verscheure, Demeulenaere, Swevers, De Schutter
+and Diehl 2009, "Time-optimal path tracking for robots: a convex optimization approach"). They minimise the duration.
+Here the timing is to stay what it is where nothing is wrong, so the program minimises
+
+    1/2 sum_k ((1 - b_k)^2 + tau^4 ((b_(k+1) - 2 b_k + b_(k-1)) / h^2)^2) + weight * sum of what loads miss
+
+subject to ``1/stretch^2 <= b_k <= 1``, and b_k at most the square of the rate that speed limits leave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+
+from wholebody.arrays import Array, Indices
+from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
+from wholebody.motion.trajectory.objective import Objective
+
+SPREAD = 0.2
+"""Seconds, tau: how far slowing at one frame spreads to its neighbours; larger = smoother, slower for longer."""
+
+SAME = 1e-3
+"""Of b: a clip that is slowed by no more keeps its timing."""
+
+MISSED = 1e3
+"""Weight of a shortfall of loads: large, so that they are met where the largest slowing lets them be."""
+
+CURVATURE = 1e-3
+"""Of a shortfall, in parts of its weight: keeps equal splits of it unique."""
+
+
+class TimedRows(NamedTuple):
+    """Loads that are linear in b and in its derivative: ``gap + speed b + change b' >= 0``.
+
+    Attributes:
+        frame: (r,) frame of each row.
+        gap: (r,) what does not depend on the timing.
+        speed: (r,) derivative with respect to b.
+        change: (r,) derivative with respect to b', seconds.
+    """
+
+    frame: Indices
+    gap: Array
+    speed: Array
+    change: Array
+
+
+def slowed(
+    most: Array, dt: float, stretch: float, solve: Callable[[BandedQP], Answer], loads: TimedRows | None = None
+) -> Array:
+    """(n,) squares of the rate at which each frame is passed: 1 where the timing stays, else less.
+
+    Args:
+        most: (n,) bounds on it that speed limits give.
+        dt: seconds from frame to frame.
+        stretch: by which factor the clip may be slowed at most, anywhere; more than 1.
+        solve: solves one program.
+        loads: further rows; what cannot be met is missed by as little as can be.
+    """
+    count = len(most)
+    least = 1.0 / stretch**2
+    if loads is None and (most >= 1.0).all():
+        return np.ones(count)
+    bands = sp.csc_matrix(Objective(count, np.ones(1), SPREAD, dt, (False, False)).bands)
+    low, high = np.zeros(count), np.full(count, 1.0 - least)
+    low = np.clip(1.0 - most, 0.0, high)  # unknowns are 1 - b
+    P, c, G, lower = bands, np.zeros(count), sp.csc_matrix((0, count)), np.zeros(0)
+    if loads is not None and len(loads.gap):
+        rate = _rate(count, dt)[loads.frame]
+        rows = sp.diags(loads.speed) @ sp.eye(count, format="csr")[loads.frame] + sp.diags(loads.change) @ rate
+        ahead = np.asarray(rows @ np.ones(count)).ravel() + loads.gap  # of b = 1
+        slacks = len(loads.gap)
+        P = sp.block_diag([bands, CURVATURE * MISSED * sp.eye(slacks)])
+        c = np.concatenate([c, np.full(slacks, MISSED)])
+        G, lower = sp.hstack([-rows, sp.eye(slacks)]), -ahead
+        low, high = np.concatenate([low, np.zeros(slacks)]), np.concatenate([high, np.full(slacks, np.inf)])
+    program = BandedQP(
+        sp.csc_matrix(P), c, sp.csc_matrix(G), lower, np.full(len(lower), np.inf), low, high
+    )  # fmt: skip
+    z = solve(program).z[:count]
+    found: Array = 1.0 - np.clip(z, low[:count], high[:count])
+    return found
+
+
+def _rate(count: int, dt: float) -> sp.csr_matrix:
+    """(n, n) derivative of values at frames with respect to time: central, and one-sided at both ends."""
+    if count < 2:
+        return sp.csr_matrix((count, count))
+    rate = sp.lil_matrix((count, count))
+    for k in range(count):
+        before, after = max(k - 1, 0), min(k + 1, count - 1)
+        rate[k, after] = 1.0 / ((after - before) * dt)
+        rate[k, before] = -1.0 / ((after - before) * dt)
+    return sp.csr_matrix(rate)
+
+
+def speed_bounds(steps: Array, slowest: Array, fastest: Array) -> Array:
+    """(n,) largest squares of the rate with which every motion between frames keeps to its bounds.
+
+    Args:
+        steps: (n - 1, nv) motion from each frame to the next.
+        slowest: (n - 1, nv) or (nv,) its negative bounds, for the time of a frame.
+        fastest: the same, positive.
+    """
+    bound = np.where(steps < 0.0, slowest, fastest)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(steps != 0.0, bound / steps, np.inf)
+    rate = np.maximum(ratio, 0.0).min(axis=1, initial=np.inf) ** 2
+    # Between two frames b is linear, so the rate is largest at one of them.
+    most: Array = np.minimum(np.concatenate([rate, [np.inf]]), np.concatenate([[np.inf], rate]))
+    return most
+
+
+class Timing(NamedTuple):
+    """A new timing.
+
+    Attributes:
+        times: (m,) seconds of the clip as it is, for each frame of the slowed clip, `dt` apart.
+        largest: factor by which the clip is slowed most, anywhere.
+    """
+
+    times: Array
+    largest: float
+
+
+def timing(b: Array, dt: float) -> Timing | None:
+    """When each frame of the slowed clip is, in the time of the clip as it is; None where its timing stays.
+
+    The duration becomes a multiple of the time step; for that everything is slowed by less than one step in all.
+
+    Args:
+        b: (n,) squares of the rate at each frame; linear in between.
+        dt: seconds from frame to frame, of both.
+    """
+    if len(b) < 2 or (b >= 1.0 - SAME).all():
+        return None
+    rate = np.sqrt(b)
+    took = 2.0 * dt / (rate[:-1] + rate[1:])
+    begun = np.concatenate([[0.0], np.cumsum(took)])
+    frames = int(np.ceil(begun[-1] / dt - 1e-9))
+    at = np.linspace(0.0, begun[-1], frames + 1)
+    gap = np.clip(np.searchsorted(begun, at, side="right") - 1, 0, len(took) - 1)
+    since = at - begun[gap]
+    speeding = 0.5 * (b[gap + 1] - b[gap]) / dt
+    times = gap * dt + rate[gap] * since + 0.5 * speeding * since**2
+    longer = frames * dt / begun[-1]
+    return Timing(np.clip(times, 0.0, (len(b) - 1) * dt), float(longer / rate.min()))
+
+
+def allowance(frames: int, stretch: float) -> float:
+    """What is left of the largest factor when the duration is made a multiple of the time step; at least 1."""
+    return max(1.0, stretch * (frames - 1) / frames)
