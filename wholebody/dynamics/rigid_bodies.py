@@ -32,11 +32,11 @@ GRAVITY = (0.0, 0.0, -9.81)  # m/s2
 SUBSTEP = 1.0 / 240.0  # s: longest step; smaller is more accurate and slower
 SHORTEST = 1e-6  # s: of a step that ends with an impact
 INSIDE = 1e-4  # m: a step that leaves pieces deeper in each other is made again with half the time
-LEAST_GAP = 1e-5  # m: pieces nearer than this are parted before the next step
+LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
 PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
 HALVINGS = 6  # of a step, at most
 MARGIN = 2e-3  # m: pairs are looked at from this much farther than bodies come in a step
-STOPS = 8  # early ends of steps in a frame, and one for each step of it
+STOPS = 12  # early ends of steps in a frame, at most
 DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
 PARTINGS = 4  # rounds of parting pieces after a step
 
@@ -128,7 +128,7 @@ class RigidBodies:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
             state.give(number, before, after, dt)
         count = int(np.ceil(dt / SUBSTEP - 1e-9))
-        record = FrameRecord(STOPS + count, np.zeros((len(self.names), 3)))
+        record = FrameRecord(STOPS, np.zeros((len(self.names), 3)))
         self._look(dt / count)
         for number in range(count):
             end = dt * (number + 1) / count

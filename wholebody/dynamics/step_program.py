@@ -14,7 +14,7 @@ from wholebody.dynamics.contact_points import ContactPoints
 SKIN = 5e-5  # m: gap at which bodies rest: coal's distances stay positive, its normals right to 0.02 rad
 TOUCH = 1e-5  # m: a gap larger than SKIN by this still touches
 SLOW = 0.02  # m/s: slower approaches are no impacts; 20 um of fall
-TOLERANCE = 5e-5  # m/s: of the program of a step; 0.2 um of its way
+TOLERANCE = 1e-4  # m/s: of the program of a step; 0.4 um of its way
 FEWEST, MOST, VISITS = 50, 1000, 40_000  # sweeps of it, and points times sweeps: more is exacter and slower
 SAME_POINT = 0.01  # m: contact points nearer than this, in the body, are the same from step to step
 MOST_EVENTS = 1000  # at one stop
