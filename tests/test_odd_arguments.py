@@ -245,7 +245,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     near = there.contacts(q, within=1.0)
     yield "Contacts.nearest_first", Call(near.nearest_first, {})
     yield "Scene.penetration", Call(there.penetration, {"q": q})
-    yield "Scene.lend", Call(there.lend, {})
+    yield "Scene.borrow", Call(there.borrow, {})
     yield "Scene.workspace", Call(there.workspace, {})
     yield "Scene.remove", Call(lambda **given: scene(path).remove(**given), {"name": "ball"})
     yield "Scene.state", Call(there.state, {"q": q})
@@ -315,9 +315,9 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Problem(touching)", Call(lambda pair: wb.Problem(there, touching=[pair]), {"pair": ("link4", "ball")})
     yield "Problem.with_start", Call(ask.with_start, {"q": q}, wb.solve)
     yield "Problem.check_fresh", Call(ask.check_fresh, {})
-    lent = ask.workspace()
-    yield "Problem.lineariser", Call(lambda dt: ask.lineariser(lent, dt), {"dt": 0.1})
-    yield "Problem.lend", Call(ask.lend, {})
+    workspace = ask.workspace()
+    yield "Problem.lineariser", Call(lambda dt: ask.lineariser(workspace, dt), {"dt": 0.1})
+    yield "Problem.borrow", Call(ask.borrow, {})
     yield "Problem.workspace", Call(ask.workspace, {})
     yield "Problem.retarget", Call(retarget, {"goals": [wb.Point("link4", at)]})
     yield "solve", Call(wb.solve, {"problem": ask, "method": "qp", "progress": print})
@@ -364,7 +364,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "SolvingTracker": wb.DampedLeastSquares().tracker(ask, 0.1),
     }.items():
         yield f"{name}.frame", Call(made.frame, {"q": q, "tolerance": 1e-4})
-        for method in ("solve", "nearest", "ways_out"):
+        for method in ("solve", "nearest", "overlap_resolutions"):
             if (name, method) != ("NewtonTracker", "solve"):
                 yield f"{name}.{method}", Call(getattr(made, method), {"q": q})
         if name == "SolvingTracker":

@@ -65,7 +65,7 @@ def assess_motion(scene: Scene, q: Array, dt: float) -> MotionAssessment:
 def pairs_along(scene: Scene, q: Array) -> Iterator[AllPairs]:
     """All pairs at each of the postures (n, nq), with the kinematic state; each is valid until the next one."""
     built = scene.built
-    with built.pool(AllPairs, lambda: AllPairs(built)).lend() as pairs:
+    with built.pool(AllPairs, lambda: AllPairs(built)).borrow() as pairs:
         for posture in q:
             pairs.move(np.asarray(posture, dtype=float))
             yield pairs

@@ -98,6 +98,42 @@ class RigidBodies:
         """
         return np.array(self.state.twist[self._number(name)])
 
+    def velocity_at(self, name: str, point: Array) -> Array:
+        """Velocity (3,) of a body's point at a place (3,) in the world, m/s.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+        """
+        number = self._number(name)
+        lever = point - self.state.position[number]
+        return np.asarray(self.state.velocity[number] + np.cross(self.state.spin[number], lever))
+
+    def mobility(self, name: str, point: Array) -> Array:
+        """Change (3, 3) of the velocity of a body's point (3,) by an impulse there, 1/kg.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+        """
+        number = self._number(name)
+        lever = pin.skew(point - self.state.position[number])
+        return np.asarray(np.eye(3) / self._pieces.mass[number] - lever @ self._inverse_inertia(number) @ lever)
+
+    def push(self, name: str, impulse: Array, point: Array) -> None:
+        """Give a body that moves by itself an impulse (3,) at a place (3,) in the world, N s; it wakes.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+        """
+        number = self._number(name)
+        lever = point - self.state.position[number]
+        self.state.velocity[number] += impulse / self._pieces.mass[number]
+        self.state.spin[number] += self._inverse_inertia(number) @ np.cross(lever, impulse)
+        self.state.moving[number] = True
+
+    def _inverse_inertia(self, number: int) -> Array:
+        rotation = self.state.rotation[number]
+        return np.asarray(rotation @ self.state.inverse[number] @ rotation.T)
+
     def energy(self) -> float:
         """Kinetic and potential energy of the bodies that move by themselves, joules."""
         return self.state.energy(self.gravity)

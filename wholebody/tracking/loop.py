@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.arrays import Array
-from wholebody.checks import array, flag, function, instance, known, time_step
+from wholebody.checks import array, flag, function, instance, known, listed, time_step
 from wholebody.errors import InputError
 from wholebody.geometry.proximity import PENETRATION
 from wholebody.methods.inputs import SEED
@@ -69,6 +69,7 @@ class FrameLoop:
         dt: float = FRAME,
         seed: int = 0,
         rigid: bool = False,
+        touching: Sequence[str] = (),
     ) -> None:
         """Prepare the first frame.
 
@@ -80,9 +81,10 @@ class FrameLoop:
             dt: seconds from frame to frame.
             seed: of all random orders.
             rigid: whether the figure is displaced as a whole, such as a hand, while its joints follow the tracker.
+            touching: names of things that the figure may touch; with "qp" it keeps a millimetre from all others.
 
         Raises:
-            UnknownNameError: another overlap.
+            UnknownNameError: another overlap, or no such thing.
             InputError: the start has the wrong shape, is not finite, or no posture near it is free of overlap.
         """
         check_scene(scene, "FrameLoop")
@@ -90,11 +92,13 @@ class FrameLoop:
         dt = time_step(dt, "dt")
         SEED.check(seed, "seed")
         flag(rigid, "rigid")
-        self.scene, self.overlap, self.count = scene, overlap, 0
+        for name in listed(touching, "FrameLoop: touching", "['ball']"):
+            known(name, scene.objects, "object", "touching")
+        self.scene, self.overlap, self.count, self._touching = scene, overlap, 0, tuple(touching)
         q = array(start, "start", f"a posture of {scene.figure.name}").copy()
-        unreadable = _unreadable(scene, q)
-        if unreadable:
-            raise InputError(f"frame 0: {unreadable}; begin with a posture of {scene.figure.name}")
+        reason = unreadable(scene, q)
+        if reason:
+            raise InputError(f"frame 0: {reason}; begin with a posture of {scene.figure.name}")
         self.shown, self._note = free_start(scene, q, rigid)
         self._workspace = scene.workspace()
         self._strategy = self._strategy_for(overlap, dt, seed, rigid)
@@ -111,11 +115,11 @@ class FrameLoop:
         """
         began = _clocks()
         goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
-        unreadable = _unreadable(self.scene, goal)
+        reason = unreadable(self.scene, goal)
         self._workspace.refresh()
         motion = self._workspace.next_frame()
-        if unreadable:
-            resolution = Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{unreadable}; the figure stays", swept=True)
+        if reason:
+            resolution = Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{reason}; the figure stays", swept=True)
         else:
             resolution = self._strategy.resolve(self.shown, self._readable(goal))
         if motion is not None:
@@ -192,7 +196,7 @@ class FrameLoop:
 
     def _strategy_for(self, overlap: str, dt: float, seed: int, rigid: bool) -> OverlapStrategy:
         if overlap == "qp":
-            return QPStrategy(self.scene, self.shown, dt, rigid)
+            return QPStrategy(self.scene, self.shown, dt, rigid, self._touching)
         if rigid:
             from wholebody.tracking.rigid_translation import RigidTranslation
 
@@ -202,7 +206,7 @@ class FrameLoop:
         return CCDStrategy(self.scene, self.shown, dt, seed)
 
 
-def _unreadable(scene: Scene, q: Array) -> str:
+def unreadable(scene: Scene, q: Array) -> str:
     """Why a tracked posture is invalid, or ""."""
     if q.shape != (scene.model.nq,) or not np.isfinite(q).all():
         return f"the tracked posture is not {scene.model.nq} finite numbers"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -42,7 +43,7 @@ class QPStrategy:
 
     sweep_tolerance = 5e-5
 
-    def __init__(self, scene: Scene, start: Array, dt: float, rigid: bool) -> None:
+    def __init__(self, scene: Scene, start: Array, dt: float, rigid: bool, touching: Sequence[str] = ()) -> None:
         """Prepare for frames of `dt` seconds, from the overlap-free posture `start`, (nq,).
 
         Args:
@@ -50,14 +51,17 @@ class QPStrategy:
             start: (nq,) the present posture.
             dt: seconds from frame to frame.
             rigid: whether the figure is displaced as a whole while its joints follow the tracker.
+            touching: things that the figure may touch; from all others it keeps `CLEARANCE`.
         """
         self.scene, self.dt = scene, dt
         self._pace = Pace(scene.model, pace(scene, dt))
         self._attraction = Attraction(scene.model, start, weights(scene, rigid))
         cones = [ReachCones()] if scene.figure.cones else []
+        mine = [*scene.figure.segments, *(name for name, thing in scene.objects.items() if thing.segment is not None)]
         self.problem = Problem(
-            scene, start, constraints=[self._pace, *cones], measures=[self._attraction], clearance=CLEARANCE
-        )
+            scene, start, constraints=[self._pace, *cones], measures=[self._attraction], clearance=CLEARANCE,
+            touching=[(part, name) for name in touching for part in mine],
+        )  # fmt: skip
         self._tracker = QP().tracker(self.problem, dt)
         self._into_cones = OverlapResolver(scene, scene.workspace()).into_cones if cones else np.array
 

@@ -73,7 +73,7 @@ class Trajectory:
         check_input(clip, scene, progress)
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
         _, solve = banded_solver(self.solver)
-        with scene.lend() as workspace:
+        with scene.borrow() as workspace:
             run = ClipRun(self, terms, workspace, solve, clip.q, self.stretch)
             q, missed = self._freed(run, terms, workspace, clip.q, watch)
             new = None if watch.ended else self._timing(q, terms, workspace.state, solve)
