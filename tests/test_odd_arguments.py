@@ -238,7 +238,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "Scene.move",
         Call(
             lambda **given: scene(path).move(**given),
-            {"name": "ball", "at": (1.0, 1.0, 1.0)},
+            {"name": "ball", "at": (1.0, 1.0, 1.0), "over": 0.1},
             lambda made: made.contacts(q),
         ),
     )
@@ -249,7 +249,14 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Scene.workspace", Call(there.workspace, {})
     yield "Scene.remove", Call(lambda **given: scene(path).remove(**given), {"name": "ball"})
     yield "Scene.state", Call(there.state, {"q": q})
-    yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4})
+    moves = {"ball": ((1.0, 1.0, 1.0), (1.0, 0.9, 1.0))}
+    yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4, "moves": moves})
+    world = {"scene": there, "start": q, "dt": 0.1, "overlap": "qp", "seed": 0, "spring": wb.Spring()}
+    yield "World", Call(wb.World, world, lambda made: made.step(q))
+    yield "World.step", Call(wb.World(there, q).step, {"tracked": q})
+    spring = {"stiffness": 1000.0, "damping": 40.0, "mass": 0.4}
+    yield "Spring", Call(wb.Spring, spring, lambda made: made.transition(0.1))
+    yield "Spring.transition", Call(wb.Spring().transition, {"time": 0.1})
 
     def put(shape: Any) -> Any:
         return wb.Scene(arm).add(shape, name="it").contacts(q)
@@ -442,7 +449,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
 
     followed = {"scene": there, "track": track, "overlap": "qp", "seed": 0, "rigid": False, "progress": print}
     yield "follow", Call(tracking.follow, followed)
-    loop = {"scene": there, "start": q, "overlap": "qp", "dt": 0.1, "seed": 0, "rigid": False}
+    loop = {"scene": there, "start": q, "overlap": "qp", "dt": 0.1, "seed": 0, "rigid": False, "touching": ["ball"]}
     yield "FrameLoop", Call(tracking.FrameLoop, loop, lambda made: made.frame(q))
     yield "FrameLoop.frame", Call(tracking.FrameLoop(there, q).frame, {"tracked": q})
     recording = tracking.follow(there, track)
@@ -511,8 +518,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
     avoided = {"clip": clip, "scene": wb.Scene(arm), "constraints": [], "progress": lambda told: None}
     yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
-    many = {"clips": [clip], "folder": path / "many", "equipment": ["nothing"], "methods": ["frames"], "jobs": 1}
-    yield "avoid_many", Call(wb.avoid_many, {**many, "constraints": [], "hold_feet": True, "progress": print})
+    many = {"clips": [], "folder": path / "many", "equipment": ["nothing"], "methods": ["frames"], "jobs": 1}
+    yield "avoid_many", Call(wb.avoid_many, {**many, "hold_feet": True, "progress": print})
+    given = {"clips": [clip], "constraints": []}
+    yield "avoid_many(case)", Call(partial(wb.avoid_many, folder=path / "many", methods=["frames"]), given)
     yield "avoid_many(figure)", Call(partial(wb.avoid_many, ["walk.npz"], path / "many"), {"figure": arm})
     clip.write(path / "read.npz")
     files = {"files": [path / "read.npz"], "folder": path / "many", "figure": arm, "jobs": 1, "progress": print}
@@ -602,7 +611,7 @@ ANSWERS = (
     "Scene.of_parts", "ClipCheck", "DerivativeCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding",
     "Deviation",
     "Torques", "SphereFilling",
-    "Torques", "SphereFilling", "AvoidedCase", "BatchProgress",
+    "Torques", "SphereFilling", "AvoidedCase", "BatchProgress", "WorldFrame", "Overlap", "EngineFrame", "Event",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 

@@ -270,7 +270,7 @@ class Scene:
         place = to_placement(at, f"{name!r}: at")
         painted = None if color is None else checks.color(color, f"{name!r}: color")
         with self._lock:
-            thing = SceneObject(name, shape, place, to, painted, rests_on, body, material)
+            thing = SceneObject(name, shape, place, to, painted, rests_on, body=body, material=material)
             self._objects[self._new_name(name)] = thing
             self._changed()
         return self

@@ -65,9 +65,8 @@ def test_a_box_slides_as_far_as_friction_lets_it(hand: wb.Figure) -> None:
     scene = floor(hand).add(wb.Box((0.2, 0.2, 0.1)), name="box", at=(3, 0, -1.95 + SKIN), body=body)
     engine = RigidBodies(scene)
     deepest = max(engine.advance(1 / 60).deepest for _ in range(60))
-    assert engine.placement("box").translation[0] - 3.0 == pytest.approx(
-        speed**2 / (2 * mu * G) - speed / 480, abs=5e-4
-    )
+    whole = speed**2 / (2 * mu * G) - speed / 480  # a step moves a body with its velocity at the end: short by v h / 2
+    assert engine.placement("box").translation[0] - 3.0 == pytest.approx(whole, abs=5e-4)
     assert np.abs(engine.twist("box")).max() < 1e-6
     assert deepest == 0.0
 

@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from wholebody import checks
 from wholebody.arrays import Array, Mask
-from wholebody.dynamics import motion_kernel, passing_kernel
+from wholebody.dynamics import contact_kernel, impact_kernel, motion_kernel, passing_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
 from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord
@@ -266,7 +266,8 @@ class RigidBodies:
         gap, normal = self._margin[bodies].sum(axis=1), np.zeros((len(listed), 3))
         gap[listed], normal[listed] = after.distance[found[listed]], after.normal[found[listed]]
         doubtful = passing_kernel.doubtful(
-            near.pair, near.distance, near.normal, gap, normal, near.placements, after.placements, pieces.body,
+            near.pair, np.ascontiguousarray(near.distance), np.ascontiguousarray(near.normal), gap, normal,
+            near.placements, after.placements, pieces.body,
             self.state.position - kept, np.linalg.norm(self.state.spin, axis=1) * time, pieces.levers,
             float(np.linalg.norm(self.gravity)) * time**2 / 8.0, PASSING, *pieces.heights,
         )  # fmt: skip
@@ -288,3 +289,31 @@ class RigidBodies:
 @lru_cache(maxsize=1)
 def compiled_kernel() -> None:
     """Compile the loops or read them back: not in the middle of a frame."""
+    one, none, mask = np.zeros((1, 3)), np.zeros(0, dtype=np.intp), np.ones(1, dtype=bool)
+    unit, vectors, turned = np.eye(3)[None].copy(), np.zeros((0, 3)), np.zeros((1, 4, 3))
+    motion_kernel.drift(one, unit.copy(), one.copy(), one.copy(), unit, unit, mask, mask, mask, np.zeros(3), 1.0)
+    motion_kernel.displace(one, unit.copy(), one, one, mask)
+    motion_kernel.world_inverses(unit, unit, mask, unit.copy())
+    motion_kernel.place_pieces(one, unit, one, np.zeros(1, dtype=np.intp), turned, turned.copy())
+    axes, levers, answers, mobility = (
+        np.zeros((0, 3, 3)),
+        np.zeros((0, 2, 3, 3)),
+        np.zeros((0, 2, 3, 3)),
+        np.zeros((0, 2)),
+    )
+    some, mass = np.zeros(0), np.zeros(1)
+    contact_kernel.frames(none, none, vectors, vectors, one, mass, unit, axes, levers, answers, mobility)
+    contact_kernel.solve(none, none, none, axes, levers, answers, mobility, some, some, mass, one, one, vectors, 1.0, 1)
+    contact_kernel.residuals(none, none, axes, levers, mobility, some, some, one, one, vectors)
+    contact_kernel.apply(none, none, axes, answers, mass, one, one, vectors)
+    contact_kernel.start_from(none, vectors, vectors, none, none, vectors, axes, 1.0, vectors)
+    impact_kernel.resolve(
+        none, none, none, none, axes, levers, answers, mobility, some, some, mass, one, one, 1.0, 1, vectors,
+        np.zeros((1, 5)),
+    )  # fmt: skip
+    pairs = np.zeros((0, 2), dtype=np.intp)
+    passing_kernel.doubtful(
+        pairs, some, vectors, some, vectors, turned, turned, none, one, mass, mass, 0.0, 1.0, vectors,
+        none, none, some, vectors, np.zeros((0, 4)),
+    )  # fmt: skip
+    passing_kernel.join(none, none, none, none)

@@ -19,7 +19,7 @@ from wholebody.motion.avoidance import Avoided, as_avoider, avoid
 from wholebody.motion.avoider import Avoider
 from wholebody.motion.batch_table import AvoidedCase, BatchTable, first_twice
 from wholebody.motion.clip import Clip
-from wholebody.motion.frame_terms import Given
+from wholebody.motion.frame_terms import Given, frame_terms
 from wholebody.motion.measures import deviation, foot_sliding, jerk_ratio
 from wholebody.motion.reading import read_clip
 from wholebody.motion.ready_equipment import NOTHING, Worn, dressed, label
@@ -29,6 +29,7 @@ from wholebody.version import __version__
 
 MOST_JOBS = 4096
 ENDLESS = 0.0  # s: no deadline
+DT = 1.0 / 30.0  # s: of the frame with which constraints are tried
 
 Source = Clip | str | os.PathLike[str]
 
@@ -121,8 +122,8 @@ def avoid_many(
     checks.function(progress, f"{what}: progress")
     owners = [source.figure if isinstance(source, Clip) else figure for source in sources.values()]
     for owner in {id(owner): owner for owner in owners if owner is not None}.values():
-        for one in pieces:
-            dressed(owner, one)  # what does not fit is said before anything is computed
+        for one in pieces:  # what does not fit is said before anything is computed
+            frame_terms(dressed(owner, one), owner.neutral[None], DT, tuple(given))
     table = BatchTable(checks.path(folder, f"{what}: folder"))
     marks, faults = _originals(sources, figure, table, jobs, cluster)
     held = _Held(tuple(given), hold_feet)

@@ -8,7 +8,7 @@ where it was in that frame, and `Freeze("root")` keeps the root's motion.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from wholebody.checks import a, listed
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.motion.stance import StanceFeet, held_feet, standing
+from wholebody.motion.stance_places import shifts
 from wholebody.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal
 from wholebody.tasks.checks import check_rows
@@ -37,6 +38,7 @@ class FrameTerms:
         dt: seconds from frame to frame.
         given: the terms as they were given, without `StanceFeet`.
         stands: for each frame, frames of the feet that stand there and are held.
+        shifts: for each frame, by how much each of them is held beside where it was (3,), metres.
     """
 
     scene: Scene
@@ -44,12 +46,23 @@ class FrameTerms:
     dt: float
     given: tuple[Constraint | Goal | Bound, ...]
     stands: tuple[tuple[str, ...], ...]
+    shifts: tuple[tuple[Array, ...], ...]
+    _held: dict[int, tuple[HeldTerm, ...]] = field(default_factory=dict, init=False, repr=False)
 
     def held(self, frame: int) -> tuple[HeldTerm, ...]:
         """Constraints and goals of a frame, resolved at its original posture."""
-        terms = [term for term in self.given if not isinstance(term, Bound)]
-        feet = held_feet(self.scene.figure, self.stands[frame])
-        return tuple(term.resolve(self.scene, self.q[frame]) for term in (*terms, *feet))
+        if frame not in self._held:
+            terms: list[HeldTerm] = [term for term in self.given if not isinstance(term, Bound)]
+            resolved = [term.resolve(self.scene, self.q[frame]) for term in terms]
+            for foot in held_feet(self.scene.figure, self.stands[frame]):
+                held = foot.resolve(self.scene, self.q[frame])
+                shift = self.shifts[frame][self.stands[frame].index(foot.frame)]
+                if shift.any():
+                    at = pin.SE3(held.kept_at.rotation, held.kept_at.translation + shift)
+                    held = replace(foot, at=at).resolve(self.scene, self.q[frame])
+                resolved.append(held)
+            self._held[frame] = tuple(resolved)
+        return self._held[frame]
 
     def bounds(self, frame: int, state: State) -> tuple[Array, Array, Array, Array]:
         """Bounds of a frame.
@@ -88,8 +101,8 @@ class FrameTerms:
         """
         places = np.asarray(times) / self.dt
         nearest = np.clip(np.rint(places).astype(int), 0, len(self.q) - 1)
-        stands = tuple(self.stands[frame] for frame in nearest)
-        return replace(self, q=between(self.scene.model, self.q, places), stands=stands)
+        stands, shifts = (tuple(each[frame] for frame in nearest) for each in (self.stands, self.shifts))
+        return replace(self, q=between(self.scene.model, self.q, places), stands=stands, shifts=shifts)
 
     def missed(self, frame: int, state: State) -> float:
         """By how much the state, of the posture of a frame, misses what is held there, metres and radians."""
@@ -138,7 +151,8 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given])
                 "wb.StanceFeet()"
             )
     plain = tuple(term for term in given if not isinstance(term, StanceFeet))
-    return FrameTerms(scene, q, dt, plain, tuple(map(tuple, feet)))
+    stands = tuple(map(tuple, feet))
+    return FrameTerms(scene, q, dt, plain, stands, shifts(scene.figure, q, stands))
 
 
 def _try(term: HeldTerm, scene: Scene, q: Array, where: str) -> None:

@@ -1,8 +1,8 @@
-"""Method "frames": every frame by tracking the original posture, with the frame before as its start.
+"""Method "frames": every frame by tracking the original posture, from the deviation of the frame before.
 
 A forward pass follows the original motion as contacts let it. It is late where contact begins, so a backward pass
 follows it from the last frame to the first, and both are blended. What overlaps after that is put right by steps of the
-tracker.
+tracker, dips between frames by more room beside them, and what is left then by `wholebody.motion.mending`.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from wholebody.figures.state import State
 from wholebody.methods.qp.method import QP
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
-from wholebody.motion.dips import dips
+from wholebody.motion.dips import dipping
 from wholebody.motion.faults import DEPTH, depth, faults
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
+from wholebody.motion.mending import Mender
 from wholebody.motion.windows import Window, windows
 from wholebody.problem import Problem
 from wholebody.scene import Scene
@@ -33,7 +34,7 @@ MARGIN = 0.3  # s, before and after a collision: in which the pass begins and en
 BACK = 1e-4  # rad, m: a posture this near to the original one is the original one
 MOST = 3  # steps of one frame; more = nearer to the original where much is in the way, dearer frames
 ROOM = 5e-4  # m: more room that the frames beside a dip are first asked for; it doubles from round to round
-LIFTS = 6  # rounds of asking for more
+LIFTS = 3  # rounds of asking for more
 STEP = 1e-3  # rad, m: a step no longer than this ends a frame
 
 
@@ -83,8 +84,7 @@ class Follower:
         goal = Posture(terms.q[number]).resolve(terms.scene, problem.start)
         held = terms.held(number)
         problem.goals = (goal, *(term for term in held if isinstance(term, Goal)))
-        if held:
-            problem.constraints = tuple(term for term in held if isinstance(term, Constraint))
+        problem.constraints = tuple(term for term in held if isinstance(term, Constraint))
         for _ in range(MOST):
             step = self._tracker.step(q)
             self.programs += 1
@@ -136,8 +136,11 @@ class PerFrame:
                 self._free(window, q, terms, follower, workspace)
                 _lift(window, q, follower, workspace)
                 done += len(window)
+            mender = Mender(terms, workspace, self.clearance)
+            if found and not watch.ended:
+                q = mender.mend(q, watch)
         ended = "the caller ended it" if watch.ended else ""
-        return MethodResult(q, 0, 0 if follower is None else follower.programs, ended)
+        return MethodResult(q, 0, mender.programs + (0 if follower is None else follower.programs), ended)
 
     def _free(self, window: Window, q: Array, terms: FrameTerms, follower: Follower, workspace: Workspace) -> None:
         forward = _passed(follower, terms, range(window.first, window.end))
@@ -155,23 +158,27 @@ class PerFrame:
 
 
 def _passed(follower: Follower, terms: FrameTerms, frames: range) -> Array:
-    """(n, nq) postures of frames, each begun at the one before."""
-    found, here = [], terms.scene.figure.clamp(terms.q[frames[0]])
+    """(n, nq) postures of frames, each begun at its original posture with the deviation of the one before."""
+    model, figure, found = terms.scene.model, terms.scene.figure, list[Array]()
+    away = np.zeros(model.nv)
     for frame in frames:
+        # the motion goes on as the original one does; without that a foot would wait behind the one that stands
+        here = figure.clamp(np.asarray(pin.integrate(model, terms.q[frame], away)))
         here = follower.frame(frame, here)
         found.append(here)
+        away = np.asarray(pin.difference(model, terms.q[frame], here))
     return np.array(found)
 
 
 def _lift(window: Window, q: Array, follower: Follower, workspace: Workspace) -> None:
-    """Ask for more room in the frames on both sides of motions that dip, until none does."""
+    """Ask for more room in the frames on both sides of motions that dip, a few times.
+
+    Most dips are arcs between two postures in contact, and less than a millimetre deep.
+    """
     more = np.zeros(len(q))
     gaps = list(range(max(0, window.first - 1), min(len(q) - 1, window.end)))
     for _ in range(LIFTS):
-        dipping = list(dips(workspace, q, gaps))
-        if not dipping:
-            return
-        frames = sorted({frame + end for frame in dipping for end in (0, 1)})
+        frames = sorted({frame + end for frame in dipping(workspace, q, gaps) for end in (0, 1)})
         for frame in frames:
             more[frame] = 2.0 * more[frame] + ROOM
             q[frame] = follower.frame(frame, q[frame], float(more[frame]))

@@ -19,7 +19,7 @@ class DragFrame(NamedTuple):
     """Answer of one frame of a drag.
 
     Attributes:
-        q: (nq,) the posture; of an assembly (7 n,) its variables.
+        q: (nq,) the posture, of an assembly that of its `scene`.
         error: largest remaining goal error, metres or radians.
         iterations: iterations of the method.
         seconds: wall time.
@@ -50,8 +50,8 @@ class AssemblyDrag:
 
     @property
     def q(self) -> Array:
-        """(7 n,) the placements of the bodies."""
-        return self.assembly.variables()
+        """(nq,) the placements of the bodies as a posture of the assembly's `scene`."""
+        return self.assembly.q
 
     def to(self, target: Any) -> DragFrame:
         """Move the goal to a position, or a placement, and make one frame towards it.
@@ -76,7 +76,7 @@ class AssemblyDrag:
         finally:
             made.retarget(goal, target)
         left = max(made.goal_error(number) for number in range(len(made.goals)))
-        return DragFrame(made.variables(), left, spent, time.perf_counter() - began)
+        return DragFrame(made.q, left, spent, time.perf_counter() - began)
 
     def finish(self) -> AssemblySolution:
         """Meet the present goals with full accuracy."""

@@ -212,8 +212,14 @@ class Drag(Generic[Answer]):
 
     @property
     def q(self) -> Array:
-        """(nq,) the present posture; of an assembly (7 n,) its variables."""
+        """(nq,) the present posture; of an assembly that of its `scene`."""
         return self._run.q
+
+    @q.setter
+    def q(self, q: Array) -> None:
+        if isinstance(self._run, AssemblyDrag):
+            raise InputError("Drag: the posture of an assembly is set by assembly.place(variables)")
+        self._run.q = q
 
     @property
     def problem(self) -> Problem | Assembly:

@@ -18,9 +18,10 @@ class _Colored:
 
 
 class ViewedAssembly:
-    """The bodies and things that an assembly has now; a posture is `assembly.variables()` or `solution.q`.
+    """The bodies and things that an assembly has now.
 
-    Bodies without shapes are not drawn. Things that are moved are shown where they are.
+    A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn. Things
+    that are moved are shown where they are.
     """
 
     figure = None
@@ -34,7 +35,7 @@ class ViewedAssembly:
         self.objects = MappingProxyType({name: _Colored(_color(assembly, name)) for name in self.piece_owner})
 
     def contacts(self, q: Array, within: float = 0.05) -> Contacts:
-        """Pairs nearer than `within` metres at the variables q (7 n,), nearest first."""
+        """Pairs nearer than `within` metres at the posture q (nq,), nearest first."""
         return self._scene.contacts(q, within)
 
 

@@ -67,7 +67,7 @@ class Viewer:
         """Prepare to show a scene.
 
         Args:
-            scene: a `wholebody.Scene`, or an assembly whose bodies have shapes; its postures are its variables.
+            scene: a `wholebody.Scene`, or an assembly whose bodies have shapes; its posture is `assembly.q`.
             contact_distance: pieces nearer than this are shown as touching, metres.
             see_through: names of things to draw transparent, so that they do not hide the figure.
             names: whether to write the names of things beside them.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -31,6 +31,9 @@ from wholebody.methods.newton.patterns import Patterns
 from wholebody.methods.newton.system import System
 from wholebody.pool import OneAtATime
 from wholebody.tasks.inputs import point
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 FINEST = 1e-12  # m, rad: least tolerance; below it only rounding remains
 FRAME_TOLERANCE = 1e-4  # m, rad: of the goals in the frames of a drag
@@ -240,7 +243,7 @@ class Assembly(AssemblyJoints):
             x, solution = solved(
                 self.bodies, active, start,
                 tolerance=tolerance, iterations=iterations, kind=inequalities,
-                nearest=prepared.nearest() if nearest else None, scene=self._solid_scene(),
+                nearest=prepared.nearest() if nearest else None, scene=self._solid_scene(), to_scene=self.to_scene,
             )  # fmt: skip
             self._places = list(x.reshape(-1, 7))
             return solution
@@ -268,10 +271,14 @@ class Assembly(AssemblyJoints):
                 early_exit=True,
             )  # fmt: skip
             holds = found.hard <= max(10.0 * HARD_TOLERANCE, float(np.abs(wrong).max(initial=0.0)))
-            taken = holds and (active.contacts is None or is_free(active.workspace, start, found.x, SHORT))
+            taken = holds and (active.contacts is None or self._is_free(active, start, found.x))
             if taken:
                 self._places = list(found.x.reshape(-1, 7))
             return AssemblyStep(found.goal, found.hard, found.iterations, found.systems, taken)
+
+    def _is_free(self, active: AssemblySystem, before: Array, after: Array) -> bool:
+        """Whether the motion of a frame passes through nothing."""
+        return is_free(active.workspace, self.to_scene(before), self.to_scene(after), SHORT)
 
     def _ready(self, algebra: str | None) -> _Prepared:
         """The equations as they stand; None for the factorisation of the last solve."""
@@ -280,8 +287,8 @@ class Assembly(AssemblyJoints):
         if found is None or (found.algebra, found.revision) != (name, self.revision):
             held, count, weight = self._held(), len(self._places), self._weight()
             active = AssemblySystem(
-                held, list(self._figures.values()), self._solid_scene(), self.clearance,
-                lambda: Patterns(count, weight, name),
+                held, list(self._figures.values()), self._solid_scene(), self.to_scene, self.clearance,
+                Patterns(count, weight, name),
             )  # fmt: skip
             self._analysed = self.structures
             found = self._prepared = _Prepared(name, self.revision, active)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -37,6 +37,8 @@ from wholebody.tasks.base import Bound, Constraint
 from wholebody.tasks.inputs import target_placement
 
 if TYPE_CHECKING:
+    from typing_extensions import Self
+
     Color = tuple[float, float, float, float]
 
 WORLD = "world"
@@ -57,6 +59,7 @@ class AssemblyBodies:
         self._colors: dict[str, Color] = {}
         self._figures: dict[str, AssemblyFigure] = {}
         self._things: dict[str, SceneObject] = {}
+        self._parts: list[str] = []  # names of bodies and figures, in the order of their bodies
         self._apart: set[frozenset[str]] = set()
         self._joined: set[frozenset[int]] = set()
         self._stuck: list[tuple[int, int]] = []
@@ -97,6 +100,7 @@ class AssemblyBodies:
         length = rim(given, SIZE) if size is None else check_length(size, f"{where}: size")
         placed = pin.SE3ToXYZQUAT(target_placement(at, where))
         painted = None if color is None else checked_color(color, f"{where}: color")
+        self._parts.append(name)
         self._frames[name] = len(self._places), pin.SE3.Identity()
         self._names[name] = len(self._places)
         self._places.append(np.array(placed))
@@ -137,6 +141,7 @@ class AssemblyBodies:
         painted = None if color is None else checked_color(color, f"figure {name!r}: color")
         part = AssemblyFigure(name, Problem(Scene(figure), start, constraints=constraints), len(self._places))
         part.batches(0)  # refuses what has no equations here
+        self._parts.append(name)
         self._figures[name] = part
         for frame, index, local in part.frames():
             self._frames[frame] = index, pin.SE3.Identity() if local is None else pin.SE3(local)
@@ -184,6 +189,23 @@ class AssemblyBodies:
     def variables(self) -> Array:
         """(7 n,) the placements of the bodies."""
         return np.concatenate(self._places) if self._places else np.zeros(0)
+
+    @property
+    def q(self) -> Array:
+        """(nq,) the present posture of `scene`: seven numbers for each body, and the posture of each figure."""
+        return self.to_scene(self.variables())
+
+    def to_scene(self, variables: Array) -> Array:
+        """The posture (nq,) of `scene` at variables (7 n,); the same numbers if there are no figures."""
+        if not self._figures:
+            return variables
+        parts = [
+            self._figures[name].posture(variables)
+            if name in self._figures
+            else variables[7 * self._names[name] : 7 * self._names[name] + 7]
+            for name in self._parts
+        ]
+        return np.concatenate(parts)
 
     def place(self, variables: Any) -> Self:
         """Set the placements of the bodies.
@@ -261,9 +283,9 @@ class AssemblyBodies:
 
     @property
     def scene(self) -> Scene:
-        """The bodies among the things, with the pairs that are tested; its postures are `variables()`.
+        """The bodies among the things, with the pairs that are tested; its present posture is `q`.
 
-        It is for questions: `scene.contacts(variables)`, `scene.penetration`, `scene.sweep`. Add and move things by the
+        It is for questions: `scene.contacts(q)`, `scene.penetration`, `scene.sweep`. Add and move things by the
         assembly. After bodies, things or joints were added it is another one.
         """
         if self._scene is None:
@@ -281,7 +303,11 @@ class AssemblyBodies:
             own = [
                 pair for name, part in self._figures.items() for pair in figure_pairs(name, part.problem.scene.figure)
             ]
-            loose = LooseBodies(self._names, owners, lambda one, other: self._tested(one, other, still), own)
+            parts: list[str | tuple[str, Figure]] = [
+                (name, self._figures[name].problem.scene.figure) if name in self._figures else name
+                for name in self._parts
+            ]
+            loose = LooseBodies(parts, owners, lambda one, other: self._tested(one, other, still), own)
             self._scene = scene_of(loose, self._things, apart)
         return self._scene
 

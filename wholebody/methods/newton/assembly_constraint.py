@@ -27,7 +27,7 @@ class AssemblyConstraint(ABC):
         one_sided: False for residual = 0, True for residual >= 0.
     """
 
-    bodies: tuple[str, ...] = ()
+    bodies: tuple[str, ...]
     one_sided: bool = False
 
     @abstractmethod
@@ -102,9 +102,10 @@ def names_of(term: AssemblyConstraint, label: str) -> list[str]:
     Raises:
         InputError: there are none, or one is twice in the list.
     """
-    names = [text(name, f"{label}: a name in bodies") for name in listed(term.bodies, f"{label}: bodies", "('crank',)")]
+    given = getattr(term, "bodies", ())
+    names = [text(name, f"{label}: a name in bodies") for name in listed(given, f"{label}: bodies", "('crank',)")]
     if not names or len(set(names)) < len(names):
-        raise InputError(f"{label}: bodies is {shown(term.bodies)}; name at least one body, and each once")
+        raise InputError(f"{label}: bodies is {shown(given)}; name at least one body, and each once")
     return names
 
 

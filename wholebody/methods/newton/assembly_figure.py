@@ -37,6 +37,7 @@ class AssemblyFigure:
         self.name, self.problem, self.first = name, problem, first
         self.bodies = FigureBodies(problem.scene.figure)
         self._limits = self.bodies.limits()
+        self._q = problem.start
         self._equations = [
             self.bodies.equations,
             constraint_equations(problem, self.bodies),
@@ -53,7 +54,7 @@ class AssemblyFigure:
     @property
     def last(self) -> int:
         """Index of the body after its last one."""
-        return self.first + self.bodies.count
+        return self.first + int(self.bodies.count)
 
     def batches(self, world: int) -> list[tuple[Batch, Key]]:
         """Joints, limits and constraints, with the assembly's indices of bodies; `world` is the index of the world.
@@ -86,11 +87,12 @@ class AssemblyFigure:
 
     def retract(self, x: Array) -> None:
         """Move the figure's bodies, among the assembly's variables x (7 n,), to the nearest posture."""
-        x[7 * self.first : 7 * self.last] = self.variables(self.posture(x))
+        self._q = self.posture(x)
+        x[7 * self.first : 7 * self.last] = self.variables(self._q)
 
-    def aim(self, x: Array) -> None:
-        """Set the rows of the limits to the nearer limits at x (7 n,)."""
-        self.bodies.aim(self._limits, self.posture(x))
+    def aim(self) -> None:
+        """Set the rows of the limits to the nearer limits at the last posture of `retract`."""
+        self.bodies.aim(self._limits, self._q)
 
     def frames(self) -> list[tuple[str, int, Any]]:
         """Name, index of the body, and placement in it (pin.SE3) of the figure's bodies and frames."""

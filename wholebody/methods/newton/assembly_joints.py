@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -21,6 +21,9 @@ from wholebody.methods.newton.equations import EquationSet, axes_along
 from wholebody.methods.newton.joint_register import JointRegister
 from wholebody.methods.newton.surfaces import OnSurface, surface
 from wholebody.tasks.inputs import direction, point, target_placement
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 
 class AssemblyJoints(AssemblyBodies):
@@ -129,8 +132,8 @@ class AssemblyJoints(AssemblyBodies):
             raise InputError(f"{what}: a body cannot stay on a plane of its own; name another one")
         unit = in_a.rotation @ direction(normal, f"{what}: normal")
         height = float(unit @ in_a.act(point(through, f"{what}: through")))
-        place = in_b.act(point(place, f"{what}: place"))
-        self._holding.slide(a, b, what, unit, place, height, above=side == "above")
+        local = np.array(in_b.act(point(place, f"{what}: place")))
+        self._holding.slide(a, b, what, unit, local, height, above=side == "above")
         return self._changed()
 
     def on_surface(self, body: str, place: ArrayLike, *, of: str) -> Self:
@@ -148,10 +151,9 @@ class AssemblyJoints(AssemblyBodies):
         what = f"the surface of {shown(of)} under {shown(body)}"
         b, in_b = self._moved(body, what)
         known(of, [*self._solids, *self._things], "body or thing with a shape", what)
-        if of in self._things:
-            a, listed = -1, ((self._things[of].shape, self._things[of].placement),)
-        else:
-            a, listed = self._names[of], self._solids[of]
+        a = -1 if of in self._things else self._names[of]
+        thing = self._things.get(of)
+        listed = self._solids[of] if thing is None else ((thing.shape, thing.placement),)
         if a == b:
             raise InputError(f"{what}: a point cannot stay on a surface of its own body; name another one")
         if len(listed) != 1:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,7 +41,8 @@ class AssemblySolution:
         penetration: depth of the deepest overlap of the tested pairs at the end, metres; judged by coal for all pairs
             at once. 0 without shapes.
         least_distance: of the tested pairs, metres; inf without shapes.
-        path: (k, 7 n) the states on the way, the first as before the solve and the last as after it.
+        path: (k, nq) the states on the way as postures of the assembly's `scene`, the first as before the solve and the
+            last as after it.
         message: one sentence that explains the status and names bodies.
     """
 
@@ -60,7 +61,7 @@ class AssemblySolution:
 
     @property
     def q(self) -> Array:
-        """(7 n,) the placements as one array, which the viewer shows."""
+        """(nq,) the placements as a posture of the assembly's `scene`, which the viewer shows."""
         result: Array = self.path[-1]
         return result
 
@@ -80,12 +81,13 @@ def solved(
     kind: Kind,
     nearest: QuasiDefinite | None,
     scene: Scene | None,
+    to_scene: Callable[[Array], Array],
 ) -> tuple[Array, AssemblySolution]:
     """Solve from the variables `before` (7 n,); where the bodies end, as variables and in words.
 
     With `nearest`, the factorisation of the system's KKT matrix, they end at the place nearest to `before`.
     """
-    found = reach(active_system, before, tolerance=tolerance, iterations=iterations, kind=kind)
+    found = reach(active_system, before, tolerance=tolerance, iterations=iterations, kind=kind, settle=True)
     system, x = active_system.system, found.x
     nearness: tuple[float, ...] = ()
     if nearest is not None and found.met:
@@ -106,7 +108,7 @@ def solved(
     least = np.inf
     if scene is not None:
         with scene.built.pool(AllPairs, lambda: AllPairs(scene.built)).lend() as pairs:
-            pairs.move(x)
+            pairs.move(to_scene(x))
             least = pairs.least
     path = active_system.path
     if not np.array_equal(path[-1], x):
@@ -123,6 +125,6 @@ def solved(
         nearness=nearness,
         penetration=max(0.0, -least),
         least_distance=least,
-        path=np.array(path),
+        path=np.array([to_scene(state) for state in path]),
         message=message,
     )

@@ -28,11 +28,12 @@ class AssemblySystem(ActiveSystem):
     Attributes:
         patterns: what was laid out and analysed.
         path: the accepted states (7 n,) since `begin`.
+        q: (nq,) posture of the scene at the last `retract`, if pairs can touch.
     """
 
     def __init__(
-        self, held: Batches, figures: Sequence[AssemblyFigure], scene: Scene | None, clearance: float,
-        patterns: Callable[[], Patterns],
+        self, held: Batches, figures: Sequence[AssemblyFigure], scene: Scene | None,
+        to_scene: Callable[[Array], Array], clearance: float, patterns: Patterns,
     ) -> None:  # fmt: skip
         """Build the equations.
 
@@ -40,12 +41,13 @@ class AssemblySystem(ActiveSystem):
             held: what must hold.
             figures: whose bodies are placed by their postures.
             scene: the bodies among things, whose pairs can touch; None without pairs.
+            to_scene: the scene's posture (nq,) at variables (7 n,).
             clearance: least distance of every pair, metres.
-            patterns: makes an empty collection of patterns.
+            patterns: that were laid out; none yet.
         """
         self._held, self._figures = list(held), list(figures)
         self._goals: list[tuple[Batch, Key]] = []
-        self.patterns = patterns()
+        self.patterns, self._to_scene = patterns, to_scene
         self.contacts: ContactSet | None = None
         if scene is not None and len(scene.pair_table.pairs):
             self.workspace = scene.workspace()
@@ -55,7 +57,7 @@ class AssemblySystem(ActiveSystem):
         self._laid: Hashable = None
         self._goals_laid: Hashable = None
         self.path: list[Array] = []
-        self._here = self._left = np.zeros(0)
+        self._here = self._left = self.q = np.zeros(0)
         self._fresh = True
 
     def begin(self, x: Array, goals: Batches) -> Array:
@@ -77,7 +79,8 @@ class AssemblySystem(ActiveSystem):
         for figure in self._figures:
             figure.retract(x)
         if self.contacts is not None:
-            pin.forwardKinematics(self.workspace.model, self._data, x)
+            self.q = self._to_scene(x)
+            pin.forwardKinematics(self.workspace.model, self._data, self.q)
             self.contacts.measure(self._data)
         self._here = x
         return x
@@ -88,19 +91,19 @@ class AssemblySystem(ActiveSystem):
 
     def passes(self) -> bool:
         """Whether the motion to the result of the last `retract` neither jumps over something nor ends deep in it."""
-        return self.contacts is None or self.contacts.passes(self._left, self._here)
+        return self.contacts is None or self.contacts.passes(self._left, self.q)
 
     def arrive(self, x: Array) -> bool:
         """Renew limits and contacts at x; returns whether the pattern changed."""
         x = self.retract(x)
-        self._left = x
+        self._left = self.q
         if not self.path or not np.array_equal(self.path[-1], x):
             self.path.append(x)
         if self.contacts is None and not self._figures and not self._fresh:
             return False  # nothing depends on the state
         self._fresh = False
         for figure in self._figures:
-            figure.aim(x)
+            figure.aim()
         batches = [*self._held, *self._goals]
         laid: Hashable = self._goals_laid
         if self.contacts is not None:

@@ -63,6 +63,7 @@ class Iteration:
         self.begin(active_system.retract(x))
         self.residuals = [max(self.hard, self.goal)]
         self.systems, self.stationary = 0, False
+        self.least_damping = 0.0
 
     @property
     def met(self) -> bool:
@@ -104,7 +105,7 @@ class Iteration:
             measures: minimised, kept from growing, or ignored.
             early_exit: end at the first step that gains little, as in a frame whose goal lies inside something.
         """
-        damping, share, pull, stagnant = 0.0, 1.0, PULL, 0
+        damping, share, pull, stagnant = self.least_damping, 1.0, PULL, 0
         self.stationary = False
         least = sum(self._norms(self.residual))
         refused = 0
@@ -159,7 +160,7 @@ class Iteration:
             self.advance(trial, length)
             gain = before[1] - promised[1]
             if restore or before[1] - after[1] >= GOOD * gain:
-                damping = damping * DAMPING_DOWN if damping > FIRST_DAMPING else 0.0
+                damping = max(damping * DAMPING_DOWN if damping > FIRST_DAMPING else 0.0, self.least_damping)
             elif gain > self.goal_tolerance and before[1] - after[1] < POOR * gain:
                 damping = max(FIRST_DAMPING, damping * DAMPING_UP)
             share, pull = min(1.0, 2.0 * share), min(PULL, 2.0 * pull)

@@ -13,7 +13,7 @@ from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
-from wholebody.motion.bisection.gaps import Gaps, hold_between
+from wholebody.motion.bisection.gaps import hold_between
 from wholebody.motion.bisection.interpolation import Kind
 from wholebody.motion.bisection.key_frames import key_frames
 from wholebody.motion.bisection.path_planes import ANKLES, ELBOWS
@@ -22,6 +22,7 @@ from wholebody.motion.bisection.recursion import Recursion, changed_frames
 from wholebody.motion.bisection.stays import Stays
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import Given, frame_terms
+from wholebody.motion.mending import Mender
 from wholebody.scene import Scene
 
 OVERLAP = 5e-5
@@ -129,11 +130,12 @@ class Bisection:
             )
             recursion.run(self._points(figure, original, frozen))
             missed = hold_between(recursion, predictor, changed_frames(original, recursion.q), watch)
-            gaps = Gaps(scene, recursion, predictor, workspace, OVERLAP, watch)
-            gaps.close()
-        return MethodResult(
-            recursion.q, recursion.predictions, recursion.programs, _message(recursion, missed, gaps, watch)
-        )
+            mender = Mender(terms, workspace, frozen=figure.dofs(frozen))
+            q = mender.mend(recursion.q, watch)
+            for frame in changed_frames(recursion.q, q):
+                q[frame] = stays.applied(frame, q[frame])
+        programs = recursion.programs + mender.programs
+        return MethodResult(q, recursion.predictions, programs, _message(recursion, missed, watch))
 
     def _points(self, figure: Figure, original: Array, frozen: tuple[str, ...]) -> tuple[int, ...]:
         """The evaluation points of a clip."""
@@ -144,7 +146,7 @@ class Bisection:
         return key_frames(figure.model, original, moving, CHARACTER)
 
 
-def _message(recursion: Recursion, missed: list[int], gaps: Gaps, watch: Watch) -> str:
+def _message(recursion: Recursion, missed: list[int], watch: Watch) -> str:
     """What did not succeed, in one sentence; empty where all did."""
     said = []
     bad = np.flatnonzero(recursion.bad).tolist()
@@ -156,11 +158,6 @@ def _message(recursion: Recursion, missed: list[int], gaps: Gaps, watch: Watch) 
         said.append(f"{_frames(bad)} still overlap{'s' if len(bad) == 1 else ''}")
     if missed:
         said.append(f"what is held does not hold in {_frames(missed)}")
-    dips = sorted(gap for gap in gaps.left if not recursion.bad[gap : gap + 2].any())
-    if dips:
-        said.append(f"{gaps.left[dips[0]]} overlap between frames {dips[0]} and {dips[0] + 1}")
-        if len(dips) > 1:
-            said[-1] += f", as do others in {len(dips) - 1} more gaps"
     if watch.ended:
         said.append("it was ended before it was done")
     return "; ".join(said)
