@@ -22,6 +22,7 @@ import pytest
 
 import wholebody as wb
 from wholebody import tracking
+from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.state import State
 from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
@@ -254,6 +255,28 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     world = {"scene": there, "start": q, "dt": 0.1, "overlap": "qp", "seed": 0, "spring": wb.Spring()}
     yield "World", Call(wb.World, world, lambda made: made.step(q))
     yield "World.step", Call(wb.World(there, q).step, {"tracked": q})
+    body = {"mass": 0.5, "material": "wood", "velocity": (0.1, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.1)}
+
+    def loose(body: Any) -> Any:
+        return wb.Scene(arm).add(wb.Sphere(0.1), name="ball", at=(1.0, 1.0, 1.0), body=body)
+
+    yield "Body", Call(wb.Body, body, lambda made: RigidBodies(loose(made)).advance(0.1))
+    yield "Body(density)", Call(wb.Body, {"density": 500.0}, lambda made: RigidBodies(loose(made)).advance(0.1))
+    material = {"name": "glass", "against": {"wood": (0.5, 0.1)}, "others": (0.5, 0.1)}
+    yield "Material", Call(wb.Material, material, lambda made: RigidBodies(loose(wb.Body(material=made))))
+    engine = RigidBodies(loose(wb.Body()))
+    yield "RigidBodies", Call(RigidBodies, {"scene": loose(wb.Body()), "gravity": (0.0, 0.0, -9.8)})
+    still = {"link1": (np.eye(4), np.eye(4))}
+    yield "RigidBodies.advance", Call(engine.advance, {"dt": 0.1, "kinematic": None})
+    yield "RigidBodies.advance(kinematic)", Call(engine.advance, {"dt": 0.1, "kinematic": still})
+    for name in ("placement", "twist"):
+        yield f"RigidBodies.{name}", Call(getattr(engine, name), {"name": "ball"})
+    for name in ("energy", "momentum"):
+        yield f"RigidBodies.{name}", Call(getattr(engine, name), {})
+    point = {"name": "ball", "point": (1.0, 1.0, 1.0)}
+    for name in ("velocity_at", "mobility"):
+        yield f"RigidBodies.{name}", Call(getattr(engine, name), point)
+    yield "RigidBodies.push", Call(engine.push, {**point, "impulse": (0.0, 0.1, 0.0)}, lambda _: engine.energy())
     spring = {"stiffness": 1000.0, "damping": 40.0, "mass": 0.4}
     yield "Spring", Call(wb.Spring, spring, lambda made: made.transition(0.1))
     yield "Spring.transition", Call(wb.Spring().transition, {"time": 0.1})
