@@ -470,7 +470,15 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Parts.posture(at)", Call(lambda at: one.posture({"one": at}), {"at": at})
     yield "Parts.contacts", Call(one.contacts, {"q": one.posture({"one": at}), "within": 0.1})
 
-    followed = {"scene": there, "track": track, "overlap": "qp", "seed": 0, "rigid": False, "progress": print}
+    followed = {
+        "scene": there,
+        "track": track,
+        "overlap": "qp",
+        "seed": 0,
+        "rigid": False,
+        "progress": print,
+        "moves": None,
+    }
     yield "follow", Call(tracking.follow, followed)
     loop = {"scene": there, "start": q, "overlap": "qp", "dt": 0.1, "seed": 0, "rigid": False, "touching": ["ball"]}
     yield "FrameLoop", Call(tracking.FrameLoop, loop, lambda made: made.frame(q))
