@@ -147,9 +147,7 @@ def _stairs(scene: Scene) -> None:
 
 
 def _things_to_walk_into(scene: Scene) -> None:
-    scene.add(
-        Box((0.30, 0.40, 0.50)), name="carton", at=(0.75, -0.1, 0.25 + GAP), color=OAK, body=Body(density=60.0)
-    )
+    scene.add(Box((0.30, 0.40, 0.50)), name="carton", at=(0.75, -0.1, 0.25 + GAP), color=OAK, body=Body(density=60.0))
     scene.add(
         Box((0.25, 0.30, 0.40)), name="parcel", at=(0.75, -0.1, 0.70 + 2 * GAP), color=BLUE, body=Body(density=60.0)
     )
@@ -165,7 +163,11 @@ def _hand(figure: Figure, at: Place, glove: str, curl: float = 0.0) -> Array:
     turn = pin.Quaternion(q[3:7]).toRotationMatrix()
     q[:3], q[3:7] = at, pin.Quaternion(turn).coeffs()
     if curl:
-        bent = {name: value + curl for name, value in figure.joint_values(q).items() if "index" in name and "flexion" in name}
+        bent = {
+            name: value + curl
+            for name, value in figure.joint_values(q).items()
+            if "index" in name and "flexion" in name
+        }
         q = figure.clamp(figure.with_joints(q, bent))
     return q
 
