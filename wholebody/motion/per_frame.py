@@ -61,7 +61,7 @@ class PerFrame:
         check_input(clip, scene, progress)
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
         q = np.array(clip.q)
-        with scene.lend() as workspace:
+        with scene.borrow() as workspace:
             _, wrong, gaps = faults(workspace, terms, q, self.clearance)
             wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
             found = windows(wrong, max(2, round(MARGIN / clip.dt)))

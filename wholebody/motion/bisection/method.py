@@ -124,7 +124,7 @@ class Bisection:
             figure.frame_id(joint)
         stays = Stays(scene, original, terms, frozen)
         method = method_for_motions(self.method)
-        with scene.lend() as workspace:
+        with scene.borrow() as workspace:
             predictor = Predictor(scene, original, terms, frozen, method, self.clearance, OVERLAP, workspace)
             recursion = Recursion(
                 scene, predictor, stays, joints, self.buffer / 100.0, self.least, self.interpolation, watch
