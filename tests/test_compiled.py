@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -90,6 +91,67 @@ def test_all_loops_are_compiled_by_one_call() -> None:
     for name in compiled.LOOPS:
         loops = vars(sys.modules[name].compiled_kernel()).values()
         assert any(loop.signatures for loop in loops if hasattr(loop, "signatures")), name
+
+
+WORK = """
+import json, sys
+import wholebody as wb
+from wholebody import compiled
+
+def signatures():
+    modules = {name: module for name, module in sys.modules.items() if name.startswith("wholebody.")}
+    found = {f"{name}.{key}": value for name, module in modules.items() for key, value in vars(module).items()}
+    return {(name, str(kind)) for name, loop in found.items() for kind in getattr(loop, "signatures", ())}
+
+def steps(problem, count):
+    tracker, q, near = wb.QP().tracker(problem, 0.02), problem.start, set()
+    for _ in range(count):
+        q = tracker.step(q).q
+        near.add(len(problem.scene.contacts(q, 0.02).distance))
+    return near
+
+compiled.compile_all()
+before = signatures()
+shelf = wb.read_task("examples/tasks/shelf.toml").problem
+for method in (wb.QP(), wb.Newton(iterations=5, restarts=0)):
+    wb.solve(shelf, method)
+steps(shelf, 20)
+wb.solve(wb.read_task("examples/tasks/robot_arm_among_obstacles.toml").problem)
+figure = wb.load("hand")
+tip = wb.Point("right_index_tip", (0.1, 0.0, 0.1))
+free = wb.Scene(figure)
+steps(wb.Problem(free, goals=[tip]), 2)
+wb.solve(wb.Problem(free, goals=[tip]), wb.CCD(iterations=3, restarts=0))
+figure = wb.load(sys.argv[1])
+near = set()
+for boxes in range(3):
+    scene = wb.Scene(figure)
+    for number in range(boxes):
+        scene.add(wb.Box((0.1, 0.1, 0.1)), name=f"box {number}", at=(0.3, 0.3, 0.06 * number))
+    near |= steps(wb.Problem(scene, goals=[wb.Point("moved", (0.0, 0.4, 0.0), offset=(0.4, 0, 0))]), 60)
+print(json.dumps(sorted(near)))
+for name, kind in sorted(signatures() - before):
+    print(name, kind)
+"""
+
+
+ONE_JOINT = """<robot name="one">
+<link name="base"/>
+<link name="moved"><collision><origin xyz="0.2 0 0"/><geometry><box size="0.3 0.05 0.05"/></geometry></collision></link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="moved"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+</robot>"""
+
+
+def test_solves_and_steps_compile_nothing_beyond_what_one_call_compiles(root: Path, tmp_path: Path) -> None:
+    """Whatever the number of joints, pairs and contacts is: numba takes some arrays of one row for another type."""
+    path = tmp_path / "one.urdf"
+    path.write_text(ONE_JOINT)
+    command = [sys.executable, "-c", WORK, str(path)]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
+    first, *rest = done.stdout.splitlines()
+    assert {0, 1, 2} <= set(json.loads(first))  # contacts of a step
+    assert rest == []
 
 
 def test_kept_loops_are_read_back_without_scipy(root: Path) -> None:

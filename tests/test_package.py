@@ -24,12 +24,17 @@ ROOMS = (
         "compiled",
         "pool",
         "runner",
+        "batches",
         "geometry",
+        "matter",
         "figures",
         "scene_geometry",
+        "moving_scene",
+        "moving_things",
         "workspace",
         "scene",
         "tasks",
+        "derivatives",
         "term_plan",
         "residual_kernel",
         "coordinate_kernel",
@@ -44,7 +49,7 @@ ROOMS = (
         "simplification",
         "methods",
     ),
-    *("tracking", "motion", "taskfile", "view", "bench", "doctor", "cli"),
+    *("tracking", "motion", "dynamics", "taskfile", "view", "bench", "doctor", "cli"),
 )
 """From the ground up; a room imports only from those before it, also where only type checkers look."""
 DOCUMENTED = {"_replace", "_asdict", "_fields", "_exit", "_SubParsersAction"}

@@ -26,16 +26,25 @@ from wholebody.version import __version__
 
 if TYPE_CHECKING:
     from wholebody.assessment import Assessment, assess
+    from wholebody.derivatives import DerivativeCheck, check_derivatives
+    from wholebody.dynamics.coupling import Spring
+    from wholebody.dynamics.world import World
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+    from wholebody.matter.body import Body
+    from wholebody.matter.materials import Material
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
     from wholebody.methods.newton.assembly import Assembly
+    from wholebody.methods.newton.assembly_constraint import AssemblyConstraint
+    from wholebody.methods.newton.assembly_solution import AssemblySolution
     from wholebody.methods.newton.method import Newton
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
     from wholebody.methods.solve import solve
     from wholebody.motion.avoidance import AvoidanceReport, Avoided, avoid
+    from wholebody.motion.batch import BatchProgress, avoid_many, read_many
+    from wholebody.motion.batch_table import AvoidedCase
     from wholebody.motion.bisection.method import Bisection
     from wholebody.motion.checking import ClipCheck, check
     from wholebody.motion.clip import Clip
@@ -86,12 +95,17 @@ __all__ = [
     "CCD",
     "QP",
     "Assembly",
+    "AssemblyConstraint",
+    "AssemblySolution",
     "Assessment",
     "AvoidanceReport",
     "Avoided",
+    "AvoidedCase",
     "Axis",
     "Balance",
+    "BatchProgress",
     "Bisection",
+    "Body",
     "Bound",
     "Box",
     "Capsule",
@@ -100,6 +114,7 @@ __all__ = [
     "ClipCheck",
     "Constraint",
     "DampedLeastSquares",
+    "DerivativeCheck",
     "Discomfort",
     "Displacement",
     "Drag",
@@ -116,6 +131,7 @@ __all__ = [
     "Hold",
     "Hull",
     "InputError",
+    "Material",
     "Measure",
     "Mesh",
     "MissingPackageError",
@@ -135,6 +151,7 @@ __all__ = [
     "SkeletonMotion",
     "Solution",
     "Sphere",
+    "Spring",
     "StanceFeet",
     "StepLimit",
     "Strength",
@@ -144,14 +161,18 @@ __all__ = [
     "UnknownNameError",
     "Viewer",
     "WholebodyError",
+    "World",
     "__version__",
     "assess",
     "avoid",
+    "avoid_many",
     "check",
+    "check_derivatives",
     "equipment",
     "follow_path",
     "load",
     "read_clip",
+    "read_many",
     "read_skeleton",
     "read_task",
     "retarget",
@@ -162,18 +183,27 @@ __all__ = [
 
 _MODULES = {
     "wholebody.assessment": "Assessment assess",
+    "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
+    "wholebody.dynamics.coupling": "Spring",
+    "wholebody.dynamics.world": "World",
+    "wholebody.matter.body": "Body",
+    "wholebody.matter.materials": "Material",
     "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
     "wholebody.tracking.drag": "Drag",
     "wholebody.methods.newton.assembly": "Assembly",
+    "wholebody.methods.newton.assembly_constraint": "AssemblyConstraint",
+    "wholebody.methods.newton.assembly_solution": "AssemblySolution",
     "wholebody.methods.newton.method": "Newton",
     "wholebody.methods.placo.method": "Placo",
     "wholebody.tracking.path_following": "follow_path",
     "wholebody.methods.qp.method": "QP",
     "wholebody.methods.solve": "solve",
     "wholebody.motion.avoidance": "AvoidanceReport Avoided avoid",
+    "wholebody.motion.batch": "BatchProgress avoid_many read_many",
+    "wholebody.motion.batch_table": "AvoidedCase",
     "wholebody.motion.checking": "ClipCheck check",
     "wholebody.motion.bisection.method": "Bisection",
     "wholebody.motion.clip": "Clip",

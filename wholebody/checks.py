@@ -29,6 +29,9 @@ TIME_STEP = (1e-6, 1e6)
 LONGEST = 200
 """Characters of a name or a title."""
 
+SHOWN_NAMES = 6
+"""Names that a list in a sentence has at most."""
+
 _SHORT = Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 
@@ -47,6 +50,13 @@ def a(kind: object) -> str:
     """The name of a type with its article."""
     name = getattr(kind, "__name__", str(kind))
     return f"an {name}" if name[:1].lower() in "aeio" else f"a {name}"
+
+
+def some(names: Iterable[str]) -> str:
+    """The first six names, and how many more there are; "" for none."""
+    listed = list(names)
+    more = f" and {len(listed) - SHOWN_NAMES} more" if len(listed) > SHOWN_NAMES else ""
+    return ", ".join(listed[:SHOWN_NAMES]) + more
 
 
 def instance(value: object, kind: type[_T] | tuple[type[_T], ...], what: str, mend: str) -> _T:

@@ -91,12 +91,22 @@ class Problem:
         self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
         pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
         self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
-        with self.lend() as workspace:
+        with self.borrow() as workspace:
             state = workspace.state.update(self.start)
             self._check_frozen(state)
             _check_goals(self.goals, state)
             self._check_terms(state)
             self.clearances = self._clearances(workspace)
+
+    def __repr__(self) -> str:
+        asked = [*self.goals, *self.constraints, *self.bounds]
+        return (
+            f"Problem of {self.scene.figure.name!r} among {len(self.scene.objects)} things, "
+            f"{len(self.clearances)} pairs, clearance {1e3 * self.clearance:g} mm\n"
+            f"  goals: {checks.some(map(_in_words, asked[: len(self.goals)])) or 'none'}\n"
+            f"  constraints: {checks.some(map(_in_words, asked[len(self.goals) :])) or 'none'}; "
+            f"measures: {checks.some(map(_in_words, self.measures)) or 'none'}"
+        )
 
     def retarget(self, goals: Iterable[Goal]) -> None:
         """Replace the goals, for a goal that moves from frame to frame; everything else stays.
@@ -111,7 +121,7 @@ class Problem:
         resolved = tuple(goal.resolve(self.scene, self.start) for goal in listed)
         doubtful = {number: goal for number, goal in enumerate(resolved) if type(goal) not in built_in_goals()}
         if doubtful:
-            with self.lend() as workspace:
+            with self.borrow() as workspace:
                 _check_goals(doubtful, workspace.state.update(self.start))
         self.goals = resolved
 
@@ -129,13 +139,13 @@ class Problem:
         return result
 
     @contextmanager
-    def lend(self) -> Iterator[Workspace]:
-        """Borrow a workspace on this problem's scene for one run; see `Scene.lend`.
+    def borrow(self) -> Iterator[Workspace]:
+        """Borrow a workspace on this problem's scene for one run; see `Scene.borrow`.
 
         Raises:
             InputError: objects were added to or removed from the scene after the problem was made.
         """
-        with self.scene.lend() as workspace:
+        with self.scene.borrow() as workspace:
             self.check_fresh()  # after borrowing: later changes of the scene do not change the workspace
             yield workspace
 
@@ -153,7 +163,7 @@ class Problem:
         """A lineariser of this problem, with its present terms and clearances.
 
         Args:
-            workspace: from this problem's `lend` or `workspace`.
+            workspace: from this problem's `borrow` or `workspace`.
             dt: time step in seconds, for bounds that need one.
         """
         return Lineariser(
@@ -234,6 +244,12 @@ def _start(scene: Scene, start: Array | str | None) -> Array:
     if np.abs(normal - q).max(initial=0.0) > UNIT_TOLERANCE:
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(normal)
+
+
+def _in_words(term: Any) -> str:
+    """Class of a term, and its frame if it has one."""
+    frame = getattr(term, "frame", None)
+    return f"{type(term).__name__}({frame})" if isinstance(frame, str) else type(term).__name__
 
 
 def _clearance(value: float) -> float:

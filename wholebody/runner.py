@@ -15,6 +15,8 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -27,6 +29,7 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 """Environment of a process whose libraries compute on one core."""
 
 FULL = 2e9  # bytes: a process that holds more should be replaced; placo never frees a robot (some 6 MB)
+ORPHANED = 1.0  # s: how often a process looks whether its parent is still there
 LONGEST_WORDS = 200  # most characters kept of the last line that a process wrote
 
 _START = (
@@ -49,7 +52,7 @@ class EndedError(WholebodyError):
 
     def __init__(self, code: int, said: str = "") -> None:
         """Build the message from the exit code and the last line."""
-        self.overtime, self.code, self.said = code == -signal.SIGALRM, code, said
+        self.overtime, self.code, self.said = -code in (signal.SIGALRM, signal.SIGPROF), code, said
         message = "it took too long" if self.overtime else f"the process ended with {self.how}"
         super().__init__(message + (f": {said}" if said and not self.overtime else ""))
 
@@ -66,7 +69,7 @@ class Job(NamedTuple):
         name: any value by which the caller identifies the job; it is not sent to the process.
         function: called in the process.
         arguments: of the function.
-        seconds: time to the deadline, unless the job moves it.
+        seconds: time to the deadline, unless the job moves it; 0 for none.
     """
 
     name: Any
@@ -239,10 +242,16 @@ def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> I
             child.close()
 
 
-def allow(seconds: float) -> None:
-    """Move the deadline of the running job to so many seconds from now; does nothing outside a job."""
+def allow(seconds: float, processor: float = 0.0) -> None:
+    """Move the deadline of the running job to so many seconds from now; does nothing outside a job.
+
+    Args:
+        seconds: by the clock; 0 for no deadline.
+        processor: of the processor's time, which passes slowly where others use it too; 0 for no such deadline.
+    """
     if _parent is not None:
         signal.setitimer(signal.ITIMER_REAL, seconds)
+        signal.setitimer(signal.ITIMER_PROF, processor)
 
 
 def tell(note: Any) -> None:
@@ -251,11 +260,27 @@ def tell(note: Any) -> None:
         _parent.send((False, note))
 
 
+def end_with_parent() -> None:
+    """End this process when its parent has ended, also in the middle of a job."""
+    threading.Thread(target=_end_after, args=(os.getppid(),), daemon=True).start()
+
+
+def _end_after(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(ORPHANED)
+    os._exit(1)
+
+
 def serve(descriptor: int) -> None:
-    """Do jobs until the parent has ended; the main loop of a process of `Child`."""
+    """Do jobs until the parent has ended; the main loop of a process of `Child`.
+
+    Ctrl-C reaches all processes of a terminal; the parent decides what it ends.
+    """
     global _parent
     _parent = Connection(descriptor)
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    _end_at_alarms()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
     try:
         while True:
             seconds, packed = _parent.recv()
@@ -273,10 +298,15 @@ def _serve_one(parent: Connection, job: Job, environment: Mapping[str, str]) -> 
     global _parent
     _parent = parent
     os.environ.update(environment)
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    _end_at_alarms()
     allow(job.seconds)
     parent.send((True, job.function(*job.arguments)))
     os._exit(0)  # the process must not close resources of the parent
+
+
+def _end_at_alarms() -> None:
+    for alarm in (signal.SIGALRM, signal.SIGPROF):
+        signal.signal(alarm, signal.SIG_DFL)
 
 
 def _wait_for(process: subprocess.Popen[bytes] | BaseProcess) -> int:

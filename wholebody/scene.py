@@ -19,13 +19,19 @@ from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.geometry.shapes import Shape
-from wholebody.scene_geometry import SceneGeometry, SceneObject, assemble
-from wholebody.workspace import Workspace, lent
+from wholebody.matter.body import Body
+from wholebody.matter.inertia import mass_properties
+from wholebody.matter.materials import DEFAULT, Material
+from wholebody.matter.materials import material as to_material
+from wholebody.scene_geometry import Motion, SceneGeometry, SceneObject, assemble
+from wholebody.workspace import Workspace, borrowed
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.geometry.continuous.sweep import FirstContact
     from wholebody.geometry.penetration import ObjectPenetration
+
+SHAPES = "give wb.Box, wb.Sphere, wb.Mesh or another"
 
 
 class Scene:
@@ -62,6 +68,14 @@ class Scene:
         scene._objects = {thing.name: thing for thing in objects}
         scene._built = built
         return scene
+
+    def __repr__(self) -> str:
+        carried = [name for name, thing in self._objects.items() if thing.segment is not None]
+        around = [name for name, thing in self._objects.items() if thing.segment is None]
+        lines = [f"Scene of {self.figure!r}"]
+        lines.append(f"  things around it: {checks.some(around) or 'none'}")
+        lines.append(f"  carried: {checks.some(carried) or 'nothing'}")
+        return "\n".join(lines)
 
     # ---- contents
 
@@ -106,9 +120,9 @@ class Scene:
         """The geometry model of the present things, with its indices."""
         return self._build()
 
-    def lend(self) -> AbstractContextManager[Workspace]:
-        """Borrow a workspace for one run: ``with scene.lend() as workspace``. Do not use it after the context ends."""
-        return lent(self._build())
+    def borrow(self) -> AbstractContextManager[Workspace]:
+        """Borrow a workspace for one run: ``with scene.borrow() as workspace``. Do not use it after the context."""
+        return borrowed(self._build())
 
     def workspace(self) -> Workspace:
         """A new workspace for a long-lived object, such as a tracker, which alone uses it."""
@@ -131,6 +145,8 @@ class Scene:
         name: str,
         at: Any = (0.0, 0.0, 0.0),
         color: Sequence[float] | None = None,
+        body: Body | None = None,
+        material: Material | str | None = None,
     ) -> Scene:
         """Add a thing to the world.
 
@@ -139,14 +155,24 @@ class Scene:
             name: a name that nothing else in the scene has.
             at: (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3.
             color: red, green, blue and, if wanted, alpha, each from 0 to 1.
+            body: its mass, material and velocity, if it moves by itself.
+            material: of a thing that does not; wood if none is given.
 
         Returns:
             The scene, so that calls can be chained.
 
         Raises:
-            InputError: the name exists already, or the shape, placement or color is invalid.
+            InputError: the name exists already, the shape, placement or color is invalid, or a half-space has a body.
+            UnknownNameError: there is no such material.
         """
-        return self._put(self._new_name(name), shape, at, color)
+        name = self._new_name(name)
+        if body is not None:
+            checks.instance(body, Body, f"{name!r}: body", "give wb.Body(density=700)")
+            if material is not None:
+                raise InputError(f"{name!r} has a body and a material; give the body's: wb.Body(material=...)")
+            mass_properties(checks.instance(shape, Shape, repr(name), SHAPES), body, name)
+        made_of = DEFAULT if material is None else to_material(material, f"{name!r}: material")
+        return self._put(name, shape, at, color, body=body, material=made_of if body is None else body.stuff)
 
     def attach(
         self,
@@ -186,21 +212,34 @@ class Scene:
             )
         return self._put(name, shape, at, color, to, rests)
 
-    def move(self, name: str, *, at: Any) -> Scene:
+    def move(self, name: str, *, at: Any, over: float | None = None) -> Scene:
         """Move a thing to a new placement in the world, or in its segment's frame.
+
+        With `over` it moves there from where it is, during the next frame of a tracker, a drag or a frame loop: its
+        centre goes straight, and it turns about its centre. What it meets on the way counts. Without `over` it is put
+        there, whatever is in between. If it is moved more than once before that frame, the frame sees one motion, from
+        where the frame before saw it to where it is.
+
+        Args:
+            name: of the thing.
+            at: its placement; as for `add`.
+            over: seconds that the motion takes, the time of a frame; None for a thing that is put there.
 
         Raises:
             UnknownNameError: there is no such object.
-            InputError: the placement cannot be read.
+            InputError: the placement cannot be read, or the time is not positive and finite.
         """
         place = to_placement(at, f"{checks.shown(name)}: at")
+        seconds = None if over is None else checks.time_step(over, f"move {checks.shown(name)}: over")
         with self._lock:
-            moved = self._objects[name] = replace(self._object(name), placement=place)
+            thing = self._object(name)
+            motion = None if seconds is None else Motion(thing.placement, seconds)
+            moved = self._objects[name] = replace(thing, placement=place, motion=motion)
             if self._built is not None:
                 base = moved.placement
                 if moved.segment is not None:
                     base = self.model.frames[self.frame_id(moved.segment)].placement * base
-                self._built.place(name, base)
+                self._built.place(name, base, moving=motion is not None)
         return self
 
     def remove(self, name: str) -> Scene:
@@ -216,14 +255,23 @@ class Scene:
         return self
 
     def _put(
-        self, name: str, shape: Shape, at: Any, color: Any, to: str | None = None, rests_on: tuple[str, ...] = ()
+        self,
+        name: str,
+        shape: Shape,
+        at: Any,
+        color: Any,
+        to: str | None = None,
+        rests_on: tuple[str, ...] = (),
+        body: Body | None = None,
+        material: Material = DEFAULT,
     ) -> Scene:
         checks.text(name, "the name of an object")
-        checks.instance(shape, Shape, repr(name), "give wb.Box, wb.Sphere, wb.Mesh or another")
+        checks.instance(shape, Shape, repr(name), SHAPES)
         place = to_placement(at, f"{name!r}: at")
         painted = None if color is None else checks.color(color, f"{name!r}: color")
         with self._lock:
-            self._objects[self._new_name(name)] = SceneObject(name, shape, place, to, painted, rests_on)
+            thing = SceneObject(name, shape, place, to, painted, rests_on, body=body, material=material)
+            self._objects[self._new_name(name)] = thing
             self._changed()
         return self
 
@@ -259,7 +307,7 @@ class Scene:
             InputError: q has the wrong shape or is not finite, or `within` is not a finite number.
         """
         within = checks.number(within, "within", -FARTHEST, FARTHEST, "m")
-        with self.lend() as workspace:
+        with self.borrow() as workspace:
             return workspace.near(q, within).nearest_first()
 
     def penetration(self, q: Array) -> list[ObjectPenetration]:
@@ -269,11 +317,13 @@ class Scene:
         """
         from wholebody.geometry.penetration import object_penetrations
 
-        with self.lend() as workspace:
+        with self.borrow() as workspace:
             near = workspace.near(q, 0.0).nearest_first()
             return object_penetrations(workspace.geometry, near.placements, workspace.owners, near.pair)
 
-    def sweep(self, q0: Array, q1: Array, tolerance: float = 1e-4) -> FirstContact | None:
+    def sweep(
+        self, q0: Array, q1: Array, tolerance: float = 1e-4, *, moves: Mapping[str, tuple[Any, Any]] | None = None
+    ) -> FirstContact | None:
         """First contact of the motion from q0 to q1, both (nq,), along pin.interpolate; None if there is none.
 
         The test is continuous and finds objects of any thickness. See `wholebody.geometry.continuous.sweep`.
@@ -282,16 +332,39 @@ class Scene:
             q0: start of the motion.
             q1: its end.
             tolerance: depth up to which an overlap is no contact, metres.
+            moves: thing to its placements at the start and at the end, as for `add`, if it moves at the same time: its
+                centre straight, and turning about it. All others stay where they are. Things that meet each other are
+                not looked at.
 
         Raises:
             InputError: postures of the wrong shape, not finite or with a quaternion that is not of unit length; a
-                tolerance below 1e-5 m.
+                tolerance below 1e-5 m; placements that cannot be read.
+            UnknownNameError: `moves` names no object.
         """
         nq = self.model.nq
         begin, end = checks.posture(q0, nq, "q0"), checks.posture(q1, nq, "q1")
         tolerance = checks.number(tolerance, "tolerance", 1e-5, FARTHEST, "m")
-        with self.lend() as workspace:
-            return workspace.sweep.first_contact(begin, end, tolerance=tolerance)
+        with self.borrow() as workspace:
+            if moves is None:
+                return workspace.sweep.first_contact(begin, end, tolerance=tolerance)
+            checks.instance(moves, Mapping, "sweep: moves", "give {name: (placement at the start, at the end)}")
+            frame = workspace.frame({name: self._way(name, way) for name, way in moves.items()})
+            found = frame.first_contact(begin, end, tolerance)
+            return None if found is None else replace(found, q=found.q[:nq])
+
+    def _way(self, name: str, way: tuple[Any, Any]) -> tuple[pin.SE3, pin.SE3]:
+        thing = self._object(name)
+        if not isinstance(way, (tuple, list)) or len(way) != 2:
+            raise InputError(
+                f"moves: {name!r} has {checks.shown(way)}; give two placements, at the start and at the end"
+            )
+        start, end = (
+            to_placement(at, f"moves: {name!r} at the {when}") for at, when in zip(way, ("start", "end"), strict=True)
+        )
+        if thing.segment is None:
+            return start, end
+        base = self.model.frames[self.frame_id(thing.segment)].placement
+        return base * start, base * end
 
     def _build(self) -> SceneGeometry:
         built = self._built

@@ -15,15 +15,30 @@ from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Joints, PairTable, Proximity
+from wholebody.matter.materials import DEFAULT, Material
 from wholebody.pool import Pool
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.geometry.shapes import Shape
+    from wholebody.matter.body import Body
 
 T = TypeVar("T")
 
 RESTING = 1e-3  # m: a carried thing nearer than this to a segment in the first posture rests on it
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How a thing came to where it is.
+
+    Attributes:
+        start: where it was before, in the world, or in the segment's frame for a carried thing.
+        seconds: how long it took.
+    """
+
+    start: pin.SE3
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -37,6 +52,9 @@ class SceneObject:
         segment: the segment that carries it; None for a thing in the world.
         color: red, green, blue, alpha from 0 to 1, or None for the viewer's choice.
         rests_on: segments and carried things that a carried thing is not tested against.
+        motion: how it came to its placement; None if it was put there.
+        body: mass and velocity of a thing that `wholebody.dynamics` moves; None for one that it does not.
+        material: what it is made of; a body's own.
     """
 
     name: str
@@ -45,6 +63,9 @@ class SceneObject:
     segment: str | None = None
     color: tuple[float, float, float, float] | None = None
     rests_on: tuple[str, ...] = ()
+    motion: Motion | None = None
+    body: Body | None = None
+    material: Material = DEFAULT
 
 
 class SceneGeometry:
@@ -75,24 +96,55 @@ class SceneGeometry:
         self.lock = Lock()
         self.moves = 0
         self._moved_at = np.zeros(geometry.ngeoms, dtype=np.int64)
+        self._put_at: dict[str, int] = {}
         self._pools: dict[Any, Pool[Any]] = {}
 
-    def place(self, name: str, base: pin.SE3) -> None:
-        """Place the pieces of an object whose placement in its joint's frame is `base`."""
+    def place(self, name: str, base: pin.SE3, *, moving: bool = False) -> None:
+        """Place the pieces of an object whose placement in its joint's frame is `base`.
+
+        Args:
+            name: of the object.
+            base: its placement.
+            moving: whether it moves there, along the way in between; otherwise it was put there.
+        """
         with self.lock:
             self.moves += 1
+            if not moving:
+                self._put_at[name] = self.moves
             for index, local in self.pieces_of[name]:
                 self.geometry.geometryObjects[index].placement = base * local
                 self._moved_at[index] = self.moves
 
-    def bring(self, proximity: Proximity, seen: int) -> int:
-        """Update the placements of the pieces that moved since `seen`; returns the present number of moves."""
+    def bring(self, proximity: Proximity, seen: int, moved: dict[str, tuple[pin.SE3, pin.SE3]] | None = None) -> int:
+        """Update the placements of the pieces that moved since `seen`; returns the present number of moves.
+
+        Args:
+            proximity: of a run.
+            seen: number of moves that it has seen.
+            moved: takes the objects that moved, and were not put, with their placements before and after.
+        """
         if seen == self.moves:
             return seen
         with self.lock:
+            if moved is not None:
+                self._note_moved(proximity, seen, moved)
             for index in np.flatnonzero(self._moved_at > seen).tolist():
                 proximity.place_piece(index, self.geometry.geometryObjects[index].placement)
             return self.moves
+
+    def _note_moved(self, proximity: Proximity, seen: int, moved: dict[str, tuple[pin.SE3, pin.SE3]]) -> None:
+        for name, pieces in self.pieces_of.items():
+            if not pieces or self._moved_at[pieces[0][0]] <= seen:
+                continue
+            index, local = pieces[0]
+            if self._put_at.get(name, 0) > seen:
+                moved.pop(name, None)
+                continue
+            before, after = (
+                model.geometryObjects[index].placement * local.inverse()
+                for model in (proximity.geometry, self.geometry)
+            )
+            moved[name] = (moved[name][0] if name in moved else before, after)
 
     def pool(self, kind: type[T], make: Callable[[], T]) -> Pool[T]:
         """The pool of objects of a kind, made by `make`; one run uses one of them at a time."""

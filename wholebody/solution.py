@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from wholebody.arrays import Array
 from wholebody.assessment import Assessment
 
@@ -31,7 +33,7 @@ class TraceEntry:
     note: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Solution:
     """The answer of a method.
 
@@ -54,7 +56,7 @@ class Solution:
     seconds: float
     iterations: int
     assessment: Assessment
-    trace: tuple[TraceEntry, ...] = field(repr=False)
+    trace: tuple[TraceEntry, ...]
     method: str
     message: str
     programs: Mapping[str, int] = field(default_factory=dict)
@@ -63,3 +65,13 @@ class Solution:
     def solved(self) -> bool:
         """Whether the status is "solved"."""
         return self.status == "solved"
+
+    def __repr__(self) -> str:
+        judged = self.assessment
+        return (
+            f"Solution: {self.status} by {self.method} in {1e3 * self.seconds:.1f} ms, {self.iterations} iterations\n"
+            f"  goals missed by {1e3 * judged.goal_error:.3g} mm and {np.degrees(judged.goal_angle):.3g} degrees; "
+            f"deepest overlap {1e3 * judged.penetration:.3g} mm, limits off by {judged.limit_violation:.3g}, "
+            f"constraints by {judged.constraint_violation:.3g}\n"
+            f"  {self.message}"
+        )

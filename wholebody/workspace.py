@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -18,10 +18,11 @@ from wholebody.scene_geometry import SceneGeometry
 
 if TYPE_CHECKING:
     from wholebody.geometry.continuous.sweep import Sweep
+    from wholebody.moving_things import Collision, FrameMotion, MovingThings
 
 
 class Workspace:
-    """Room for one run on a scene; lent by `Scene.lend`, or made by `Scene.workspace` for what lives on.
+    """Room for one run on a scene; borrowed by `Scene.borrow`, or made by `Scene.workspace` for what lives on.
 
     A run sees things where they were at its last `begin` or `refresh`, whoever moves them meanwhile. After `begin` the
     same questions have the same answers, whatever was asked before.
@@ -33,6 +34,8 @@ class Workspace:
         owners: the segment or object that each piece is part of.
         state: moves from posture to posture.
         proximity: distances between the pieces.
+        moved: things that moved since the last `next_frame`, with their placements before and after; what was put
+            somewhere did not move.
     """
 
     def __init__(self, built: SceneGeometry) -> None:
@@ -43,19 +46,57 @@ class Workspace:
         self.rows: ContactRowBuilder = built.rows
         self.owners = built.owners
         self.state = State(built.model)
-        self._seen = 0
+        self.moved: dict[str, tuple[pin.SE3, pin.SE3]] = {}
+        self._stuck: tuple[str, ...] = ()
         self.proximity = Proximity(built.table)
         self._sweep: Sweep | None = None
+        self._moving: MovingThings | None = None
         self._seen = built.bring(self.proximity, -1)
 
     def begin(self) -> None:
         """Forget what was asked before, and see things where they are now."""
-        self.proximity.forget()
+        self.proximity.reset()
         self.refresh()
+        self.moved.clear()
+        self._stuck = ()
 
     def refresh(self) -> None:
-        """See things where they are now."""
-        self._seen = self._built.bring(self.proximity, self._seen)
+        """See things where they are now; `moved` has those that moved there."""
+        self._seen = self._built.bring(self.proximity, self._seen, self.moved)
+
+    def place(self, placements: Mapping[str, pin.SE3]) -> None:
+        """See things at placements in their joints' frames; the scene keeps its own."""
+        for name, base in placements.items():
+            for index, local in self._built.pieces_of[name]:
+                self.proximity.place_piece(index, base * local)
+
+    def where(self, name: str) -> pin.SE3:
+        """Where this run sees a thing, in its joint's frame."""
+        index, local = self._built.pieces_of[name][0]
+        return self.geometry.geometryObjects[index].placement * local.inverse()
+
+    def next_frame(self) -> FrameMotion | None:
+        """The frame in which the things go that moved since the last one; None if none did, and none is in the figure.
+
+        Things are where it ends.
+        """
+        if not (self.moved or self._stuck):
+            return None
+        moved = {name: (self.where(name),) * 2 for name in self._stuck} | self.moved
+        self.moved.clear()
+        return self.frame(moved)
+
+    def keep(self, motion: FrameMotion, collisions: Collection[Collision]) -> None:
+        """Let the next frame look after the things of this one too, if it could not keep them out of the figure."""
+        self._stuck = tuple(motion.names) if collisions else ()
+
+    def frame(self, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> FrameMotion:
+        """A frame in which these things move, from one placement to another in the frame of their joint."""
+        if self._moving is None:
+            from wholebody.moving_things import MovingThings
+
+            self._moving = MovingThings(self._built, self.geometry)
+        return self._moving.frame(moved)
 
     @property
     def geometry(self) -> pin.GeometryModel:
@@ -91,8 +132,8 @@ class Workspace:
 
 
 @contextmanager
-def lent(built: SceneGeometry) -> Iterator[Workspace]:
+def borrowed(built: SceneGeometry) -> Iterator[Workspace]:
     """A workspace of a scene for one run; it is used again when the context ends."""
-    with built.pool(Workspace, lambda: Workspace(built)).lend() as workspace:
+    with built.pool(Workspace, lambda: Workspace(built)).borrow() as workspace:
         workspace.begin()
         yield workspace

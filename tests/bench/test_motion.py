@@ -6,13 +6,15 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.motion import cases, measuring, report
+from wholebody.bench.motion import cases, figures, measuring, report
 from wholebody.bench.motion.measuring import CHECKED, MotionRow
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
+from wholebody.motion.ready_equipment import dressed
 
 NAME = "sword cut"
 
@@ -31,7 +33,7 @@ def test_synthetic_clips_collide_are_smooth_and_within_limits(name: str) -> None
 
 @pytest.mark.parametrize("worn", cases.EQUIPMENT)
 def test_equipment_is_attached(worn: str) -> None:
-    scene = cases.dressed(wb.load("human"), worn)
+    scene = dressed(wb.load("human"), worn)
     assert all(thing.segment is not None for thing in scene.objects.values())
     assert bool(scene.objects) == (worn != "nothing")
 
@@ -90,6 +92,12 @@ def test_the_report_has_every_method(tmp_path: Path) -> None:
     assert "| fade | 0 of 1 | 2.00 |" in text
     assert "deviation (rad) is 0.60 of bisection's" in text
     assert "| walk | pack | 60 | 20 | 0 | 30.0 | 0.1 |" in text
+    assert "| trajectory | no frame deeper than 0.1 mm | 1 of 1 |  |" in text
+    assert "| fade | no frame deeper than 0.1 mm | 0 of 1 | walk, pack: 3 frames |" in text
+    assert "| trajectory | deviation (rad) at most 0.7 of bisection's | 1 of 1 |  |" in text
+    assert "| trajectory | at most 2 s a second of motion | 1 of 1 |  |" in text
+    assert "| bisection | hands on the weapon" not in text
+    assert "| trajectory | hands on the weapon within 1 mm | 1 of 1 |  |" in text
     assert "nan" not in text
     for path in (*report.chart(rows(), tmp_path / "motion"), *report.check_chart(rows(), tmp_path / "check")):
         assert path.stat().st_size > 1000
@@ -101,3 +109,26 @@ def test_an_unknown_name_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "pack" in capsys.readouterr().err
     assert main(["bench", "motion", "--out", out, "--clips", str(tmp_path / "none")]) == 2
     assert "--clips" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("drawing", figures.DRAWINGS, ids=lambda drawing: drawing.number)
+def test_a_figure_without_its_recording_is_refused(drawing: figures.Drawing, tmp_path: Path) -> None:
+    with pytest.raises(wb.InputError, match=f"figure {drawing.number} needs the recording {drawing.clip}"):
+        figures.redraw(drawing, {}, wb.load("human"), tmp_path, 1)
+
+
+def test_a_weapon_is_in_both_hands() -> None:
+    """It begins in the right hand, and the left one is on it, 75 cm long, where the arms are as in the drawings."""
+    human = wb.load("human")
+    q = figures.carrying(human)
+    scene = wb.Scene(human)
+    hands = [pin.SE3(scene.state(q).frame(human.frame_id(hand))).translation for hand in figures.HANDS]
+    assert np.array(hands) == pytest.approx(np.array(figures.CARRIED), abs=1e-4)
+    armed = dressed(human, figures.weapon(human))
+    rod = armed.objects["weapon"]
+    assert rod.segment == "right_hand"
+    place = pin.SE3(armed.state(q).frame(human.frame_id("right_hand"))) * pin.SE3(rod.placement)
+    for hand in hands:
+        across, along = np.linalg.norm(place.actInv(hand)[:2]), abs(place.actInv(hand)[2])
+        assert across < 1e-6
+        assert along < 0.5 * 0.75

@@ -24,6 +24,18 @@ ROBOT = """<robot name="r"><link name="a"/>
 <joint name="l" type="revolute"><parent link="c"/><child link="d"/><origin xyz="0 0 0.4"/><axis xyz="0 1 0"/>
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
 
+SLOT = """<robot name="s">
+<link name="a"><collision><origin xyz="0.24 0 0.2"/><geometry><box size="0.4 0.4 1"/></geometry></collision>
+<collision><origin xyz="-0.24 0 0.2"/><geometry><box size="0.4 0.4 1"/></geometry></collision></link>
+<link name="b"><collision><geometry><sphere radius="0.03"/></geometry></collision></link>
+<link name="c"><collision><origin xyz="0 0 0.4"/><geometry><cylinder radius="0.02" length="0.5"/></geometry></collision>
+</link>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
+<limit lower="-1.5" upper="1.5" effort="1" velocity="1"/></joint>
+<joint name="k" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0 0 0.1"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+"""A rod in a slot: most of its postures are inside of one of two boxes, some far on the way from upright too."""
+
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
@@ -68,6 +80,13 @@ def test_targets_are_where_free_postures_have_the_tip(folder: Path) -> None:
         assert np.array_equal(a, b)
         assert np.linalg.norm(a) < 0.8
     assert examine(str(folder / "good" / "robot.urdf"), 0).times == ()
+
+
+def test_targets_are_of_free_postures_where_most_are_not(tmp_path: Path) -> None:
+    (tmp_path / "slot.urdf").write_text(SLOT)
+    figure = wb.load(tmp_path / "slot.urdf")
+    targets = np.array([target for _, target in tip_targets(figure, wb.Scene(figure), 20)])
+    assert (np.abs(np.arctan2(targets[:, 0], targets[:, 2])) < np.arctan2(0.04, 0.6)).all()
 
 
 def test_the_command_writes_the_page(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

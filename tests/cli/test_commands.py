@@ -280,6 +280,19 @@ def test_help_is_there_and_light(command: list[str]) -> None:
     assert "usage: wholebody" in done.stdout
 
 
+def test_a_command_loads_neither_the_others_nor_what_osqp_writes_code_with(task: Path) -> None:
+    code = (
+        "import sys, wholebody.cli as cli; cli.main(sys.argv[1:])\n"
+        "for name in ('wholebody.cli.clip', 'wholebody.cli.bench', 'jinja2'):\n"
+        "    print(name in sys.modules, file=sys.stderr)\n"
+        "import osqp\n"  # the package works after its compiled module was loaded without it
+        "print(osqp.OSQP().ext is sys.modules['osqp.ext_builtin'], file=sys.stderr)"
+    )
+    command = [sys.executable, "-c", code, "pose", str(task), "--json", "--out", str(task.parent)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stderr.split()[-4:] == ["False", "False", "False", "True"]
+
+
 def test_a_wrong_option_is_code_2() -> None:
     with pytest.raises(SystemExit) as ended:
         main(["pose"])

@@ -204,3 +204,17 @@ def test_a_model_with_numbers_that_no_body_has_is_refused(planar_arm, spoil, sai
     spoil(model)
     with pytest.raises(InputError, match=f"^arm, joint 'turn1': .*{said}"):
         Figure("arm", model, arm.geometry, "own", arm.describe())
+
+
+def test_a_placement_is_that_of_the_frame_the_segment_or_the_joint() -> None:
+    q = random_posture(HUMAN, np.random.default_rng(4))
+    for name in ("left_palm", "right_shank", "left_elbow_flexion"):
+        np.testing.assert_allclose(HUMAN.placement(q, name).homogeneous, place(HUMAN, q, name).homogeneous, atol=1e-12)
+    standing = HUMAN.posture("standing")
+    # hanging hands: fingers point down, palms to the thighs
+    assert HUMAN.placement(standing, "left_palm").rotation[2, 0] < -0.9
+    assert HUMAN.placement(standing, "left_palm").rotation[1, 2] < -0.9
+    with pytest.raises(UnknownNameError, match="left_palm"):
+        HUMAN.placement(standing, "left_plam")
+    with pytest.raises(InputError):
+        HUMAN.placement(standing[1:], "left_palm")

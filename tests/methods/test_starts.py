@@ -1,11 +1,15 @@
-"""When enough starts were tried: the rule of Boender and Rinnooy Kan, by its own formula and by simulation."""
+"""Where starts are, and when enough were tried: the rule of Boender and Rinnooy Kan, by its formula and simulated."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from wholebody.methods.starts import Minima
+import wholebody as wb
+from wholebody.methods.starts import Minima, restarts, throughout
 
 
 def descents_needed(values) -> int:
@@ -43,3 +47,39 @@ def test_the_best_of_several_minima_is_seldom_missed() -> None:
             minima.add(1.0 + end, True)
         missed += 0 not in seen
     assert missed < 40
+
+
+JOINT = '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/><axis xyz="0 0 1"/>{4}</joint>'
+LIMIT = '<limit lower="-1" upper="2" effort="1" velocity="1"/>'
+
+
+@pytest.fixture
+def problem(tmp_path: Path) -> wb.Problem:
+    """A joint with limits, one without, and one that stays where it is."""
+    links = "".join(f'<link name="{name}"/>' for name in "abcd")
+    joints = (
+        JOINT.format("limited", "revolute", "a", "b", LIMIT)
+        + JOINT.format("endless", "continuous", "b", "c", "")
+        + JOINT.format("frozen", "revolute", "c", "d", LIMIT)
+    )
+    (tmp_path / "r.urdf").write_text(f'<robot name="r">{links}{joints}</robot>')
+    return wb.Problem(wb.Scene(wb.load(tmp_path / "r.urdf")), constraints=[wb.Freeze("frozen")])
+
+
+def angles(problem: wb.Problem, starts: Iterable[np.ndarray]) -> np.ndarray:
+    return np.array([list(problem.scene.figure.joint_values(q).values()) for q in starts])
+
+
+def test_each_part_of_a_joints_range_is_seen_once(problem: wb.Problem) -> None:
+    with problem.borrow() as workspace:
+        found = angles(problem, throughout(problem, workspace.state, problem.start, np.random.default_rng(0), 12))
+    parts = np.floor(12 * (found[:, :2] - [-1.0, -np.pi]) / [3.0, 2.0 * np.pi])
+    assert np.array_equal(np.sort(parts, axis=0), np.tile(np.arange(12.0)[:, None], 2))
+    assert not found[:, 2].any()
+
+
+def test_a_joint_without_limits_starts_anywhere(problem: wb.Problem) -> None:
+    with problem.borrow() as workspace:
+        found = angles(problem, restarts(problem, workspace.state, problem.start, np.random.default_rng(0), 40, [1.0]))
+    assert found[:, 1].min() < -2.5
+    assert found[:, 1].max() > 2.5

@@ -113,6 +113,28 @@ def test_a_thin_thing_between_two_frames_is_not_passed(planar_arm: Callable[...,
     assert found.report.solved, found.report.message
 
 
+@pytest.mark.parametrize(
+    ("method", "beyond"),
+    [("trajectory", [0.2]), *((method, far) for method in ("frames", "bisection") for far in ([0.2], [0.2, 0.5, 0.2]))],
+)
+def test_a_thin_thing_passed_wholly_between_two_frames_is_not_passed(
+    planar_arm: Callable[..., Figure], method: str, beyond: list[float]
+) -> None:
+    """No frame touches the plate; the arm goes through it between two frames, and comes back through it later."""
+    figure = planar_arm((LINK, LINK), radius=0.01)
+    scene = wb.Scene(figure)
+    scene.add(wb.Box((0.3, 0.002, 0.3)), name="plate", at=(0.75, 0.0, 0.0))
+    near = np.linspace(-0.8, -0.2, 10)
+    angle = np.concatenate([near, beyond, near[::-1]])
+    clip = wb.Clip(figure, np.stack([angle, np.full(len(angle), 0.3)], axis=1), DT)
+    found = wb.avoid(clip, scene, method=method)
+    assert (found.report.before.colliding, found.report.before.dips) == (0, 2)
+    assert found.report.solved, found.report.message
+    first, second = found.clip.q[:, 0], found.clip.q.sum(axis=1)
+    height = LINK * np.sin(first) + (0.75 - LINK * np.cos(first)) * np.tan(second)  # of the forearm at the plate
+    assert (height < -0.01).all()
+
+
 def test_what_cannot_be_freed_is_said(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 30)
     for method in ("trajectory", "frames", "fade"):
@@ -227,3 +249,17 @@ def test_the_command_frees_a_file(tmp_path: Path, human: Figure, capsys: pytest.
     told = capsys.readouterr()
     assert "does not slow" in told.err + told.out
     assert "does not take dynamics" in told.err + told.out
+
+
+def test_an_answer_is_told_in_three_lines() -> None:
+    human = wb.load("human")
+    standing = human.posture("standing")
+    inside = human.with_joints(standing, {"right_shoulder_abduction": -0.3})
+    freed = wb.avoid(wb.Clip(human, [standing, inside, standing], 0.5, "an arm"), method="fade")  # type: ignore[arg-type]
+    lines = str(freed).splitlines()
+    assert len(lines) == 3
+    assert lines[0].startswith("an arm, free: nothing collides")
+    assert "frames in collision 1 before, 0 after" in lines[1]
+    assert lines[2].startswith("fade: ")
+    assert str(freed.report) == str(freed).removeprefix("an arm, ")
+    assert len(repr(freed)) < 200

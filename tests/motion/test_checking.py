@@ -206,3 +206,17 @@ def test_a_recorded_jump_with_a_ring_at_the_waist(shared_data: Path) -> None:
                     assert said[names].depth[k] == pytest.approx(deep, abs=3e-6)
     assert missed < 3e-6
     assert len(seen) > 5
+
+
+def test_a_check_is_told_in_three_lines() -> None:
+    human = wb.load("human")
+    standing = human.posture("standing")
+    inside = human.with_joints(standing, {"right_shoulder_abduction": -0.3})
+    found = wb.check(wb.Clip(human, [standing, inside, standing], 0.5, "an arm"))  # type: ignore[arg-type]
+    lines = str(found).splitlines()
+    assert len(lines) == 3
+    assert lines[0].startswith("an arm, 3 frames: 1 frames and 0 gaps")
+    assert f"{1e3 * found.deepest:.2f} mm" in lines[1]
+    assert "at 0.50 s" in lines[1]
+    assert len(repr(found)) < 200
+    assert "nothing overlaps" in str(wb.check(wb.Clip(human, [standing], 0.5)))  # type: ignore[arg-type]

@@ -12,6 +12,9 @@ import pinocchio as pin
 import pytest
 from PIL import Image
 
+from wholebody.errors import UnknownNameError
+from wholebody.figures import load
+from wholebody.scene import Scene
 from wholebody.tasks import Axis, CenterOfMass, Frame, Orientation, Point
 from wholebody.view import Viewer, style
 from wholebody.view.browser import Browser
@@ -316,3 +319,25 @@ def test_ghosts_are_transparent_throw_no_shadow_and_are_replaced(exhibit: Any, b
         viewer.ghosts([])
         assert viewer.sync(10.0)
         assert nodes(["/ghosts"]) == [None]
+
+
+def test_axes_of_frames_are_drawn_where_they_are_and_go_when_asked(browser: Browser, nodes: Any) -> None:
+    figure = load("human")
+    q, names = figure.posture("standing"), ("left_palm", "right_shank")
+    with Viewer(Scene(figure)) as viewer:
+        viewer.show(q)
+        viewer.frames(names, length=0.2)
+        browser.open(viewer.url)
+        for name in names:
+            placement = figure.placement(q, name)
+            for axis, direction in zip("xyz", placement.rotation.T, strict=True):
+                (found,) = nodes([f"/frames/{name}/{axis}"])
+                matrix = np.array(found["matrix"])
+                np.testing.assert_allclose(matrix[:3, 3], placement.translation, atol=1e-5)
+                along = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+                assert max(along.T @ direction) == pytest.approx(1.0, abs=1e-5)  # the arrow's own axis
+        with pytest.raises(UnknownNameError):
+            viewer.frames(["nowhere"])
+        viewer.frames([])
+        assert viewer.sync(10.0)
+        assert not any(found["seen"] for found in nodes([f"/frames/{name}/x" for name in names]))

@@ -33,6 +33,7 @@ SEED = 7  # of the postures whose tips are the targets
 FAR = 100.0  # m: pairs farther apart in the default posture do not count
 SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0625)
 """How far from the default posture towards a random one a target's posture is: the first that is free of contact."""
+DRAWS = 100  # of random postures for a target, towards which nothing may be free
 
 
 @dataclass(frozen=True)
@@ -117,21 +118,27 @@ def examine(path: str, reaches: int) -> Loaded:
 
 def tip_targets(figure: Figure, scene: Scene, count: int) -> list[tuple[str, Array]]:
     """Tips, the longest chain's first, and where each is in a random posture that is free of contact."""
-    from wholebody.figures.self_pairs import random_postures
-
     chains = sorted(figure.chains.values(), key=lambda chain: -len(chain.joints))
     data = figure.model.createData()
     found = []
-    for number, other in enumerate(random_postures(figure.model, count, SEED)):
+    for number in range(count):
         tip = chains[number % len(chains)].tip
-        q = figure.neutral
+        pin.framesForwardKinematics(figure.model, data, _free_posture(figure, scene, count, number))
+        found.append((tip, np.array(data.oMf[figure.frame_id(tip)].translation)))
+    return found
+
+
+def _free_posture(figure: Figure, scene: Scene, count: int, number: int) -> Array:
+    """The posture (nq,) of a target: on the way to the first random posture that has a free one there."""
+    from wholebody.figures.self_pairs import random_postures
+
+    for draw in range(DRAWS):
+        other = random_postures(figure.model, count, SEED + draw)[number]
         for share in SHARES:
             q = np.asarray(pin.interpolate(figure.model, figure.neutral, other, share))
             if not len(scene.contacts(q, within=0.0).number):
-                break
-        pin.framesForwardKinematics(figure.model, data, q)
-        found.append((tip, np.array(data.oMf[figure.frame_id(tip)].translation)))
-    return found
+                return q
+    return figure.neutral
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,13 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 
-from wholebody.cli import bench, clip, demo, doctor, drag, figure, interact, pose, show
 from wholebody.errors import WholebodyError
 from wholebody.version import __version__
+
+COMMANDS = ("pose", "show", "figure", "demo", "interact", "drag", "clip", "bench", "doctor")
+"""Each is a module of this folder."""
 
 DESCRIPTION = """\
 Pose people, avatars, hands and robots among objects, in contact and without penetration.
@@ -25,14 +28,14 @@ exit codes:
   2  the command, a task or another file is wrong; the message says what, where, and how to correct it"""
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of all commands."""
+def parser(names: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
+    """Return the parser of some commands; it loads their modules alone."""
     shape = argparse.RawDescriptionHelpFormatter
     top = argparse.ArgumentParser(prog="wholebody", description=DESCRIPTION, epilog=EXIT_CODES, formatter_class=shape)
     top.add_argument("--version", action="version", version=f"wholebody {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command in (pose, show, figure, demo, interact, drag, clip, bench, doctor):
-        command.add_to(commands)
+    for name in names:
+        import_module(f"wholebody.cli.{name}").add_to(commands)
     return top
 
 
@@ -45,7 +48,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 1 or 2 (see `EXIT_CODES`), 130 after Ctrl-C.
     """
-    arguments = parser().parse_args(argv)
+    given = sys.argv[1:] if argv is None else list(argv)
+    arguments = parser([name for name in COMMANDS if name in given[:1]] or COMMANDS).parse_args(given)
     _tell_progress()
     try:
         return int(arguments.run(arguments))

@@ -175,6 +175,18 @@ class Figure:
             self._frame_ids[checks.known(name, self._frame_ids, "frame", offered={*self.frames, *self.segments})]
         )
 
+    def placement(self, q: Array, name: str) -> pin.SE3:
+        """Return the placement in the world, at the posture q (nq,), of a frame, a segment or a joint.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+            InputError: q has the wrong shape or is not finite.
+        """
+        frame, q = self.frame_id(name), self._checked(q)
+        data = self.model.createData()
+        pin.forwardKinematics(self.model, data, q)
+        return pin.updateFramePlacement(self.model, data, frame).copy()
+
     def joint_id(self, name: str) -> int:
         """Return the index of a joint in the model; "root" is the free root.
 

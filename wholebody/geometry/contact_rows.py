@@ -56,9 +56,17 @@ class ContactRows(NamedTuple):
 class ContactRowBuilder:
     """Builds contact rows for all near pairs at once. It remembers no posture, so any number of runs may share one."""
 
-    def __init__(self, table: PairTable) -> None:
-        """Lay the swept points and faces of all pieces in flat tables."""
-        self.table = table
+    def __init__(self, table: PairTable, most_ends: int = MOST_ENDS, same_normal: float = SAME_NORMAL) -> None:
+        """Lay the swept points and faces of all pieces in flat tables.
+
+        Args:
+            table: the pieces and pairs.
+            most_ends: rows of one contact beside its witness row.
+            same_normal: cosine of the angle to a face's normal within which coal's may be meant to be it.
+        """
+        self.table, self.most_ends = table, most_ends
+        self._lengths = LENGTHS.copy()
+        self._lengths[4] = same_normal
         shapes = table.swept
         self._points = np.vstack([swept.points for swept in shapes] or [np.zeros((0, 3))])
         self._point_count = np.array([len(swept.points) for swept in shapes], dtype=np.intp)
@@ -93,11 +101,11 @@ class ContactRowBuilder:
                 f"contacts among {len(contacts.placements)} pieces are not among these {len(self.table.joint)}; ask "
                 "the scene that they come from"
             )
-        most = len(contacts.distance) * (1 + MOST_ENDS)
+        most = len(contacts.distance) * (1 + self.most_ends)
         wrench, gap = np.empty((most, 6)), np.empty(most)
         contact, joints = np.empty(most, dtype=np.intp), np.empty((most, 2), dtype=np.intp)
-        asked = np.broadcast_to(np.asarray(clearance, dtype=float), contacts.distance.shape)
-        count = self.write(contacts, np.ascontiguousarray(asked), wrench, gap, contact, joints)
+        asked = np.full(contacts.distance.shape, clearance, dtype=float)  # not a view: numba takes it for another type
+        count = self.write(contacts, asked, wrench, gap, contact, joints)
         return ContactRows(
             gap[:count].copy(), wrench[:count].copy(), contact[:count].copy(), joints[:count, 0].copy(),
             joints[:count, 1].copy(),
@@ -106,7 +114,7 @@ class ContactRowBuilder:
     def write(
         self, contacts: Contacts, clearance: Array, wrench: Array, gap: Array, contact: Indices, joints: Indices
     ) -> int:
-        """Write the rows of all contacts into arrays with room for ``k * (1 + MOST_ENDS)`` rows; how many there are.
+        """Write the rows of all contacts into arrays with room for ``k * (1 + most_ends)`` rows; how many there are.
 
         Args:
             contacts: the near pairs of the same pieces.
@@ -120,7 +128,7 @@ class ContactRowBuilder:
             contacts.pair, contacts.distance, contacts.normal, contacts.point_a, contacts.point_b, contacts.number,
             contacts.placements, clearance, self._extended, self.table.joint, self._points, self._point_start,
             self._point_count, self._faces, self._face_start, self._face_count, self._radius, self._axis,
-            self._is_capsule, LENGTHS, MOST_ENDS, wrench, gap, contact, joints,
+            self._is_capsule, self._lengths, self.most_ends, wrench, gap, contact, joints,
         )  # fmt: skip
         return count
 
@@ -130,11 +138,11 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.geometry import patch_kernel
 
-    none, points, table = np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros((0, 10))
+    none, points, lengths = np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros(0)
     pair, faces, placement = np.zeros((0, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros((0, 4, 3))
     patch_kernel.contact_rows(
-        pair, table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], none, placement, np.zeros(0),
-        np.zeros(0, dtype=bool), none, points, none, none, faces, none, none, np.zeros(0), points,
-        np.zeros(0, dtype=bool), LENGTHS, MOST_ENDS, np.zeros((0, 6)), np.zeros(0), none, pair,
+        pair, lengths, points, points, points, none, placement, lengths, np.zeros(0, dtype=bool), none, points, none,
+        none, faces, none, none, lengths, points, np.zeros(0, dtype=bool), LENGTHS, MOST_ENDS, np.zeros((0, 6)),
+        lengths, none, pair,
     )  # fmt: skip
     return patch_kernel

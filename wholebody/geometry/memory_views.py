@@ -17,7 +17,9 @@ from wholebody.arrays import Array
 SE3_STRIDE = 96  # bytes: rotation (9 doubles, column major), translation (3 doubles)
 RESULT_STRIDE = 160  # bytes of a coal.DistanceResult
 RESULT_NORMAL = 64  # offset of its normal; the distance is in the 8 bytes before it
-RESULT_FIELDS = 10  # distance, normal, nearest point of the first, nearest point of the second
+RESULT_DOUBLES = RESULT_STRIDE // 8
+RESULT_FIRST = RESULT_NORMAL // 8 - 1  # of these: distance, normal, nearest point of the first, of the second
+RESULT_FIELDS = 10
 
 
 def _address(array: Array) -> int:
@@ -44,25 +46,36 @@ def placement_view(placements: Any) -> Array | None:
     return np.lib.stride_tricks.as_strided(first, (count, 4, 3), (SE3_STRIDE, 24, 8))
 
 
-def distance_view(results: Any) -> Array | None:
-    """View of a StdVec_DistanceResult as (n, 10): distance, normal, point on the first, point on the second.
+def result_view(results: Any) -> Array | None:
+    """View of a StdVec_DistanceResult as (n, 20) doubles without gaps, of which `fields` have a meaning.
 
     Call it after every pair was computed once, so that the contents can be checked. Returns None if the layout in
     memory is not as expected.
     """
     count = len(results)
     if count == 0:
-        return np.zeros((0, RESULT_FIELDS))
+        return np.zeros((0, RESULT_DOUBLES))
     base = _address(results[0].normal)
     for i in {0, count // 2, count - 1}:
         if _address(results[i].normal) != base + RESULT_STRIDE * i:
             return None
-    buffer = (ctypes.c_char * (RESULT_STRIDE * (count - 1) + 8 * RESULT_FIELDS)).from_address(base - 8)
-    view: Array = np.ndarray((count, RESULT_FIELDS), float, buffer=memoryview(buffer), strides=(RESULT_STRIDE, 8))
+    buffer = (ctypes.c_char * (RESULT_STRIDE * count)).from_address(base - RESULT_NORMAL)
+    view: Array = np.ndarray((count, RESULT_DOUBLES), float, buffer=memoryview(buffer))
     for i in {0, count // 3, count // 2, count - 1}:
-        if not np.array_equal(view[i], read_result(results[i]), equal_nan=True):
+        if not np.array_equal(fields(view)[i], read_result(results[i]), equal_nan=True):
             return None
     return view
+
+
+def fields(view: Array) -> Array:
+    """The columns (n, 10) of a `result_view`: distance, normal, point on the first, point on the second."""
+    return view[:, RESULT_FIRST : RESULT_FIRST + RESULT_FIELDS]
+
+
+def distance_view(results: Any) -> Array | None:
+    """The `fields` (n, 10) of a StdVec_DistanceResult, or None: see `result_view`."""
+    view = result_view(results)
+    return None if view is None else fields(view)
 
 
 def read_result(result: Any) -> Array:

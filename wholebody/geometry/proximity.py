@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array, Indices
 from wholebody.geometry.guesses import Guesses
-from wholebody.geometry.memory_views import distance_view, placement_view, read_result
+from wholebody.geometry.memory_views import RESULT_DOUBLES, fields, placement_view, read_result, result_view
 from wholebody.geometry.swept_points import SweptPoints, swept_points
 
 COAL_ACCURACY = 1e-6  # m: of coal's distances
@@ -30,7 +30,7 @@ ENDLESS = 1e9  # m: what counts for the reach of a half-space, and half the size
 
 
 class Contacts(NamedTuple):
-    """Pairs nearer than a query distance, nearest first. All arrays have k rows.
+    """Pairs nearer than a query distance, nearest first. All arrays have k rows, and no gaps in memory.
 
     Attributes:
         pair: (k, 2) indices of the two pieces in the geometry model.
@@ -148,9 +148,9 @@ class Proximity:
         self._last, self._extent = np.zeros((count, 4, 3)), np.zeros((count, 3))
         self._lay_views()
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Forget how near each pair was and where coal ended for it: the same queries give the same answers again."""
-        self._guesses.forget()
+        self._guesses.reset()
         self._travelled[:] = 0.0
         self._bound[:] = -np.inf
 
@@ -162,10 +162,10 @@ class Proximity:
         for k in range(self.geometry.ngeoms):  # anywhere apart: views are laid over results that were computed
             self.results.oMg[k] = pin.SE3(np.eye(3), np.array([AWAY * k, 0.0, 0.0]))
         pin.computeDistances(self.geometry, self.results)
-        self._distances = distance_view(self.results.distanceResults)
+        self._distances = result_view(self.results.distanceResults)
         self._placements = placement_view(self.results.oMg)
         self.results.deactivateAllCollisionPairs()
-        self.forget()
+        self.reset()
 
     def placements(self, state: Kinematics) -> Array:
         """Placements (n, 4, 3) of the pieces with the joints as in `state`; see `Contacts.placements`."""
@@ -212,24 +212,30 @@ class Proximity:
     def _gather(self, placements: Array, index: Indices, within: float, most: Array) -> Contacts:
         results, known = self._distances, self.table
         if results is None:
-            results = np.zeros((len(known.pairs), 10))
+            results = np.zeros((len(known.pairs), RESULT_DOUBLES))
             for number in index.tolist():
-                results[number] = read_result(self.results.distanceResults[number])
-        table = np.empty((len(index), 10))
-        number, pair = np.empty(len(index), dtype=np.intp), np.empty((len(index), 2), dtype=np.intp)
+                fields(results)[number] = read_result(self.results.distanceResults[number])
+        room = len(index)
+        distance, vectors = np.empty(room), np.empty((3, room, 3))
+        numbers, pair = np.empty(room, dtype=np.intp), np.empty((room, 2), dtype=np.intp)
         count, broken = self._kernel.gather(
             results, index, known.pairs, known.points_meet, self._travelled, self._bound, 10.0 * COAL_ACCURACY, within,
-            most, table, number, pair,
+            most, distance, vectors, numbers, pair,
         )  # fmt: skip
-        table, number, pair = table[:count], number[:count], pair[:count]
+        normal, point_a, point_b = vectors
+        contacts = Contacts(
+            pair[:count], distance[:count], normal[:count], point_a[:count], point_b[:count], numbers[:count],
+            placements,
+        )  # fmt: skip
         if broken:
-            self._repair_normals(placements, table, pair, np.flatnonzero(table[:, 0] <= known.points_meet[number]))
-        return Contacts(pair, table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7:10], number, placements)
+            self._repair_normals(contacts)
+        return contacts
 
-    def _repair_normals(self, placements: Array, table: Array, pair: Indices, rows: Indices) -> None:
+    def _repair_normals(self, contacts: Contacts) -> None:
         """Give a normal to pairs where coal has none: capsule axes that cross exactly, concentric spheres."""
-        for row in rows:
-            first, second = pair[row]
+        placements = contacts.placements
+        for row in np.flatnonzero(contacts.distance <= self.table.points_meet[contacts.number]):
+            first, second = contacts.pair[row]
             axis_a = self.table.swept[first].axis @ placements[first, :3]
             axis_b = self.table.swept[second].axis @ placements[second, :3]
             normal = np.cross(axis_a, axis_b)
@@ -237,9 +243,9 @@ class Proximity:
                 along = axis_a if axis_a.any() else axis_b if axis_b.any() else np.array([1.0, 0.0, 0.0])
                 normal = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
             normal /= np.linalg.norm(normal)
-            center = 0.5 * (table[row, 4:7] + table[row, 7:10])
-            depth = -0.5 * table[row, 0] * normal
-            table[row, 1:4], table[row, 4:7], table[row, 7:10] = normal, center + depth, center - depth
+            center = 0.5 * (contacts.point_a[row] + contacts.point_b[row])
+            depth = -0.5 * contacts.distance[row] * normal
+            contacts.normal[row], contacts.point_a[row], contacts.point_b[row] = normal, center + depth, center - depth
 
 
 @lru_cache(maxsize=1)
@@ -254,7 +260,7 @@ def compiled_kernel() -> Any:
         np.zeros((2, 2), dtype=bool, order="F"), index, 0,
     )  # fmt: skip
     proximity_kernel.gather(
-        np.zeros((0, 20))[:, :10], index, pairs, none, one, none, 0.0, 0.0, none, np.zeros((0, 10)), index,
+        np.zeros((0, RESULT_DOUBLES)), index, pairs, none, one, none, 0.0, 0.0, none, none, np.zeros((3, 0, 3)), index,
         pairs,
     )  # fmt: skip
     return proximity_kernel

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array, Indices
 from wholebody.compiled import compiled
+from wholebody.geometry.memory_views import RESULT_FIRST
 
 
 @compiled()
@@ -36,6 +37,30 @@ def travel(placement: Array, last: Array, reach: Array, travelled: Array) -> Non
             travelled[i] += np.sqrt(shift) + np.sqrt(turn) * reach[i]
         elif shift > 0.0:
             travelled[i] += np.sqrt(shift)
+
+
+@compiled()
+def bound_by_boxes(placement: Array, half: Array, extent: Array) -> None:
+    """Write half the sizes (n, 3) of boxes along the world's axes about boxes along the pieces' own into `extent`."""
+    for i in range(len(half)):
+        for k in range(3):
+            total = 0.0
+            for j in range(3):
+                total += abs(placement[i, j, k]) * half[i, j]
+            extent[i, k] = total
+
+
+@compiled()
+def outer_gap(placement: Array, reach: Array, extent: Array, a: int, b: int) -> float:
+    """A lower bound of the signed distance of two pieces: the gap between the spheres or the boxes about them."""
+    square = 0.0
+    boxes = -np.inf
+    for k in range(3):
+        apart = abs(placement[a, 3, k] - placement[b, 3, k])
+        square += apart * apart
+        boxes = max(boxes, apart - extent[a, k] - extent[b, k])
+    gap: float = max(boxes, np.sqrt(square) - reach[a] - reach[b])
+    return gap
 
 
 @compiled()
@@ -73,12 +98,7 @@ def cull(
     Returns:
         How many there are.
     """
-    for i in range(len(reach)):
-        for k in range(3):
-            total = 0.0
-            for j in range(3):
-                total += abs(placement[i, j, k]) * half[i, j]
-            extent[i, k] = total
+    bound_by_boxes(placement, half, extent)
     count = 0
     for p in range(len(pairs)):
         a, b = pairs[p, 0], pairs[p, 1]
@@ -86,13 +106,7 @@ def cull(
         near = min(within, most[p])
         if bound[p] - way >= near:
             continue
-        square = 0.0
-        boxes = -np.inf
-        for k in range(3):
-            apart = abs(placement[a, 3, k] - placement[b, 3, k])
-            square += apart * apart
-            boxes = max(boxes, apart - extent[a, k] - extent[b, k])
-        gap = max(boxes, np.sqrt(square) - reach[a] - reach[b])
+        gap = outer_gap(placement, reach, extent, a, b)
         if gap >= near:
             bound[p] = gap + way
             continue
@@ -112,14 +126,15 @@ def gather(
     accuracy: float,
     within: float,
     most: Array,
-    table: Array,
+    nearest: Array,
+    vectors: Array,
     number: Indices,
     pair: Indices,
 ) -> tuple[int, bool]:
     """Copy the results of the pairs nearer than `within`, and remember the distances of all that were asked.
 
     Args:
-        results: (pairs, 10) of coal; see `memory_views.distance_view`.
+        results: (pairs, 20) of coal; see `memory_views.result_view`.
         index: (k,) the pairs that were asked.
         pairs: (pairs, 2) their pieces.
         points_meet: (pairs,) distance at and below which coal may have no normal.
@@ -128,7 +143,8 @@ def gather(
         accuracy: metres to which a distance is known, and share of it.
         within: metres.
         most: (pairs,) see `cull`.
-        table: (k, 10) room for distance, normal and nearest points.
+        nearest: (k,) room for distances.
+        vectors: (3, k, 3) room for normals and the nearest points on first and second pieces.
         number: (k,) room for the places of the pairs.
         pair: (k, 2) room for their pieces.
 
@@ -139,13 +155,13 @@ def gather(
     broken = False
     for p in index:
         a, b = pairs[p, 0], pairs[p, 1]
-        distance = results[p, 0]
+        distance = results[p, RESULT_FIRST]
         bound[p] = distance - accuracy * (1.0 + abs(distance)) + travelled[a] + travelled[b]
         if not distance < min(within, most[p]):
             continue
-        for k in range(10):
-            table[count, k] = results[p, k]
-        number[count] = p
+        nearest[count], number[count] = distance, p
+        for k in range(9):
+            vectors[k // 3, count, k % 3] = results[p, RESULT_FIRST + 1 + k]
         pair[count, 0], pair[count, 1] = a, b
         broken = broken or distance <= points_meet[p]
         count += 1

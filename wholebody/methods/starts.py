@@ -15,7 +15,8 @@ SPREADS = (0.3, 0.6, 1.0)  # largest distance from the first start, as a share o
 AT_LIMIT = 0.02  # rad: a joint nearer to its limit than this counts as at it
 BEND = 0.3  # rad: distance by which such a joint is moved off its limit
 SAME_MINIMUM = 0.01  # largest relative difference of values of one minimum; 0.05 merges neighbouring minima
-ROOT_SPREAD = 0.2  # m and rad, for joints without limits
+ROOT_SPREAD = 0.2  # m and rad, for joints without limits, but those that turn about one axis
+TURN = 2.0 * np.pi  # rad: range of those
 
 
 def bent(problem: Problem, state: State, start: Array) -> Array | None:
@@ -53,12 +54,31 @@ def restarts(
         count: how many.
         spreads: largest distances from the start as shares of each joint's range; `SPREADS` if empty.
     """
-    lower, upper = problem.scene.figure.tangent_bounds(start)
-    span = np.where(np.isfinite(upper - lower), upper - lower, ROOT_SPREAD)
+    lower, upper = _ranges(problem, start)
+    span = upper - lower
     shares = spreads or SPREADS
     for number in range(count):
         spread = shares[number % len(shares)]
         yield _moved(problem, state, start, rng.uniform(-0.5, 0.5, len(span)) * spread * span)
+
+
+def throughout(problem: Problem, state: State, start: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:
+    """Postures within limits, shape (nq,), of which each joint has every part of its range once.
+
+    A Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover, "A comparison of three methods for selecting values of
+    input variables", Technometrics 21, 1979): a limb of few joints is seen in all of its configurations.
+
+    Args:
+        problem: its bounds are kept.
+        state: of the run; it is moved.
+        start: (nq,) joints without limits stay near it.
+        rng: the random generator.
+        count: how many.
+    """
+    lower, upper = _ranges(problem, start)
+    parts = rng.permuted(np.tile(np.arange(count), (len(lower), 1)), axis=1)
+    for share in ((parts + rng.uniform(size=parts.shape)) / count).T:
+        yield _moved(problem, state, start, lower + share * (upper - lower))
 
 
 class Minima:
@@ -85,6 +105,17 @@ class Minima:
         """Whether all minima count as found."""
         found, count = len(self._values), self._count
         return count > found + 2 and found * (count - 1) <= (found + 0.5) * (count - found - 2)
+
+
+def _ranges(problem: Problem, start: Array) -> tuple[Array, Array]:
+    """The least and the largest move (nv,) of each degree of freedom from a posture (nq,), all of them finite."""
+    lower, upper = problem.scene.figure.tangent_bounds(start)
+    spread = np.full(len(lower), ROOT_SPREAD)
+    for joint in list(problem.scene.model.joints)[1:]:  # the first is the world
+        if joint.shortname().startswith("JointModelR"):
+            spread[joint.idx_v] = TURN
+    limited = np.isfinite(upper - lower)
+    return np.where(limited, lower, -0.5 * spread), np.where(limited, upper, 0.5 * spread)
 
 
 def _moved(problem: Problem, state: State, start: Array, move: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from importlib import import_module
 from types import MappingProxyType
 
@@ -41,7 +41,7 @@ METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
 """Methods by name: module and class of the settings."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class AvoidanceReport:
     """What a method did to a clip, and what it left.
 
@@ -73,13 +73,28 @@ class AvoidanceReport:
     missed: float
     stretch: float
     duration: float
-    times: Array = field(repr=False)
-    before: ClipCheck = field(repr=False)
-    after: ClipCheck = field(repr=False)
-    loads: LoadChange | None = field(repr=False, default=None)
+    times: Array
+    before: ClipCheck
+    after: ClipCheck
+    loads: LoadChange | None = None
+
+    def __str__(self) -> str:
+        """Three lines: what is left, before and after, and what it took."""
+        was, now = self.before, self.after
+        return (
+            f"{'free' if self.solved else 'not free'}: {self.message}\n"
+            f"frames in collision {was.colliding} before, {now.colliding} after; deepest {1e3 * was.deepest:.2f} mm "
+            f"before, {1e3 * now.deepest:.2f} mm after; {now.dips} dips between frames\n"
+            f"{self.method}: {self.seconds:.2f} s, {self.programs} programs, {self.posture_solves} postures; "
+            f"{self.frames_changed} of {len(now.clip)} frames changed"
+        )
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"AvoidanceReport({self.method!r}, solved={self.solved}, {self.message!r})"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Avoided:
     """The answer of `avoid`.
 
@@ -90,6 +105,14 @@ class Avoided:
 
     clip: Clip
     report: AvoidanceReport
+
+    def __str__(self) -> str:
+        """The name of the clip, and the three lines of its report."""
+        return f"{self.clip.name}, {self.report}"
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"Avoided({self.clip.name!r}, {self.report!r})"
 
 
 def avoider_named(name: str) -> Avoider:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -50,7 +50,7 @@ class Beyond:
     limit: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ClipCheck:
     """What `check` found in a clip.
 
@@ -69,15 +69,15 @@ class ClipCheck:
         queries: number of distances that coal was asked for.
     """
 
-    clip: Clip = field(repr=False)
+    clip: Clip
     tolerance: float
-    depth: Array = field(repr=False)
-    between: Array = field(repr=False)
-    contacts: tuple[Contact, ...] = field(repr=False)
+    depth: Array
+    between: Array
+    contacts: tuple[Contact, ...]
     limits: tuple[Beyond, ...]
     speeds: tuple[Beyond, ...]
-    sliding: tuple[Sliding, ...] = field(repr=False)
-    jerk: Array = field(repr=False)
+    sliding: tuple[Sliding, ...]
+    jerk: Array
     queries: int
 
     @property
@@ -115,6 +115,27 @@ class ClipCheck:
     def mean_jerk(self) -> float:
         """Root of the mean square of `jerk`, rad/s^3; 0 for fewer than four frames."""
         return float(np.sqrt(np.mean(self.jerk**2))) if len(self.jerk) else 0.0
+
+    def __str__(self) -> str:
+        """Three lines: whether it is free, the deepest overlap, and limits, speeds, feet and jerk."""
+        told = f"{self.clip.name}, {len(self.clip)} frames: "
+        first = f"nothing overlaps by more than {1e3 * self.tolerance:g} mm"
+        if not self.free:
+            first = (
+                f"{self.colliding} frames and {self.dips} gaps between free frames collide, {len(self.contacts)} pairs"
+            )
+        deepest = f"deepest {1e3 * self.deepest:.2f} mm in a frame and {1e3 * self.deepest_between:.2f} mm at any time"
+        if self.contacts:
+            worst = max(self.contacts, key=lambda contact: contact.deepest)
+            deepest += f", {worst.first} and {worst.second} at {worst.deepest_frame * self.clip.dt:.2f} s"
+        return (
+            f"{told}{first}\n{deepest}\n{len(self.limits)} joints beyond limits, {len(self.speeds)} too fast; feet "
+            f"slide {1e3 * self.slid:.1f} mm at most; jerk {self.mean_jerk:.0f} rad/s^3"
+        )
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"ClipCheck({str(self).splitlines()[0]!r})"
 
     def as_dict(self) -> dict[str, Any]:
         """Everything as JSON has it: metres, radians, seconds."""
@@ -174,7 +195,7 @@ def check(
     depth = number(depth, "check: depth", SMALLEST, LARGEST, "m")
     tell: Progress | None = function(progress, "check: progress") if progress is not None else None
     table = ContactTable(scene, len(clip))
-    with scene.lend() as workspace:
+    with scene.borrow() as workspace:
         swept = SweptDepth(workspace.table, workspace.geometry, depth)
         table.add(0, swept.start(clip.q[0]), between=False)
         for frame in range(1, len(clip)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import coal
 import numpy as np
 import pinocchio as pin
 
@@ -14,7 +15,7 @@ from wholebody.workspace import Workspace
 DIP = 8e-5  # m: a deeper overlap between two frames is a dip; `wb.check` allows 0.1 mm and may add 0.01 mm
 SAMPLED = 4e-5  # m: the same where a gap is looked at in a few places only; the deepest one may be elsewhere
 NEAR = 2e-4  # m: what is nearer than this between frames gets rows as soon as something dips
-FAR = 0.1  # m: distances beyond it are as good as this
+FAR = 0.1  # m: in place of a distance that coal does not find
 BEHIND = 2e-3  # share of a gap behind the first contact of a sweep at which it is looked at
 HALVINGS = 8  # of the search for the deepest place: to a fiftieth of what is between two places
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
@@ -23,8 +24,8 @@ MANY = tuple(float(k) / 64.0 for k in range(1, 64))
 """Shares of a gap at which it is looked at."""
 
 
-def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float]:
-    """Gaps that dip, and the share of each at which it is deepest.
+def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, int]:
+    """Gaps that dip, and the number of the pair that is deepest in each.
 
     Args:
         workspace: of this run alone.
@@ -39,8 +40,14 @@ def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float
         last = gap + 1
         passing = swept.advance(q[last])[1]
         if passing.depth.max(initial=0.0) > DIP:
-            found[gap] = _deepest(workspace, q[gap], q[last], int(passing.number[np.argmax(passing.depth)]))
+            found[gap] = int(passing.number[np.argmax(passing.depth)])
     return found
+
+
+def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float]:
+    """Gaps that dip, and the share of each at which it is deepest; see `dipping`."""
+    found = dipping(workspace, q, gaps)
+    return {gap: _deepest(workspace, q[gap], q[gap + 1], number) for gap, number in found.items()}
 
 
 def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tuple[int, float]]:
@@ -61,10 +68,17 @@ def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tu
 
 def _deepest(workspace: Workspace, before: Array, after: Array, number: int) -> float:
     """Share of the way between two postures (nq,) at which a pair is nearest: a corner dips in a hundredth of a gap."""
+    model, data, geometry = workspace.model, workspace.model.createData(), workspace.geometry
+    pieces = [geometry.geometryObjects[int(piece)] for piece in workspace.table.pairs[number]]
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
 
     def distance(share: float) -> float:
-        near = workspace.near(np.asarray(pin.interpolate(workspace.model, before, after, share)), FAR)
-        return float(near.distance[near.number == number].min(initial=FAR))
+        pin.forwardKinematics(model, data, pin.interpolate(model, before, after, share))
+        at = [data.oMi[piece.parentJoint] * piece.placement for piece in pieces]
+        places = [coal.Transform3s(one.rotation, one.translation) for one in at]
+        result.clear()
+        found = coal.distance(pieces[0].geometry, places[0], pieces[1].geometry, places[1], request, result)
+        return float(found) if np.isfinite(found) else FAR
 
     contact = workspace.sweep.first_contact(before, after, tolerance=DIP)
     begun: tuple[float, ...] = () if contact is None else (contact.fraction, contact.fraction + BEHIND)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wholebody.arrays import Array, Mask
-from wholebody.motion.dips import dips
+from wholebody.motion.dips import dipping
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.workspace import Workspace
 
@@ -19,7 +19,9 @@ def depth(workspace: Workspace, q: Array, clearance: float = 0.0) -> float:
     return clearance - float(workspace.near(q, clearance).distance.min(initial=clearance))
 
 
-def faults(workspace: Workspace, terms: FrameTerms, q: Array, clearance: float = 0.0) -> tuple[Array, Mask, list[int]]:
+def faults(
+    workspace: Workspace, terms: FrameTerms, q: Array, clearance: float = 0.0, first: int = 0
+) -> tuple[Array, Mask, list[int]]:
     """What is wrong with postures (n, nq) of a clip.
 
     Args:
@@ -27,6 +29,7 @@ def faults(workspace: Workspace, terms: FrameTerms, q: Array, clearance: float =
         terms: what is held.
         q: (n, nq) postures.
         clearance: least distance asked of every pair, metres.
+        first: frame of the clip that the first posture belongs to.
 
     Returns:
         (n,) depths in metres; (n,) frames that overlap, miss a limit or miss what is held; gaps between other frames
@@ -39,6 +42,8 @@ def faults(workspace: Workspace, terms: FrameTerms, q: Array, clearance: float =
     wrong = (depths > DEPTH) | (beyond > BEYOND)
     if terms.holds:
         state = workspace.state
-        wrong |= np.array([terms.missed(frame, state.update(posture)) > MISSED for frame, posture in enumerate(q)])
+        wrong |= np.array(
+            [terms.missed(frame, state.update(posture)) > MISSED for frame, posture in enumerate(q, first)]
+        )
     quiet = [frame for frame in range(len(q) - 1) if not (wrong[frame] or wrong[frame + 1])]
-    return depths, wrong, sorted(dips(workspace, q, quiet))
+    return depths, wrong, list(dipping(workspace, q, quiet))

@@ -1,8 +1,8 @@
-"""Method "frames": every frame by tracking the original posture, with the frame before as its start.
+"""Method "frames": every frame by tracking the original posture, from the deviation of the frame before.
 
 A forward pass follows the original motion as contacts let it. It is late where contact begins, so a backward pass
 follows it from the last frame to the first, and both are blended. What overlaps after that is put right by steps of the
-tracker.
+tracker, dips between frames by more room beside them, and what is left then by `wholebody.motion.mending`.
 """
 
 from __future__ import annotations
@@ -15,83 +15,20 @@ import pinocchio as pin
 
 from wholebody import checks
 from wholebody.arrays import Array
-from wholebody.figures.state import State
-from wholebody.methods.qp.method import QP
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
-from wholebody.motion.dips import dips
+from wholebody.motion.dips import dipping
 from wholebody.motion.faults import DEPTH, depth, faults
+from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
+from wholebody.motion.mending import Mender
 from wholebody.motion.windows import Window, windows
-from wholebody.problem import Problem
 from wholebody.scene import Scene
-from wholebody.tasks import Posture
-from wholebody.tasks.base import Bound, Constraint, Goal
 from wholebody.workspace import Workspace
 
 MARGIN = 0.3  # s, before and after a collision: in which the pass begins and ends at the original posture
-BACK = 1e-4  # rad, m: a posture this near to the original one is the original one
-MOST = 3  # steps of one frame; more = nearer to the original where much is in the way, dearer frames
 ROOM = 5e-4  # m: more room that the frames beside a dip are first asked for; it doubles from round to round
-LIFTS = 6  # rounds of asking for more
-STEP = 1e-3  # rad, m: a step no longer than this ends a frame
-
-
-class Follower:
-    """Follows the original motion frame by frame.
-
-    Attributes:
-        programs: how many quadratic programs were solved.
-    """
-
-    def __init__(self, terms: FrameTerms, clearance: float) -> None:
-        """Set up on a scene.
-
-        Args:
-            terms: original postures, and what is held.
-            clearance: least distance of every pair, metres.
-        """
-        self._terms, self._clearance, self.programs = terms, clearance, 0
-        q = terms.scene.figure.clamp(terms.q[0])
-        self._problem = Problem(terms.scene, q, goals=[Posture(terms.q[0])], measures=(), clearance=0.0)
-        bounds = [term.resolve(terms.scene, q) for term in terms.given if isinstance(term, Bound)]
-        still = [bound for bound in bounds if np.isfinite(bound.bounds(State(terms.scene.model), None)).any()]
-        self._problem.bounds = tuple(still)
-        self._tracker = QP(restarts=0).tracker(self._problem, terms.dt)
-        self._state = State(terms.scene.model)
-
-    def _still(self, number: int) -> tuple[Array, Array]:
-        """Least and greatest deviation (nv,) of a frame."""
-        low, high, _, _ = self._terms.bounds(number, self._state)
-        return low, high
-
-    def frame(self, number: int, q: Array, more: float = 0.0) -> Array:
-        """The posture of a frame, begun at a posture (nq,): steps until they are short.
-
-        Args:
-            number: of the frame.
-            q: (nq,) where the steps begin.
-            more: metres that are asked of every pair beyond the clearance.
-        """
-        terms, problem = self._terms, self._problem
-        problem.clearances = np.full_like(problem.clearances, self._clearance + more)
-        low, high = self._still(number)
-        if (low > -np.inf).any() or (high < np.inf).any():  # what is frozen keeps to the original motion
-            model = terms.scene.model
-            away = np.asarray(pin.difference(model, terms.q[number], q))
-            q = np.asarray(pin.integrate(model, terms.q[number], np.clip(away, low, high)))
-        goal = Posture(terms.q[number]).resolve(terms.scene, problem.start)
-        held = terms.held(number)
-        problem.goals = (goal, *(term for term in held if isinstance(term, Goal)))
-        if held:
-            problem.constraints = tuple(term for term in held if isinstance(term, Constraint))
-        for _ in range(MOST):
-            step = self._tracker.step(q)
-            self.programs += 1
-            q = step.q
-            if np.abs(step.displacement).max(initial=0.0) <= STEP:
-                break
-        return q
+LIFTS = 3  # rounds of asking for more
 
 
 @dataclass(frozen=True)
@@ -124,7 +61,7 @@ class PerFrame:
         check_input(clip, scene, progress)
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
         q = np.array(clip.q)
-        with scene.lend() as workspace:
+        with scene.borrow() as workspace:
             _, wrong, gaps = faults(workspace, terms, q, self.clearance)
             wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
             found = windows(wrong, max(2, round(MARGIN / clip.dt)))
@@ -136,8 +73,11 @@ class PerFrame:
                 self._free(window, q, terms, follower, workspace)
                 _lift(window, q, follower, workspace)
                 done += len(window)
+            mender = Mender(terms, workspace, self.clearance)
+            if found and not watch.ended:
+                q = mender.mend(q, watch)
         ended = "the caller ended it" if watch.ended else ""
-        return MethodResult(q, 0, 0 if follower is None else follower.programs, ended)
+        return MethodResult(q, 0, mender.programs + (0 if follower is None else follower.programs), ended)
 
     def _free(self, window: Window, q: Array, terms: FrameTerms, follower: Follower, workspace: Workspace) -> None:
         forward = _passed(follower, terms, range(window.first, window.end))
@@ -155,23 +95,27 @@ class PerFrame:
 
 
 def _passed(follower: Follower, terms: FrameTerms, frames: range) -> Array:
-    """(n, nq) postures of frames, each begun at the one before."""
-    found, here = [], terms.scene.figure.clamp(terms.q[frames[0]])
+    """(n, nq) postures of frames, each begun at its original posture with the deviation of the one before."""
+    model, figure, found = terms.scene.model, terms.scene.figure, list[Array]()
+    away = np.zeros(model.nv)
     for frame in frames:
+        # the motion goes on as the original one does; without that a foot would wait behind the one that stands
+        here = figure.clamp(np.asarray(pin.integrate(model, terms.q[frame], away)))
         here = follower.frame(frame, here)
         found.append(here)
+        away = np.asarray(pin.difference(model, terms.q[frame], here))
     return np.array(found)
 
 
 def _lift(window: Window, q: Array, follower: Follower, workspace: Workspace) -> None:
-    """Ask for more room in the frames on both sides of motions that dip, until none does."""
+    """Ask for more room in the frames on both sides of motions that dip, a few times.
+
+    Most dips are arcs between two postures in contact, and less than a millimetre deep.
+    """
     more = np.zeros(len(q))
     gaps = list(range(max(0, window.first - 1), min(len(q) - 1, window.end)))
     for _ in range(LIFTS):
-        dipping = list(dips(workspace, q, gaps))
-        if not dipping:
-            return
-        frames = sorted({frame + end for frame in dipping for end in (0, 1)})
+        frames = sorted({frame + end for frame in dipping(workspace, q, gaps) for end in (0, 1)})
         for frame in frames:
             more[frame] = 2.0 * more[frame] + ROOM
             q[frame] = follower.frame(frame, q[frame], float(more[frame]))

@@ -6,16 +6,20 @@ The shapes are parametric meshes and solids; sizes are those of common gear, and
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.checks import instance, known
+from wholebody.checks import text as checked_text
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.files import is_file
 from wholebody.geometry.shapes import Box, Mesh, Sphere
 from wholebody.motion.equipment import Equipment
+from wholebody.scene import Scene
 
 CARRIERS = ("lower_thorax", "thorax")
 CLOTH = (0.35, 0.38, 0.28, 1.0)
@@ -67,6 +71,9 @@ def torus(figure: Figure) -> tuple[Equipment, ...]:
     return (Equipment.worn(mesh, figure, name="torus", to="lower_thorax", side="left", height=WAIST, color=CLOTH),)
 
 
+NOTHING = "nothing"
+"""In place of equipment: nothing is worn."""
+
 READY: dict[str, Callable[[Figure], tuple[Equipment, ...]]] = {
     "side_sphere": side_sphere,
     "pouches": pouches,
@@ -95,6 +102,56 @@ def equipment(name: str, figure: Figure) -> tuple[Equipment, ...]:
             "put it on with wb.Equipment(name, shape, to=..., at=...)"
         )
     return READY[name](figure)
+
+
+Worn = str | Equipment | tuple["str | Equipment", ...]
+"""What is worn: "nothing"; names of equipment, joined by "+"; the path of a mesh, which is put on the back; equipment;
+or several of these."""
+
+
+def dressed(figure: Figure, worn: Worn) -> Scene:
+    """The scene of a figure that wears something; see `put_on`."""
+    return put_on(Scene(figure), worn)
+
+
+def put_on(scene: Scene, worn: Worn) -> Scene:
+    """The scene, which is changed, with something attached to its figure.
+
+    Raises:
+        UnknownNameError: there is no such equipment.
+        WholebodyError: a mesh that cannot be read, or a figure that the equipment does not fit.
+    """
+    if isinstance(worn, tuple):
+        for one in worn:
+            put_on(scene, one)
+        return scene
+    pieces = [worn] if isinstance(worn, Equipment) else list[Equipment]()
+    for name in () if isinstance(worn, Equipment) else _names(worn):
+        if name not in READY and Path(name).suffix:
+            pieces.append(Equipment.worn(Mesh(name), scene.figure, name=Path(name).stem))
+        elif name != NOTHING:
+            pieces.extend(equipment(name, scene.figure))
+    for piece in pieces:
+        piece.attach(scene)
+    return scene
+
+
+def label(worn: Worn) -> str:
+    """Name of what is worn, for tables and files.
+
+    Raises:
+        InputError: it is nothing of these.
+    """
+    if isinstance(worn, tuple) and worn:
+        return "+".join(label(one) for one in worn)
+    if isinstance(worn, Equipment):
+        return worn.name
+    return "+".join(Path(name).stem if Path(name).suffix else name for name in _names(worn))
+
+
+def _names(worn: object) -> list[str]:
+    text = checked_text(worn, "equipment")
+    return [text] if is_file(text) else text.split("+")
 
 
 def torus_mesh(radius: float, tube: float) -> tuple[Array, NDArray[np.int64]]:

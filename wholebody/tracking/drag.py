@@ -7,51 +7,35 @@ high.
 from __future__ import annotations
 
 import time
-from typing import Any, NamedTuple
+from typing import Any, Generic, TypeVar, overload
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.checks import time_step
+from wholebody.errors import InputError
 from wholebody.geometry.continuous.passing_through import GRAZE, is_free
-from wholebody.methods.base import Method, goal_error
+from wholebody.methods.base import Method, Tracker, goal_error, judged
+from wholebody.methods.newton.assembly import Assembly
+from wholebody.methods.newton.assembly_solution import AssemblySolution
 from wholebody.methods.solve import method_for_motions
+from wholebody.moving_things import Collision, FrameMotion
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Frame, Point, StepLimit
-from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, refuse_assembly, retarget
+from wholebody.tracking.assembly_drag import GOAL_MOVES, AssemblyDrag, DragFrame
+from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, retarget
 from wholebody.tracking.warm_start import warm_started
 from wholebody.workspace import Workspace
 
 FRAME = 1.0 / 60.0  # s: frame time of a screen
-GOAL_MOVES = (np.inf, 0.01, 0.002)  # m, rad: moves of the goal in a frame, tried until the motion is free
+Answer = TypeVar("Answer", Solution, AssemblySolution)
 
 
-class DragFrame(NamedTuple):
-    """Answer of one frame of a drag.
-
-    Attributes:
-        q: (nq,) the posture.
-        error: largest remaining goal error, metres or radians.
-        iterations: iterations of the method.
-        seconds: wall time.
-    """
-
-    q: Array
-    error: float
-    iterations: int
-    seconds: float
-
-
-class Drag:
-    """Follows a goal that is moved from frame to frame.
-
-    "qp" solves one quadratic program a frame, seldom up to three; "newton" takes a few Newton steps. Other methods
-    solve every frame anew from the present posture, "ccd" to a millimetre. No method restarts from other postures. If
-    the motion to a posture penetrates something, the goal moves by a shorter distance, or not in that frame. If a thing
-    was moved into the figure, the figure first leaves it.
+class ProblemDrag:
+    """Follows a goal of a problem; see `Drag`.
 
     Attributes:
         problem: the problem; its goals are replaced as they move.
@@ -59,21 +43,13 @@ class Drag:
         tracker: the method's tracker of these goals.
     """
 
-    def __init__(self, problem: Problem, method: str | Method = "qp", *, goal: int = 0, dt: float = FRAME) -> None:
+    def __init__(self, problem: Problem, method: str | Method, *, goal: int, dt: float) -> None:
         """Begin a drag at the problem's start.
-
-        Args:
-            problem: with the goal that will move, a `Point` or a `Frame`.
-            method: "qp", "ccd", "newton" or another by name, with a tolerance of 1e-5 at the end and no restarts; or a
-                configured method, which is used as it is.
-            goal: index of the goal that moves.
-            dt: seconds a frame.
 
         Raises:
             InputError: there is no such goal, or it is of another kind.
             UnknownNameError: there is no such method.
         """
-        refuse_assembly(problem, "Drag")
         self.problem, self.dt = copied(problem), time_step(dt, "dt")
         self.method = method_for_motions(method)
         self.tracker = self.method.tracker(self.problem, self.dt)
@@ -81,6 +57,7 @@ class Drag:
         self._alone = OneAtATime("drag")
         moving_goal(problem, goal)
         self._number = goal
+        self._motion: FrameMotion | None = None
         self.q: Array = problem.scene.figure.clamp(problem.start)
 
     def to(self, target: Any) -> DragFrame:
@@ -93,13 +70,17 @@ class Drag:
         with self._alone:
             retarget(self.problem, self._number, target)
             self._workspace.refresh()
+            collisions: tuple[Collision, ...] = ()
             if np.isinf(self.tracker.unswept):
                 step = self.tracker.frame(self.q)
-                self.q, iterations = step.q, step.iterations
+                self.q, iterations, collisions = step.q, step.iterations, getattr(step, "collisions", ())
             else:
+                before, self._motion = self.q, self._workspace.next_frame()
                 iterations = self._followed()
+                if self._motion is not None:
+                    collisions = judged(self._workspace, self._motion, before, self.q)
             error = goal_error(self.problem, self._workspace, self.q)
-            return DragFrame(self.q, error, iterations, time.perf_counter() - began)
+            return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions)
 
     def finish(self) -> Solution:
         """Meet the present goal with the method's full accuracy, and assess the posture."""
@@ -130,9 +111,7 @@ class Drag:
                 continue  # the goal is nearer than that, and was tried already
             step = self.tracker.frame(self.q)
             spent, q = spent + step.iterations, self._bounded(step.q)
-            if is_free(self._workspace, self.q, q, self.tracker.unswept) and (
-                not deep or _depth(self._workspace, q) <= GRAZE
-            ):
+            if self._is_free(q, self.tracker.unswept) and (not deep or _depth(self._workspace, q) <= GRAZE):
                 self.q = q
                 break
             tried.append(q)
@@ -140,6 +119,12 @@ class Drag:
             if deep:
                 self._leave(tried, deep)
         return spent
+
+    def _is_free(self, q: Array, unswept: float) -> bool:
+        """Whether the motion to the posture q (nq,) is free, with things that move meanwhile; see `is_free`."""
+        if self._motion is not None:
+            return self._motion.first_contact(self.q, q, GRAZE) is None
+        return is_free(self._workspace, self.q, q, unswept)
 
     def _bounded(self, q: Array) -> Array:
         """The motion towards the posture q (nq,), as far as the velocity bounds allow in a frame."""
@@ -165,10 +150,10 @@ class Drag:
         The candidates are the tracker's ways out and the postures (nq,) that were tried. A free motion is better than
         one that gets deeper first; among these the shallower end is better.
         """
-        ends = [*(self._bounded(q) for q in self.tracker.ways_out(self.q)), *tried]
+        ends = [*(self._bounded(q) for q in self.tracker.overlap_resolutions(self.q)), *tried]
         depths = [_depth(self._workspace, q) for q in ends]
         out = [
-            (not is_free(self._workspace, self.q, q, 0.0), depth, number)
+            (not self._is_free(q, 0.0), depth, number)
             for number, (depth, q) in enumerate(zip(depths, ends, strict=True))
             if depth < deep
         ]
@@ -179,3 +164,82 @@ class Drag:
 def _depth(workspace: Workspace, q: Array) -> float:
     """Depth of the deepest overlap at a posture (nq,), metres."""
     return float(-workspace.near(q, 0.0).distance.min(initial=0.0))
+
+
+class Drag(Generic[Answer]):
+    """Follows a goal that is moved from frame to frame, of a problem by any method or of an assembly.
+
+    "qp" solves one quadratic program a frame, seldom up to three; "newton" takes a few Newton steps. Other methods
+    solve every frame anew from the present posture, "ccd" to a millimetre. No method restarts from other postures. If
+    the motion to a posture penetrates something, the goal moves by a shorter distance, or not in that frame. If a thing
+    was moved into the figure, the figure first leaves it. Of things that move (`Scene.move` with `over`) "qp" gets out
+    of the way as they come; the others meet them where they end. What they could not avoid is named in the answer.
+
+    A drag of an assembly moves the assembly itself, by a few Newton steps a frame.
+    """
+
+    @overload
+    def __init__(
+        self: Drag[Solution], problem: Problem, method: str | Method = ..., *, goal: int = ..., dt: float = ...
+    ) -> None: ...
+    @overload
+    def __init__(self: Drag[AssemblySolution], problem: Assembly, *, goal: int = ...) -> None: ...
+    def __init__(
+        self, problem: Problem | Assembly, method: str | Method = "qp", *, goal: int = 0, dt: float = FRAME
+    ) -> None:
+        """Begin a drag at the problem's start, or where the assembly's bodies are.
+
+        Args:
+            problem: with the goal that will move, a `Point` or a `Frame`; or an assembly with a goal.
+            method: "qp", "ccd", "newton" or another by name, with a tolerance of 1e-5 at the end and no restarts; or a
+                configured method, which is used as it is. An assembly has one method only.
+            goal: index of the goal that moves.
+            dt: seconds a frame, for methods that bound velocities.
+
+        Raises:
+            InputError: there is no such goal, or it is of another kind.
+            UnknownNameError: there is no such method.
+        """
+        self._run: ProblemDrag | AssemblyDrag
+        if isinstance(problem, Assembly):
+            time_step(dt, "dt")
+            if isinstance(method, str) and method not in ("qp", "newton"):
+                raise InputError(f"Drag: an assembly is solved by Newton steps, not by {method!r}; leave method out")
+            self._run = AssemblyDrag(problem, goal)
+        else:
+            self._run = ProblemDrag(problem, method, goal=goal, dt=dt)
+
+    @property
+    def q(self) -> Array:
+        """(nq,) the present posture; of an assembly that of its `scene`."""
+        return self._run.q
+
+    @q.setter
+    def q(self, q: Array) -> None:
+        if isinstance(self._run, AssemblyDrag):
+            raise InputError("Drag: the posture of an assembly is set by assembly.place(variables)")
+        self._run.q = q
+
+    @property
+    def problem(self) -> Problem | Assembly:
+        """The problem, whose goals are replaced as they move; or the assembly."""
+        return self._run.assembly if isinstance(self._run, AssemblyDrag) else self._run.problem
+
+    @property
+    def tracker(self) -> Tracker | None:
+        """The method's tracker of the problem's goals; None for an assembly."""
+        return self._run.tracker if isinstance(self._run, ProblemDrag) else None
+
+    def to(self, target: Any) -> DragFrame:
+        """Move the goal to a position (or a placement, for a `Frame`), and make one frame towards it.
+
+        Raises:
+            InputError: the target is not one.
+        """
+        return self._run.to(target)
+
+    def finish(self) -> Answer:
+        """Meet the present goal with the method's full accuracy, and assess the posture."""
+        answer: Any = self._run.finish()
+        found: Answer = answer
+        return found

@@ -7,20 +7,23 @@ is attracted to the tracked posture as far as contact allows.
 
 from __future__ import annotations
 
+import copy
 import itertools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.arrays import Array
-from wholebody.checks import array, flag, function, instance, known, time_step
+from wholebody.checks import array, flag, function, instance, known, listed, time_step
 from wholebody.errors import InputError
+from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.proximity import PENETRATION
 from wholebody.methods.inputs import SEED
 from wholebody.methods.qp.method import QP
+from wholebody.moving_things import Collision, FrameMotion
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
@@ -49,6 +52,9 @@ def check_scene(scene: object, what: str) -> None:
 class FrameLoop:
     """Computes the posture of a figure that follows a tracker, frame by frame, without penetration.
 
+    Things may be moved between frames. One that moves during a frame (`Scene.move` with `over`) is met on its way: with
+    "qp" the figure gets out of its way as it comes. What could not be avoided is named in the frame.
+
     Attributes:
         scene: the figure among things.
         shown: (nq,) the posture that is shown at present.
@@ -65,6 +71,7 @@ class FrameLoop:
         dt: float = FRAME,
         seed: int = 0,
         rigid: bool = False,
+        touching: Sequence[str] = (),
     ) -> None:
         """Prepare the first frame.
 
@@ -76,9 +83,10 @@ class FrameLoop:
             dt: seconds from frame to frame.
             seed: of all random orders.
             rigid: whether the figure is displaced as a whole, such as a hand, while its joints follow the tracker.
+            touching: names of things that the figure may touch; with "qp" it keeps a millimetre from all others.
 
         Raises:
-            UnknownNameError: another overlap.
+            UnknownNameError: another overlap, or no such thing.
             InputError: the start has the wrong shape, is not finite, or no posture near it is free of overlap.
         """
         check_scene(scene, "FrameLoop")
@@ -86,12 +94,15 @@ class FrameLoop:
         dt = time_step(dt, "dt")
         SEED.check(seed, "seed")
         flag(rigid, "rigid")
-        self.scene, self.overlap, self.count = scene, overlap, 0
+        for name in listed(touching, "FrameLoop: touching", "['ball']"):
+            known(name, scene.objects, "object", "touching")
+        self.scene, self.overlap, self.count, self._touching = scene, overlap, 0, tuple(touching)
         q = array(start, "start", f"a posture of {scene.figure.name}").copy()
-        unreadable = _unreadable(scene, q)
-        if unreadable:
-            raise InputError(f"frame 0: {unreadable}; begin with a posture of {scene.figure.name}")
+        reason = unreadable(scene, q)
+        if reason:
+            raise InputError(f"frame 0: {reason}; begin with a posture of {scene.figure.name}")
         self.shown, self._note = free_start(scene, q, rigid)
+        self._workspace = scene.workspace()
         self._strategy = self._strategy_for(overlap, dt, seed, rigid)
         self._kept_from_passing(self._strategy.resolve(self.shown, self.shown))  # one-time set-up
 
@@ -106,14 +117,20 @@ class FrameLoop:
         """
         began = _clocks()
         goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
-        unreadable = _unreadable(self.scene, goal)
-        if unreadable:
-            return self._shown(Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{unreadable}; the figure stays"), began)
-        resolution = self._strategy.resolve(self.shown, self._readable(goal))
-        # Simulated objects would move here, after the driven ones.
-        return self._shown(self._kept_from_passing(resolution), began)
+        reason = unreadable(self.scene, goal)
+        self._workspace.refresh()
+        motion = self._workspace.next_frame()
+        if reason:
+            resolution = Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{reason}; the figure stays", swept=True)
+        else:
+            resolution = self._strategy.resolve(self.shown, self._readable(goal))
+        if motion is not None:
+            return self._shown(*self._kept_from_moving(resolution, motion), began=began)
+        return self._shown(self._kept_from_passing(resolution), began=began)
 
-    def _shown(self, resolution: Resolution, began: tuple[float, float]) -> Frame:
+    def _shown(
+        self, resolution: Resolution, collisions: tuple[Collision, ...] = (), *, began: tuple[float, float]
+    ) -> Frame:
         note = "; ".join(part for part in (self._note, resolution.note) if part)
         note = f"frame {self.count}: {note}" if note else ""
         self.shown, self._note, self.count = np.array(resolution.candidates[0]), "", self.count + 1
@@ -121,6 +138,7 @@ class FrameLoop:
         return Frame(
             self.shown, wall, cpu, resolution.contact_seconds, resolution.solve_seconds,
             resolution.iterations, resolution.joints, resolution.pairs, note,
+            collisions,
         )  # fmt: skip
 
     def _readable(self, goal: Array) -> Array:
@@ -152,9 +170,35 @@ class FrameLoop:
         spent = resolution.contact_seconds + time.perf_counter() - began
         return resolution._replace(candidates=(q,), contact_seconds=spent, note=note)
 
+    def _kept_from_moving(
+        self, resolution: Resolution, motion: FrameMotion
+    ) -> tuple[Resolution, tuple[Collision, ...]]:
+        """The first posture to which the motion is free of things that move meanwhile, or else the least deep.
+
+        Returns:
+            The resolution with this posture, and what could not be avoided, which its note names.
+        """
+        began, start = time.perf_counter(), (0.0, self.shown)
+        nearest = resolution.candidates[-1]
+        ways: list[tuple[tuple[float, Array], ...]] = [resolution.path] if resolution.path else []
+        ends = [*resolution.candidates, *(pin.interpolate(self.scene.model, self.shown, nearest, s) for s in SHARES)]
+        ways += [(start, (1.0, np.asarray(q))) for q in [*ends, self.shown]]
+        best, found, least = ways[0], tuple[Collision, ...](), np.inf
+        for way in ways:
+            collisions = motion.collisions(way)
+            depth = sum(one.depth for one in collisions)
+            if depth < least:
+                best, found, least = way, collisions, depth
+            if not collisions:
+                break
+        self._workspace.keep(motion, found)
+        note = "; ".join(part for part in (resolution.note, *map(str, found)) if part)
+        spent = resolution.contact_seconds + time.perf_counter() - began
+        return resolution._replace(candidates=(best[-1][1],), contact_seconds=spent, note=note), found
+
     def _strategy_for(self, overlap: str, dt: float, seed: int, rigid: bool) -> OverlapStrategy:
         if overlap == "qp":
-            return QPStrategy(self.scene, self.shown, dt, rigid)
+            return QPStrategy(self.scene, self.shown, dt, rigid, self._touching)
         if rigid:
             from wholebody.tracking.rigid_translation import RigidTranslation
 
@@ -164,7 +208,7 @@ class FrameLoop:
         return CCDStrategy(self.scene, self.shown, dt, seed)
 
 
-def _unreadable(scene: Scene, q: Array) -> str:
+def unreadable(scene: Scene, q: Array) -> str:
     """Why a tracked posture is invalid, or ""."""
     if q.shape != (scene.model.nq,) or not np.isfinite(q).all():
         return f"the tracked posture is not {scene.model.nq} finite numbers"
@@ -176,6 +220,28 @@ def _unreadable(scene: Scene, q: Array) -> str:
 def _clocks() -> tuple[float, float]:
     """Wall time and the processor's time for this thread, seconds."""
     return time.perf_counter(), time.thread_time()
+
+
+def frame_placements(
+    scene: Scene, moves: Mapping[str, Sequence[PlacementLike]] | None, count: int, what: str
+) -> dict[str, tuple[pin.SE3, ...]]:
+    """Placements of things at the ends of `count` frames, checked.
+
+    Raises:
+        InputError: not a mapping, not as many placements as frames, or one that cannot be read.
+        UnknownNameError: there is no such thing.
+    """
+    if moves is None:
+        return {}
+    instance(moves, Mapping, what, "give {name: a placement for each frame}")  # type: ignore[type-abstract]
+    found = {}
+    for name, given in moves.items():
+        known(name, scene.objects, "object", what)
+        places = listed(given, f"{what}[{name!r}]", "[(x, y, z), ...]")
+        if len(places) != count:
+            raise InputError(f"{what}[{name!r}] has {len(places)} placements; give {count}, one for each frame")
+        found[name] = tuple(placement(at, f"{what}[{name!r}][{number}]") for number, at in enumerate(places))
+    return found
 
 
 def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
@@ -215,6 +281,7 @@ def follow(
     seed: int = 0,
     rigid: bool = False,
     progress: Callable[[int], None] | None = None,
+    moves: Mapping[str, Sequence[PlacementLike]] | None = None,
 ) -> Recording:
     """Follow a whole track.
 
@@ -225,6 +292,8 @@ def follow(
         seed: of all random orders; the same seed gives the same frames.
         rigid: whether the figure is displaced as a whole, see `FrameLoop`.
         progress: called after each frame with the number of frames done.
+        moves: thing to its placement at the end of each frame, as many as the track has; it moves from one to the next,
+            and begins where the scene has it. The scene is left as it was.
 
     Raises:
         UnknownNameError, InputError: the track does not fit the figure, or no posture near its start is free; frame
@@ -234,10 +303,14 @@ def follow(
     instance(track, Track, "follow: track", "make one with Track.of(figure, q, dt)")
     function(progress, "progress")
     track.check(scene.figure)
+    ways = frame_placements(scene, moves, len(track.q), "follow: moves")
+    scene = copy.copy(scene) if ways else scene
     loop = FrameLoop(scene, track.q[0], overlap=overlap, dt=track.dt, seed=seed, rigid=rigid)
     frames = []
     for number, tracked in enumerate(track.q):
+        for name, places in ways.items():
+            scene.move(name, at=places[number], over=track.dt)
         frames.append(loop.frame(tracked))
         if progress is not None:
             progress(number + 1)
-    return Recording.of(frames, track.q, track.dt, overlap)
+    return Recording.of(frames, track.q, track.dt, overlap, ways)

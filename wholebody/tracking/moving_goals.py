@@ -12,7 +12,6 @@ from wholebody.arrays import Array
 from wholebody.checks import whole
 from wholebody.errors import InputError
 from wholebody.methods.inputs import check_problem
-from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
 from wholebody.tasks import Frame, Point
 from wholebody.tasks.base import Goal
@@ -27,19 +26,6 @@ def copied(problem: Problem) -> Problem:
     check_problem(problem, "problem")
     problem.check_fresh()
     return copy.copy(problem)
-
-
-def refuse_assembly(problem: object, what: str) -> None:
-    """Refuse an assembly in place of a problem: its goals have no indices, and its bodies no shapes.
-
-    Raises:
-        InputError: it is an assembly.
-    """
-    if isinstance(problem, Assembly):
-        raise InputError(
-            f"{what} takes a Problem, not an Assembly; move an assembly's goal by "
-            "assembly.drop_goals().point_goal(body, target).solve(), place by place"
-        )
 
 
 def moving_goal(problem: Problem, number: int) -> Point | Frame:

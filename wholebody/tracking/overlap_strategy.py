@@ -12,7 +12,8 @@ class Resolution(NamedTuple):
 
     Attributes:
         candidates: postures (nq,) to show, the best one first; the next is taken if the motion to one is not free.
-        swept: whether the motion to the first of them was swept and is free.
+        swept: whether the motion to the first of them was swept and is free, where nothing moves by itself.
+        path: where things moved, shares of the frame and postures (nq,) on the way to the first of them.
     """
 
     candidates: tuple[Array, ...]
@@ -23,6 +24,7 @@ class Resolution(NamedTuple):
     pairs: int
     note: str
     swept: bool = False
+    path: tuple[tuple[float, Array], ...] = ()
 
 
 class OverlapStrategy(Protocol):

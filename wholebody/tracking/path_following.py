@@ -7,6 +7,7 @@ be reached, or the end.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,12 +17,14 @@ from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
+from wholebody.methods.newton.assembly import Assembly
+from wholebody.methods.newton.assembly_solution import AssemblySolution
 from wholebody.methods.solve import method_for_motions
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point
 from wholebody.tasks.inputs import FARTHEST, point
-from wholebody.tracking.moving_goals import copied, moving_goal, refuse_assembly, retarget
+from wholebody.tracking.moving_goals import copied, moving_goal, retarget
 from wholebody.tracking.warm_start import warm_started
 
 SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from a nearer start
@@ -30,18 +33,32 @@ MOST_GOALS = 10_000
 FRAME = 1.0 / 60.0  # s: time step of the tracker, which makes only whole solves here
 
 
+@overload
 def follow_path(
-    problem: Problem, path: ArrayLike, method: str | Method = "newton", *, goal: int = 0, spacing: float = SPACING
-) -> tuple[Solution, ...]:
+    problem: Problem, path: ArrayLike, method: str | Method = ..., *, goal: int = ..., spacing: float = ...
+) -> tuple[Solution, ...]: ...
+@overload
+def follow_path(
+    problem: Assembly, path: ArrayLike, *, goal: int = ..., spacing: float = ...
+) -> tuple[AssemblySolution, ...]: ...
+def follow_path(
+    problem: Problem | Assembly,
+    path: ArrayLike,
+    method: str | Method = "newton",
+    *,
+    goal: int = 0,
+    spacing: float = SPACING,
+) -> tuple[Solution, ...] | tuple[AssemblySolution, ...]:
     """Move a goal along a path, through evenly spaced intermediate goals.
 
     `solve` finds the posture for the first corner. Each later goal is solved from the posture before. If the motion to
     its posture is blocked, the goal counts as not reached.
 
     Args:
-        problem: with the goal that moves, a `Point`.
+        problem: with the goal that moves, a `Point`; or an assembly with a goal of `point_goal`. An assembly's bodies
+            move along, and stay where the last solution left them.
         path: (k, 3) corners of the path, metres; the first one is the first target.
-        method: by name, with a tolerance of 1e-5 and no restarts, or a configured method.
+        method: for a problem: by name, with a tolerance of 1e-5 and no restarts, or a configured method.
         goal: index of the goal that moves.
         spacing: metres between intermediate goals, at most.
 
@@ -52,9 +69,10 @@ def follow_path(
         InputError: the path is not one, the spacing is not positive, or the goal is not a `Point`.
         UnknownNameError: there is no such method.
     """
-    refuse_assembly(problem, "follow_path")
-    check_problem(problem, "follow_path: problem")
     places = _spaced(path, spacing)
+    if isinstance(problem, Assembly):
+        return _pulled(problem, places, goal)
+    check_problem(problem, "follow_path: problem")
     term = moving_goal(problem, goal)
     if not isinstance(term, Point):
         raise InputError(f"follow_path moves a Point, and goals[{goal}] is a {type(term).__name__}; use Drag")
@@ -66,6 +84,18 @@ def follow_path(
         if not found[-1].solved:
             break
         q = found[-1].q
+    return tuple(found)
+
+
+def _pulled(assembly: Assembly, places: Sequence[Array], goal: int) -> tuple[AssemblySolution, ...]:
+    """The same for an assembly: pull to goal, as Choi and Cremer call it."""
+    if assembly.goals[assembly.goal_index(goal)].whole:
+        raise InputError(f"follow_path moves the goal of a point, and goal {goal} is that of a frame; use Drag")
+    found: list[AssemblySolution] = []
+    for place in places:
+        found.append(assembly.retarget(goal, place).solve())
+        if found[-1].status != "solved":
+            break
     return tuple(found)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -42,7 +43,7 @@ class QPStrategy:
 
     sweep_tolerance = 5e-5
 
-    def __init__(self, scene: Scene, start: Array, dt: float, rigid: bool) -> None:
+    def __init__(self, scene: Scene, start: Array, dt: float, rigid: bool, touching: Sequence[str] = ()) -> None:
         """Prepare for frames of `dt` seconds, from the overlap-free posture `start`, (nq,).
 
         Args:
@@ -50,14 +51,17 @@ class QPStrategy:
             start: (nq,) the present posture.
             dt: seconds from frame to frame.
             rigid: whether the figure is displaced as a whole while its joints follow the tracker.
+            touching: things that the figure may touch; from all others it keeps `CLEARANCE`.
         """
         self.scene, self.dt = scene, dt
         self._pace = Pace(scene.model, pace(scene, dt))
         self._attraction = Attraction(scene.model, start, weights(scene, rigid))
         cones = [ReachCones()] if scene.figure.cones else []
+        mine = [*scene.figure.segments, *(name for name, thing in scene.objects.items() if thing.segment is not None)]
         self.problem = Problem(
-            scene, start, constraints=[self._pace, *cones], measures=[self._attraction], clearance=CLEARANCE
-        )
+            scene, start, constraints=[self._pace, *cones], measures=[self._attraction], clearance=CLEARANCE,
+            touching=[(part, name) for name in touching for part in mine],
+        )  # fmt: skip
         self._tracker = QP().tracker(self.problem, dt)
         self._into_cones = OverlapResolver(scene, scene.workspace()).into_cones if cones else np.array
 
@@ -75,10 +79,12 @@ class QPStrategy:
         self._pace.begin(shown)
         q = shown
         candidates: list[Array] = []
+        path: list[tuple[float, Array]] = []
         while len(candidates) < STEPS:
             step = self._tracker.step(q)
             q = self._into_cones(step.q)  # rows are exact to first order only, and have one edge at a corner of a cone
             candidates.append(q)
+            path += [*step.path[:-1], (1.0, q)] if step.path else [(1.0, q)] if path else []
             if np.abs(step.displacement).max() < SETTLED or not step.rows:
                 break
         contacts = workspace.near(q, 1.01 * CLEARANCE)
@@ -86,7 +92,9 @@ class QPStrategy:
         queried = proximity.seconds - queried
         whole = time.perf_counter() - began
         joints = len(candidates) * (self.scene.model.njoints - 1) if pairs else 0
-        return Resolution(tuple(candidates[::-1]), queried, whole - queried, len(candidates), joints, pairs, "")
+        return Resolution(
+            tuple(candidates[::-1]), queried, whole - queried, len(candidates), joints, pairs, "", path=tuple(path)
+        )
 
 
 def weights(scene: Scene, rigid: bool) -> Array:

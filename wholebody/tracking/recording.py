@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
+from wholebody.moving_things import Collision
 
 Counts = NDArray[np.intp]
 
@@ -28,6 +30,7 @@ class Frame(NamedTuple):
             per frame of table 2 of Schmidl and Lin; 0 if the figure is displaced as a whole.
         pairs: number of pairs of pieces that were kept apart or separated.
         note: "" or a report of unusual events.
+        collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
     """
 
     q: Array
@@ -39,6 +42,7 @@ class Frame(NamedTuple):
     joints: int
     pairs: int
     note: str
+    collisions: tuple[Collision, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,7 @@ class Recording:
         seconds, cpu_seconds, contact_seconds, solve_seconds: (n,) as in `Frame`.
         iterations, joints, pairs: (n,) as in `Frame`.
         notes: a note for each frame, mostly empty.
+        moves: things that moved, with their placements at the ends of the frames.
     """
 
     q: Array
@@ -67,9 +72,17 @@ class Recording:
     joints: Counts
     pairs: Counts
     notes: tuple[str, ...]
+    moves: Mapping[str, Sequence[pin.SE3]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, frames: Sequence[Frame], tracked: Array, dt: float, overlap: str) -> Recording:
+    def of(
+        cls,
+        frames: Sequence[Frame],
+        tracked: Array,
+        dt: float,
+        overlap: str,
+        moves: Mapping[str, Sequence[pin.SE3]] | None = None,
+    ) -> Recording:
         """Collect frames."""
         return cls(
             q=np.array([frame.q for frame in frames]),
@@ -84,6 +97,7 @@ class Recording:
             joints=np.array([frame.joints for frame in frames], dtype=np.intp),
             pairs=np.array([frame.pairs for frame in frames], dtype=np.intp),
             notes=tuple(frame.note for frame in frames),
+            moves={} if moves is None else dict(moves),
         )
 
     def __len__(self) -> int:

@@ -9,8 +9,10 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.view import style
+from wholebody.view.axes import mark_frames
 from wholebody.view.blocker_markers import mark_blockers
 from wholebody.view.bodies import Bodies
 from wholebody.view.camera import camera_on
@@ -41,6 +43,24 @@ class Composition:
         self._state = State(scene.model)
         self._bodies: Bodies | None = None
         self._goals: Goals | None = None
+        self._frames: tuple[str, ...] = ()
+        self._axes = style.AXES_LENGTH
+
+    @property
+    def figure(self) -> Figure:
+        """The figure.
+
+        Raises:
+            InputError: there is none: the scene is of parts alone.
+        """
+        if self._scene.figure is None:
+            raise InputError("the scene has no figure, so it has no frames to show")
+        figure: Figure = self._scene.figure
+        return figure
+
+    def frames(self, names: Iterable[str], length: float) -> None:
+        """Draw the axes of these frames of the figure in every keyframe made from now on, `length` metres long."""
+        self._frames, self._axes = tuple(names), length
 
     @property
     def bodies(self) -> Bodies:
@@ -72,6 +92,7 @@ class Composition:
             asked = float(problem.clearances.max(initial=0.0))
             near = self._scene.contacts(q, within=asked + self._contact_distance)
             mark_blockers(keyframe, self._scene, state, near, blockers)
+        mark_frames(keyframe, self._scene, state, self._frames, self._axes)
         if self._names:
             for path, (name, top) in bodies.tops(state.data).items():
                 matrix = np.eye(4)

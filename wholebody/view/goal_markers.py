@@ -14,6 +14,7 @@ from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import placement
 from wholebody.view import drawing, style
+from wholebody.view.axes import mark_axes
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.viewed_scene import ViewedScene
 
@@ -50,8 +51,8 @@ class Goals:
             if line is not None:
                 keyframe.markers[f"{root}/line"] = (_MISS, line)
             if directed:
-                _triad(keyframe, f"{root}/axes", target, style.AXES_LENGTH)
-                _triad(keyframe, f"{root}/frame", here, style.AXES_LENGTH / 2)
+                mark_axes(keyframe, f"{root}/axes", target, style.AXES_LENGTH)
+                mark_axes(keyframe, f"{root}/frame", here, style.AXES_LENGTH / 2)
             self._point(keyframe, root, goal, here)
             text = f"{getattr(goal, 'frame', 'centre of mass')}  {left(goal, state)}"
             label = Marker("label", style.GOAL_LABEL, style.LABEL_SIZE, text)
@@ -132,12 +133,6 @@ def left(goal: Any, state: State) -> str:
         f"{np.degrees(np.linalg.norm(error[angular])):.1f}°" if angular.any() else "",
     )
     return "  ".join(part for part in parts if part)
-
-
-def _triad(keyframe: Keyframe, path: str, place: pin.SE3, length: float) -> None:
-    for name, color, direction in zip("xyz", style.AXES, place.rotation.T, strict=True):
-        arrow = drawing.arrow_placement(place.translation, direction, length)
-        keyframe.markers[f"{path}/{name}"] = (Marker("arrow", color, 0.7), arrow)
 
 
 def _at(point: Array) -> Array:

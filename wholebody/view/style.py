@@ -56,6 +56,7 @@ PLATE = (6.0, 6.0, 0.04)  # m: size of the plate that represents a half-space
 
 FIGURE_NODE, OBJECT_NODE, GHOST_NODE = "/figure", "/objects", "/ghosts"
 CONTACT_NODE, GOAL_NODE, NAME_NODE, BLOCKER_NODE = "/contacts", "/goals", "/names", "/in the way"
+FRAME_NODE = "/frames"
 """Folders of the page's scene tree: each can be switched off in its controls."""
 
 FIELD_OF_VIEW = 32.0  # degrees, vertical

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from wholebody.arrays import Array
 from wholebody.checks import a
 from wholebody.errors import InputError
+from wholebody.methods.newton.assembly import Assembly
+from wholebody.view.viewed_assembly import ViewedAssembly
 
 
 def checked_scene(scene: Any) -> Any:
@@ -20,15 +22,14 @@ def checked_scene(scene: Any) -> Any:
     Raises:
         InputError: it is no scene; for some other types the message says how to show them.
     """
+    if isinstance(scene, Assembly) and scene.has_shapes:
+        return ViewedAssembly(scene)
     if isinstance(getattr(scene, "model", None), pin.Model) and callable(getattr(scene, "contacts", None)):
         return scene
-    if hasattr(scene, "scene"):  # a problem
+    if isinstance(scene, Assembly):
+        mend = "none of its bodies has a shape; give some with body(name, shape=...), or use wholebody.view.parts.Parts"
+    elif hasattr(scene, "scene"):  # a problem
         mend = f"give the scene of the {type(scene).__name__}"
-    elif hasattr(scene, "bodies"):  # an assembly
-        mend = (
-            "its bodies have no shapes; say what they look like with wholebody.view.parts.Parts, and show "
-            "parts.posture(solution.placements)"
-        )
     else:
         mend = "make one with wb.Scene(figure)"
     raise InputError(f"Viewer: scene is {a(type(scene))}, not a Scene; {mend}")

@@ -19,6 +19,7 @@ from wholebody.assessment import assess
 from wholebody.errors import InputError
 from wholebody.files import check_writable, write
 from wholebody.geometry.placement import FARTHEST
+from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
 from wholebody.view import style
 from wholebody.view.camera import look
@@ -54,7 +55,7 @@ class Viewer:
 
     def __init__(
         self,
-        scene: ViewedScene,
+        scene: ViewedScene | Assembly,
         *,
         contact_distance: float = 0.005,
         see_through: Collection[str] = (),
@@ -66,7 +67,7 @@ class Viewer:
         """Prepare to show a scene.
 
         Args:
-            scene: a `wholebody.Scene`.
+            scene: a `wholebody.Scene`, or an assembly whose bodies have shapes; its posture is `assembly.q`.
             contact_distance: pieces nearer than this are shown as touching, metres.
             see_through: names of things to draw transparent, so that they do not hide the figure.
             names: whether to write the names of things beside them.
@@ -79,23 +80,24 @@ class Viewer:
             InputError: not a scene, or a value of the wrong kind or out of range.
             UnknownNameError: there is no thing of a name in `see_through`.
         """
-        scene = checked_scene(scene)
+        viewed = checked_scene(scene)
         contact_distance = checks.number(contact_distance, "contact_distance", -FARTHEST, FARTHEST, "m")
         see_through = checks.listed(see_through, "see_through", "['table']")
         for name in see_through:
-            checks.known(name, scene.objects, "object", "see_through")
+            checks.known(name, viewed.objects, "object", "see_through")
         checks.flag(names, "names")
         checks.text(title, "title")
         self._host, self._port = checks.text(host, "host"), checks.whole(port, "port", 0, 65535)
         self.title = title
         self._graph = SceneGraph()
-        self._composition = Composition(scene, self._graph, contact_distance, tuple(see_through), names)
+        self._composition = Composition(viewed, self._graph, contact_distance, tuple(see_through), names)
         self._screenshots = Screenshots()
         self._sender: Sender | None = None
         self._camera: Command | None = None
         self._seen: list[Array] = []
         self._ghosts: list[Array] = []
         self._motion: tuple[int, float] | None = None
+        self._shown: tuple[Array, Any] | None = None
 
     # ---- content
 
@@ -113,7 +115,7 @@ class Viewer:
         posture = self._composition.checked(q)
         blockers = assess(problem, posture).blockers if isinstance(problem, Problem) else ()
         keyframe = self._composition.keyframe(posture, problem, blockers)
-        self._seen, self._motion = [posture], None
+        self._seen, self._motion, self._shown = [posture], None, (posture, problem)
         if self._graph.store.camera is None:
             self._graph.do(self._camera_command())
         self._graph.show(keyframe)
@@ -144,7 +146,7 @@ class Viewer:
         if ghost is not None:
             followed = checks.listed(getattr(ghost, "q", ghost), "ghost", "postures, each of shape (nq,)")
             self._ghosts = self._composition.moving_ghost(keyframes, followed, style.GHOST)
-        self._motion = (len(postures), step)
+        self._motion, self._shown = (len(postures), step), None
         chosen = np.unique(np.linspace(0, len(postures) - 1, CAMERA_POSTURES).astype(int))
         self._seen = [postures[index] for index in chosen]
         self._graph.do(self._camera_command())
@@ -165,6 +167,28 @@ class Viewer:
         self._ghosts = [self._composition.checked(q) for q in given]
         self._composition.ghosts(self._ghosts, painted)
         self._graph.flush()
+
+    def frames(self, names: Sequence[str] | None = None, *, length: float = style.AXES_LENGTH) -> None:
+        """Show the axes of frames of the figure, with their names: x red, y green, z blue.
+
+        They are drawn at the posture that is shown, and at all that are shown or played after this call.
+
+        Args:
+            names: frames, segments or joints; by default all of the figure's frames for goals; none removes the axes.
+            length: of the axes, metres.
+
+        Raises:
+            UnknownNameError: there is no frame of a name.
+            InputError: the scene has no figure, or a value of the wrong kind or out of range.
+        """
+        figure = self._composition.figure
+        given = figure.frames if names is None else checks.listed(names, "names", "['right_palm']")
+        for name in given:
+            figure.frame_id(name)
+        self._composition.frames(given, checks.number(length, "length", 1e-3, FARTHEST, "m"))
+        if self._shown is not None:
+            q, problem = self._shown
+            self.show(q, problem=problem)
 
     def look(self, eye: ArrayLike | None = None, target: ArrayLike | None = None) -> None:
         """Set the camera; without arguments it looks at the figure.

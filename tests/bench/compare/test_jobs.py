@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from wholebody.bench.compare.jobs import Task, own_child, work
+from wholebody.batches import close_own_child
+from wholebody.bench.compare.jobs import Task, work
 
 
 def test_what_a_method_compiles_is_not_taken_for_what_its_solves_cost(fakes: ModuleType) -> None:
@@ -13,7 +14,8 @@ def test_what_a_method_compiles_is_not_taken_for_what_its_solves_cost(fakes: Mod
     try:
         chunk = work(Task(fakes.SET, 0, 0, solves, cap=10.0, most=1.0))
     finally:
-        own_child().close()
+        close_own_child()
+    assert not chunk.fault
     assert chunk.spent["sleeps"] >= 0.4
     assert chunk.spent["compiles"] < 1.5  # which it takes to compile
     assert [record.outcome for record in chunk.records] == ["answered", "answered", "failed"]

@@ -152,7 +152,7 @@ def test_a_set_that_cannot_be_built_is_an_error_with_its_reason(fakes: ModuleTyp
 
 def test_a_local_dask_cluster_gives_the_same(fakes: ModuleType, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
-    from wholebody.bench.compare.jobs import threads
+    from wholebody.batches import threads
 
     asked = settings(fakes, "solves", "refuses", cases=3)
     with distributed.LocalCluster(
@@ -166,7 +166,7 @@ def test_a_local_dask_cluster_gives_the_same(fakes: ModuleType, tmp_path: Path) 
 
 def test_a_cluster_that_is_not_there_is_one_sentence() -> None:
     pytest.importorskip("distributed")
-    from wholebody.bench.compare.jobs import threads
+    from wholebody.batches import threads
 
     with pytest.raises(WholebodyError, match="no dask scheduler answers"):
         threads("not an address")

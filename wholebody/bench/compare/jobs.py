@@ -1,25 +1,19 @@
-"""One chunk of work, and where chunks are worked on: in processes of this machine or on a cluster, through joblib."""
+"""One chunk of work of a comparison."""
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
 
+from wholebody.batches import own_child
 from wholebody.bench.adapters.base import FIRST_FIT, Adapter, Budget
 from wholebody.bench.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Record
 from wholebody.bench.compare.solving import BUILDING, Which, built, solved, warmed
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.problem_sets.case import ProblemSet
-from wholebody.errors import MissingPackageError, WholebodyError
-from wholebody.runner import ONE_THREAD, Child, EndedError
-
-ORPHANED = 1.0  # s: how often a process looks whether its parent is still there
+from wholebody.runner import Child, EndedError
 
 _local = threading.local()
 
@@ -107,77 +101,17 @@ def _solve(child: Child, adapter: Adapter, level: Budget, task: Task) -> tuple[R
 
 def _warm_up(child: Child, which: Which, adapter: Adapter, cap: float) -> None:
     """Let a method import and compile what it needs. What goes wrong over it will do so again in its solve."""
-    if adapter.name in _local.hopeless:
+    if adapter.name in _hopeless():
         return
     try:
         child.call(warmed, which, adapter, cap, seconds=BUILDING)
     except EndedError:
-        _local.hopeless.add(adapter.name)
+        _hopeless().add(adapter.name)
 
 
-def own_child() -> Child:
-    """The process in which this thread's methods run; it lives as long as this process."""
-    if not hasattr(_local, "child"):
-        _local.child, _local.hopeless = Child(ONE_THREAD), set[str]()
-        if multiprocessing.current_process().name.startswith("LokyProcess"):
-            threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
-    child: Child = _local.child
-    return child
-
-
-def _end_with(parent: int) -> None:
-    """End this process, and with it its child, when its parent was killed; joblib's would wait for minutes."""
-    while os.getppid() == parent:
-        time.sleep(ORPHANED)
-    os._exit(1)
-
-
-def compute(tasks: Iterator[Task], jobs: int, cluster: str | None = None) -> Iterator[Chunk]:
-    """Work on tasks beside each other, and give their chunks as they are done. Tasks are asked for when one can begin.
-
-    Args:
-        tasks: asked for one by one.
-        jobs: how many at a time.
-        cluster: address of a dask scheduler; processes of this machine where None.
-
-    Raises:
-        MissingPackageError: dask is not installed.
-        WholebodyError: the cluster does not answer.
-    """
-    import joblib
-
-    with ExitStack() as stack:
-        if cluster is not None:
-            stack.enter_context(_client(cluster))
-            stack.enter_context(joblib.parallel_config(backend="dask"))
-        parallel = joblib.Parallel(
-            n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=jobs + 1
-        )  # fmt: skip
-        yield from parallel(joblib.delayed(work)(task) for task in tasks)
-
-
-def threads(cluster: str) -> int:
-    """How many cases a cluster works on at a time.
-
-    Raises:
-        MissingPackageError: dask is not installed.
-        WholebodyError: the cluster does not answer, or has no workers.
-    """
-    with _client(cluster) as client:
-        found = sum(client.nthreads().values())
-    if not found:
-        raise WholebodyError(f"the dask scheduler at {cluster} has no workers; start some: dask worker {cluster}")
-    return int(found)
-
-
-def _client(address: str) -> AbstractContextManager[Any]:
-    try:
-        from distributed import Client
-    except ImportError:
-        raise MissingPackageError("--cluster needs dask; install it with: pip install 'wholebody[cluster]'") from None
-    try:
-        connect: Callable[..., AbstractContextManager[Any]] = Client
-        client = connect(address, timeout=10)
-    except (OSError, ValueError) as error:
-        raise WholebodyError(f"no dask scheduler answers at {address} ({error}); start one: dask scheduler") from None
-    return client
+def _hopeless() -> set[str]:
+    """Names of the methods that ended this thread's process over warming up."""
+    if not hasattr(_local, "hopeless"):
+        _local.hopeless = set[str]()
+    found: set[str] = _local.hopeless
+    return found

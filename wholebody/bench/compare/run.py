@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from wholebody.batches import spread
 from wholebody.bench.adapters.base import Adapter
-from wholebody.bench.compare.jobs import Task, compute
+from wholebody.bench.compare.jobs import Task, work
 from wholebody.bench.compare.plan import Plan
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk, Store
@@ -53,7 +54,7 @@ def run(
     before = sum(_seconds(chunk) for chunk in store.chunks)
     done = {(chunk.set, chunk.number) for chunk in store.chunks}
     end = began + 60.0 * settings.minutes - before / jobs
-    for chunk in compute(_tasks(settings, plan, done, end), jobs, cluster):
+    for chunk in spread(work, _tasks(settings, plan, done, end), jobs, cluster):
         store.add(chunk)
         plan.note(chunk)
         worked = before + jobs * (time.perf_counter() - began)

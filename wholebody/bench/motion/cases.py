@@ -16,8 +16,7 @@ from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.reading import read_clip
-from wholebody.motion.ready_equipment import READY, equipment
-from wholebody.scene import Scene
+from wholebody.motion.ready_equipment import NOTHING, READY
 
 RATE = 30.0  # Hz: of all clips
 LONGEST = 12.0  # s: longer recordings are cut
@@ -114,16 +113,8 @@ def recordings(folder: Path | None) -> tuple[Path, ...]:
     return tuple(found)
 
 
-EQUIPMENT = ("nothing", *READY)
+EQUIPMENT = (NOTHING, *READY)
 """What a person wears."""
-
-
-def dressed(figure: Figure, worn: str) -> Scene:
-    """The scene of a person that wears something of `EQUIPMENT`."""
-    scene = Scene(figure)
-    for piece in equipment(worn, figure) if worn != "nothing" else ():
-        piece.attach(scene)
-    return scene
 
 
 def chosen(wanted: Sequence[str] | None, known: Sequence[str], option: str) -> tuple[str, ...]:

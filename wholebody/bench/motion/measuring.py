@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wholebody.bench.motion.cases import SYNTHETIC, WEAPON, dressed, recorded, synthetic
+from wholebody.batches import run_batch
+from wholebody.bench.motion.cases import SYNTHETIC, WEAPON, recorded, synthetic
 from wholebody.bench.tables import read_rows, write_rows
 from wholebody.errors import InputError, WholebodyError
 from wholebody.files import make_folder
-from wholebody.runner import ONE_THREAD, Child, EndedError, Job, Outcome, run_jobs
+from wholebody.runner import Job
 
 if TYPE_CHECKING:
     from wholebody.motion.checking import ClipCheck
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 FIGURE = "human"
 CHECKED = "check"  # in place of a method: the clip as it is
 MAKING = 600.0  # s: to read a clip and bring it onto the figure
-START = 120.0  # s of the deadline of a case that its clip's length does not count for: imports, compilation
+START = 300.0  # s of the deadline of a case beside those for its length: imports, compilation, other work
 SLOWEST = 60.0  # s for a second of motion, after which a method is ended
 MIDDLE = 7  # frames, around a collision, with which everything is compiled or read back first
 
@@ -133,6 +134,7 @@ def measured(row: MotionRow, path: str) -> MotionRow:
     from wholebody.figures import load
     from wholebody.motion.checking import check
     from wholebody.motion.reading import read_clip
+    from wholebody.motion.ready_equipment import dressed
 
     figure = load(FIGURE)
     scene, clip = dressed(figure, row.equipment), read_clip(path, figure)
@@ -239,7 +241,7 @@ def run(
         if row.clip in faults:
             rows[row.key] = replace(row, outcome="no clip", said=faults[row.clip])
     waiting = [row for row in missing if row.clip not in faults]
-    for outcome in _outcomes(waiting, lengths, folder, jobs):
+    for outcome in run_batch((_job(row, lengths[row.clip][1], folder) for row in waiting), jobs):
         row = outcome.answer or replace(
             outcome.job.name, outcome="overtime" if outcome.error and outcome.error.overtime else "ended",
             said=str(outcome.error), frames=lengths[outcome.job.name.clip][0],
@@ -259,42 +261,26 @@ def clip_file(name: str, folder: Path) -> Path:
     return folder / "clips" / f"{name.replace(' ', '_')}.npz"
 
 
-def _outcomes(
-    rows: Sequence[MotionRow], lengths: Mapping[str, tuple[int, float]], folder: Path, jobs: int
-) -> Iterator[Outcome]:
-    asked = iter(rows)
-
-    def next_job() -> Job | None:
-        row = next(asked, None)
-        if row is None:
-            return None
-        seconds = START + SLOWEST * lengths[row.clip][1]
-        return Job(row, measured, (row, str(clip_file(row.clip, folder))), seconds)
-
-    yield from run_jobs(next_job, [Child(ONE_THREAD) for _ in range(min(jobs, max(1, len(rows))))])
+def _job(row: MotionRow, duration: float, folder: Path) -> Job:
+    return Job(row, measured, (row, str(clip_file(row.clip, folder))), START + SLOWEST * duration)
 
 
 def _clips(
     clips: Mapping[str, Path | None], folder: Path, jobs: int, tell: Callable[[int, int, str], object]
 ) -> tuple[dict[str, tuple[int, float]], dict[str, str]]:
     """Make the clips; the length of each, and the faults of those that could not be made."""
-    asked = iter(clips.items())
-    lengths, faults = dict[str, tuple[int, float]](), dict[str, str]()
-
-    def next_job() -> Job | None:
-        name, recording = next(asked, (None, None))
-        if name is None:
-            return None
+    for name, recording in clips.items():
         if recording is None and name not in SYNTHETIC:
             raise InputError(f"there is no clip {name!r}; give one of {', '.join(SYNTHETIC)}")
-        where = str(clip_file(name, folder))
-        return Job(name, _made_or_fault, (name, "" if recording is None else str(recording), where), MAKING)
-
-    for outcome in run_jobs(next_job, [Child(ONE_THREAD) for _ in range(min(jobs, max(1, len(clips))))]):
+    work = (
+        Job(name, _made_or_fault, (name, str(recording or ""), str(clip_file(name, folder))), MAKING)
+        for name, recording in clips.items()
+    )
+    lengths, faults = dict[str, tuple[int, float]](), dict[str, str]()
+    for outcome in run_batch(work, jobs):
         name = outcome.job.name
-        error: EndedError | None = outcome.error
-        if error is not None or isinstance(outcome.answer, str):
-            faults[name] = str(error) if error is not None else outcome.answer
+        if outcome.error is not None or isinstance(outcome.answer, str):
+            faults[name] = outcome.answer or str(outcome.error)
         else:
             lengths[name] = outcome.answer
         tell(0, len(clips), f"clip {name}: {faults.get(name, 'ready')}")

@@ -21,6 +21,7 @@ from wholebody.cli.bench import (
     solve,
     stability,
     step,
+    world,
 )
 
 HELP = "measure steps, solves and random reaches, beside other tools where installed"
@@ -50,5 +51,6 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         attack,
         ablation,
         regress,
+        world,
     ):
         command.add_to(kinds)

@@ -87,7 +87,7 @@ def _settings(arguments: argparse.Namespace) -> Settings:
 
 
 def _jobs(arguments: argparse.Namespace) -> int:
-    from wholebody.bench.compare.jobs import threads
+    from wholebody.batches import threads
 
     if arguments.jobs is None:
         return threads(arguments.cluster) if arguments.cluster else 1

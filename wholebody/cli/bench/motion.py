@@ -29,6 +29,9 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser.add_argument("--equipment", nargs="+", metavar="NAME", help="what is worn (default: all)")
     parser.add_argument("--methods", nargs="+", metavar="NAME", help="methods, and check (default: all)")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="cases at a time (default: 1)")
+    parser.add_argument(
+        "--figures", action="store_true", help="redraw figures 4.1 to 4.7 of Degenhardt's thesis instead; needs --clips"
+    )
     parser.set_defaults(run=run)
     add_common(parser)
 
@@ -40,6 +43,8 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.motion.avoidance import METHODS
 
     check_count(arguments.jobs, "--jobs")
+    if arguments.figures:
+        return _figures(arguments)
     recordings = {path.stem: path for path in cases.recordings(arguments.clips)}
     known: dict[str, Path | None] = {**dict.fromkeys(cases.SYNTHETIC), **recordings}
     names = cases.chosen(arguments.only, tuple(known), "--only")
@@ -57,6 +62,31 @@ def run(arguments: argparse.Namespace) -> int:
     if any(row.measured for row in rows):
         charts["motion-check"] = report.check_chart(rows, arguments.out / "motion-check")
     publish("motion", report.report(rows, facts), charts, CAPTIONS, arguments)
+    return 0
+
+
+def _figures(arguments: argparse.Namespace) -> int:
+    import shutil
+
+    from wholebody.bench.motion import cases, figures
+    from wholebody.bench.report import render
+    from wholebody.figures import load
+    from wholebody.files import make_folder
+
+    recordings = {path.stem: path for path in cases.recordings(arguments.clips)}
+    names = cases.chosen(arguments.only, [drawing.number for drawing in figures.DRAWINGS], "--only")
+    folder, figure, drawn = arguments.out / "figures", load("human"), []
+    for drawing in figures.DRAWINGS:
+        if drawing.number in names:
+            drawn.append(figures.redraw(drawing, recordings, figure, folder, arguments.jobs))
+            print(f"figure {drawing.number}: {drawn[-1].strip}, {drawn[-1].curves}", flush=True)
+    publish("motion-figures", render("motion_figures.md", figures=drawn), {}, {}, arguments)
+    if arguments.update_docs is not None:
+        place = arguments.update_docs / "assets" / "motion"
+        make_folder(place)
+        for one in drawn:
+            for path in (one.strip, one.curves):
+                shutil.copyfile(path, place / path.name)
     return 0
 
 

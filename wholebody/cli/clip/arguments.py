@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from wholebody.figures import Figure
     from wholebody.motion.clip import Clip
-    from wholebody.scene import Scene
+
+MOST_JOBS = 4096
 
 
-def add_clip(parser: argparse.ArgumentParser) -> None:
-    """Add the file of a clip, and the figure that it moves."""
-    parser.add_argument("file", type=Path, metavar="FILE", help="the motion")
+def add_command(
+    commands: argparse._SubParsersAction[argparse.ArgumentParser], name: str, help: str, description: str,
+    epilog: str = "", many: bool = False,
+) -> argparse.ArgumentParser:  # fmt: skip
+    """Add a command that takes the file of a clip, or of several, and the figure that it moves."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser(name, help=help, description=description, epilog=epilog, formatter_class=shape)
+    if many:
+        parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="the motions")
+    else:
+        parser.add_argument("file", type=Path, metavar="FILE", help="the motion")
     figure = parser.add_argument_group("figure")
     figure.add_argument(
         "--figure", default="human", metavar="FIGURE", help="human (default), avatar, hand, or the path of a URDF"
@@ -25,34 +34,57 @@ def add_clip(parser: argparse.ArgumentParser) -> None:
     figure.add_argument("--stature", type=float, metavar="M", help="height of a person, m (default: median)")
     figure.add_argument("--mass", type=float, metavar="KG", help="mass of a person, kg (default: from the stature)")
     figure.add_argument("--detail", choices=("spheres", "capsules", "hulls"), help="geometry (default: capsules)")
+    return parser
 
 
 def add_equipment(parser: argparse.ArgumentParser) -> None:
     """Add what the figure wears."""
     parser.add_argument(
         "--equipment", action="append", default=[], metavar="WHAT",
-        help="what the body wears: a ready name such as pack, or a mesh that is put on its back; may be repeated",
+        help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back; "
+        "repeated, each in turn",
     )  # fmt: skip
 
 
-def dressed(scene: Scene, names: Sequence[str]) -> Scene:
-    """The scene with equipment attached to its figure.
+def add_jobs(parser: argparse.ArgumentParser) -> None:
+    """Add how many cases are done at a time, and where."""
+    parser.add_argument("--jobs", type=int, metavar="N", help="cases at a time (default: 1, or all of the cluster)")
+    parser.add_argument("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786")
+
+
+def jobs_of(arguments: argparse.Namespace) -> int:
+    """How many cases are done at a time.
 
     Raises:
-        WholebodyError: no such equipment, a mesh that cannot be read, or a figure that it does not fit.
+        WholebodyError: less than one, or a cluster that does not answer.
     """
-    from wholebody.geometry.shapes import Mesh
-    from wholebody.motion.equipment import Equipment
-    from wholebody.motion.ready_equipment import READY, equipment
+    from wholebody.batches import threads
+    from wholebody.checks import whole
 
-    for name in names:
-        if name in READY or not Path(name).suffix:
-            worn = equipment(name, scene.figure)
-        else:
-            worn = (Equipment.worn(Mesh(name), scene.figure, name=Path(name).stem),)
-        for one in worn:
-            one.attach(scene)
-    return scene
+    if arguments.jobs is None:
+        return threads(arguments.cluster) if arguments.cluster else 1
+    return whole(arguments.jobs, "--jobs", 1, MOST_JOBS)
+
+
+@contextmanager
+def bar(what: str, count: float = 1.0) -> Iterator[Callable[[float, str], object]]:
+    """Show how far something is; the function takes what is done, and says what it is."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    numbers = MofNCompleteColumn() if count != 1.0 else TaskProgressColumn()
+    columns = TextColumn("{task.description}"), BarColumn(), numbers, TimeRemainingColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as shown:
+        task = shown.add_task(escape(what), total=count)
+        yield lambda done, said: shown.update(task, completed=done, total=count, description=escape(said))
 
 
 def figure_of(arguments: argparse.Namespace) -> Figure:

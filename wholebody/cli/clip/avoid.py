@@ -1,4 +1,4 @@
-"""`wholebody clip avoid`: free a motion of collisions."""
+"""`wholebody clip avoid`: free motions of collisions."""
 
 from __future__ import annotations
 
@@ -7,23 +7,40 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.clip.arguments import add_clip, add_equipment, clip_of, dressed
+from wholebody.cli.clip.arguments import add_command, add_equipment, add_jobs, bar, figure_of, jobs_of
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from wholebody.motion.avoidance import Avoided
     from wholebody.motion.avoider import Avoider
-    from wholebody.motion.strength import Strength
+    from wholebody.motion.batch_table import AvoidedCase
 
 DESCRIPTION = """\
-Free a motion of collisions of the body with itself and with what it wears. The answer is judged by all pairs in all
-frames and by sweeps between them, independently of the method; the exit code is 1 where something is left."""
+Free motions of collisions of the body with itself and with what it wears. The answer is judged by all pairs in all
+frames and by sweeps between them, independently of the method; the exit code is 1 where something is left.
+
+Several motions, pieces of equipment or methods are a batch: each motion with each equipment by each method, written
+into a folder with a table (cases.csv, cases.json). What the folder holds already is not done again, so a batch that was
+ended goes on."""
+EPILOG = """\
+examples:
+  wholebody clip avoid walk.bvh --equipment pack
+  wholebody clip avoid walk.bvh run.bvh --equipment pack --equipment vest_plate+pouches --jobs 4 --out freed"""
+METHOD, WORN, FOLDER = "trajectory", "nothing", "freed"
+WIDE = 120  # letters that a line of a batch's table needs
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command."""
-    parser = commands.add_parser("avoid", help="free a motion of collisions", description=DESCRIPTION)
-    add_clip(parser)
-    parser.add_argument("--method", default="trajectory", metavar="NAME", help="how (default: trajectory)")
+    parser = add_command(commands, "avoid", "free motions of collisions", DESCRIPTION, EPILOG, many=True)
+    parser.add_argument(
+        "--method",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="how (default: trajectory); repeated, each in turn",
+    )
     add_equipment(parser)
     parser.add_argument("--no-feet", action="store_true", help="let feet slide that stand; without it they are held")
     parser.add_argument(
@@ -37,70 +54,73 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         metavar="FACTOR",
         help="slow the motion by up to this factor where joints are too fast or, with --dynamics, too weak",
     )
-    parser.add_argument("--out", type=Path, metavar="FILE", help="default: <name>-free.npz, beside FILE")
+    parser.add_argument(
+        "--out", type=Path, metavar="OUT",
+        help="the file to write (default: <name>-free.npz, beside FILE); of a batch a folder (default: freed)",
+    )  # fmt: skip
+    add_jobs(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Free the clip, write it, and say what was found."""
+    """Free the clips, write them, and say what was found."""
+    methods, worn = arguments.method or [METHOD], arguments.equipment or [WORN]
+    if len(arguments.files) * len(methods) * len(worn) > 1:
+        return _batch(arguments, methods, worn)
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+    from wholebody.files import check_writable
     from wholebody.motion.avoidance import avoid
-    from wholebody.scene import Scene
+    from wholebody.motion.reading import read_clip
+    from wholebody.motion.ready_equipment import dressed
 
-    method = _method(arguments)
-    clip = clip_of(arguments)
-    scene = dressed(Scene(clip.figure), arguments.equipment)
-    console = Console()
-    with Progress(TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), transient=True) as bar:
-        task = bar.add_task(clip.name, total=1.0)
+    (file,) = arguments.files
+    out = check_writable(arguments.out or file.with_name(f"{file.stem}-free.npz"))
+    method, figure = _method(methods[0], arguments), figure_of(arguments)
+    scene, clip = dressed(figure, worn[0]), read_clip(file, figure)
+    with bar(clip.name) as tell:
         avoided = avoid(
             clip,
             scene,
             method=method,
             hold_feet=not arguments.no_feet,
-            dynamics=_strength(arguments),
-            progress=lambda told: bar.update(task, completed=told.share, description=told.note),
+            progress=lambda told: _ignored(tell(told.share, told.note)),
         )
-    out = arguments.out or arguments.file.with_name(f"{arguments.file.stem}-free.npz")
-    written = avoided.clip.write(out)
-    _tell(console, avoided, written)
+    _tell(Console(), avoided, avoided.clip.write(out))
     return 0 if avoided.report.solved else 1
 
 
-def _method(arguments: argparse.Namespace) -> Avoider:
-    """The method, which may slow the motion.
+def _ignored(_: object) -> None:
+    """Go on: a method ends where its progress returns True."""
+
+
+def _method(name: str, arguments: argparse.Namespace) -> Avoider:
+    """The method, which may slow the motion, and keep to the strength of a person of the sex that was asked for.
 
     Raises:
         WholebodyError: there is no such method, or it does not slow motions.
     """
     from wholebody.errors import InputError
     from wholebody.motion.avoidance import as_avoider
+    from wholebody.motion.strength import Strength
     from wholebody.motion.trajectory.method import Trajectory
 
-    method = as_avoider(arguments.method)
-    if arguments.stretch is None:
-        return method
+    method = as_avoider(name)
     if not isinstance(method, Trajectory):
-        raise InputError(f"--stretch: the method {method.name} does not slow motions; leave out --method")
-    return replace(method, stretch=arguments.stretch)
+        if arguments.stretch is not None:
+            raise InputError(f"--stretch: the method {method.name} does not slow motions; leave out --method")
+        if arguments.dynamics:
+            raise InputError(f"--dynamics: the method {method.name} does not take dynamics; leave out --method")
+        return method
+    strength = Strength(sex=arguments.sex or "male") if arguments.dynamics else None
+    return replace(method, stretch=arguments.stretch or method.stretch, dynamics=strength)
 
 
-def _strength(arguments: argparse.Namespace) -> bool | Strength:
-    """Strength of a person of the sex that was asked for."""
-    from wholebody.motion.strength import Strength
-
-    return Strength(sex=arguments.sex or "male") if arguments.dynamics else False
-
-
-def _tell(console: object, avoided: Avoided, written: Path) -> None:
-    from rich.console import Console
+def _tell(console: Console, avoided: Avoided, written: Path) -> None:
     from rich.markup import escape
 
     from wholebody.cli.tables import table
 
-    assert isinstance(console, Console)
     report, clip = avoided.report, avoided.clip
     color = "green" if report.solved else "red"
     rate = report.seconds / max(clip.duration, clip.dt)
@@ -123,3 +143,60 @@ def _tell(console: object, avoided: Avoided, written: Path) -> None:
         highlight=False,
     )
     console.print(f"written: {escape(str(written))}", highlight=False)
+
+
+def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -> int:
+    from rich.console import Console
+
+    from wholebody.motion.batch import BatchProgress, avoid_many
+
+    console, folder = Console(width=max(WIDE, Console().width)), arguments.out or Path(FOLDER)
+    ways = [_method(name, arguments) for name in methods]
+    count = len(arguments.files) * len(methods) * len(worn)
+    try:
+        with bar("reading the motions", count) as tell:
+
+            def said(now: BatchProgress) -> None:
+                done = "freeing" if now.case is None else f"{now.case.clip}, {now.case.equipment}, {now.case.method}"
+                tell(now.done, done)
+
+            rows = avoid_many(
+                arguments.files, folder, figure=figure_of(arguments), equipment=worn,
+                methods=ways,
+                hold_feet=not arguments.no_feet, jobs=jobs_of(arguments), cluster=arguments.cluster, progress=said,
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        said_last = f"ended; {folder} keeps what is done, and the same command goes on"
+        console.print(said_last, highlight=False, markup=False, soft_wrap=True)
+        raise
+    _table(console, rows)
+    console.print(f"written: {folder}", highlight=False, markup=False, soft_wrap=True)
+    return 0 if all(row.outcome == "free" for row in rows) else 1
+
+
+def _table(console: Console, rows: tuple[AvoidedCase, ...]) -> None:
+    from rich.markup import escape
+
+    from wholebody.cli.tables import table
+
+    made = table(
+        "motion", "wears", "method", "", "collide", "after", "dips", "deepest mm", "deviation mm", "s a second"
+    )
+    for column in made.columns[1:4]:
+        column.justify = "left"
+    for row in rows:
+        color = {"free": "green", "left": "yellow"}.get(row.outcome, "red")
+        rate = row.seconds / row.duration if row.duration else 0.0
+        numbers = (
+            f"{row.colliding_before}", f"{row.colliding}", f"{row.dips}", f"{1e3 * row.deepest_between:.2f}",
+            f"{1e3 * row.distance:.1f}", f"{rate:.2f}",
+        )  # fmt: skip
+        made.add_row(
+            escape(row.clip), escape(row.equipment), escape(row.method), f"[{color}]{row.outcome}[/]",
+            *(numbers if row.frames else ()),
+        )  # fmt: skip
+    console.print(made)
+    for row in rows:
+        if row.outcome != "free":
+            where = f"{row.clip}, {row.equipment}, {row.method}"
+            console.print(f"{where}: {row.message}", highlight=False, markup=False, soft_wrap=True)

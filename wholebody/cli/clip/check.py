@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from wholebody.cli.clip.arguments import add_clip, add_equipment, dressed, figure_of
+from wholebody.cli.clip.arguments import add_command, add_equipment, add_jobs, bar, figure_of, jobs_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,13 +18,14 @@ if TYPE_CHECKING:
 DESCRIPTION = """\
 Check a motion: every pair of pieces that can touch, in every frame and in the motion from each frame to the next one;
 joint limits, joint speeds, feet that slide while they stand, jerk. Overlaps of the figure with itself, with what it
-carries and with the things around it are told apart."""
+carries and with the things around it are told apart. Several motions, or pieces of equipment, give a line each."""
 EPILOG = """\
 examples:
   wholebody clip check walk.bvh
   wholebody clip check walk.bvh --equipment pack --html walk.html
   wholebody clip check walk.npz --scene room.toml
   wholebody clip check walk.npz --json > walk.json
+  wholebody clip check *.bvh --equipment pack --equipment vest_plate --jobs 4
 exit code: 1 if something overlaps by more than the depth, or a joint is beyond its limit"""
 MOST = 20  # lines of a table
 WIDE = 110  # letters that its lines need
@@ -32,13 +33,11 @@ WIDE = 110  # letters that its lines need
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser(
-        "check", help="what overlaps in a motion, when and how deep", description=DESCRIPTION, epilog=EPILOG,
-        formatter_class=shape,
-    )  # fmt: skip
-    add_clip(parser)
+    parser = add_command(
+        commands, "check", "what overlaps in motions, when and how deep", DESCRIPTION, EPILOG, many=True
+    )
     add_equipment(parser)
+    add_jobs(parser)
     parser.add_argument("--scene", type=Path, metavar="TASK.toml", help="task file with the figure and its things")
     parser.add_argument("--depth", type=float, metavar="MM", help="deepest overlap that is no contact (default: 0.1)")
     parser.add_argument("--json", action="store_true", help="print everything as JSON instead of tables")
@@ -57,12 +56,17 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.files import check_writable, write
     from wholebody.motion.checking import DEPTH
     from wholebody.motion.reading import read_clip
+    from wholebody.motion.ready_equipment import NOTHING, put_on
 
+    depth = DEPTH if arguments.depth is None else 1e-3 * arguments.depth
+    if len(arguments.files) * max(1, len(arguments.equipment)) > 1:
+        return _many(arguments, depth)
     if arguments.html is not None:
         check_writable(arguments.html)
-    scene = dressed(_scene(arguments), arguments.equipment)
-    clip = read_clip(arguments.file, scene.figure)
-    found = checked(clip, scene, DEPTH if arguments.depth is None else 1e-3 * arguments.depth)
+    (file,), worn = arguments.files, (*arguments.equipment, NOTHING)[0]
+    scene = put_on(_scene(arguments), worn)
+    clip = read_clip(file, scene.figure)
+    found = checked(clip, scene, depth)
     if arguments.json:
         print(json.dumps(found.as_dict(), indent=1))
     else:
@@ -89,15 +93,72 @@ def _scene(arguments: argparse.Namespace) -> Scene:
 
 def checked(clip: Clip, scene: Scene, depth: float) -> ClipCheck:
     """Check, with a progress bar."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
     from wholebody.motion.checking import check
 
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
-        work = bar.add_task("checking every pair", total=len(clip))
-        return check(clip, scene, depth=depth, progress=lambda done: bar.update(work, completed=done))
+    with bar("checking every pair", len(clip)) as tell:
+        return check(clip, scene, depth=depth, progress=lambda done: tell(done, "checking every pair"))
+
+
+def _many(arguments: argparse.Namespace, depth: float) -> int:
+    """Each motion with each equipment: one line of a table each; 1 if one overlaps, or cannot be read."""
+    import json
+
+    from rich.console import Console
+    from rich.markup import escape
+
+    from wholebody.batches import run_batch
+    from wholebody.checks import number
+    from wholebody.cli.tables import table
+    from wholebody.errors import InputError
+    from wholebody.motion.checking import LARGEST, SMALLEST
+    from wholebody.motion.ready_equipment import NOTHING, put_on
+    from wholebody.runner import Job
+
+    if arguments.html is not None:
+        raise InputError("--html is for one motion with one equipment; give one file")
+    number(1e3 * depth, "--depth", 1e3 * SMALLEST, 1e3 * LARGEST, "mm")
+    cases = [(file, worn) for file in arguments.files for worn in arguments.equipment or [NOTHING]]
+    for worn in dict.fromkeys(worn for _, worn in cases):
+        put_on(_scene(arguments), worn)  # what does not fit is said before anything is checked
+    work = (Job(case, _check_one, (arguments, *case, depth), 0.0) for case in cases)
+    found: dict[tuple[Path, str], dict[str, Any]] = {}
+    with bar("checking", len(cases)) as tell:
+        for outcome in run_batch(work, jobs_of(arguments), arguments.cluster):
+            found[outcome.job.name] = outcome.answer or {"refused": str(outcome.error)}
+            tell(len(found), str(outcome.job.name[0].name))
+    if arguments.json:
+        rows = [{"file": str(file), "equipment": worn, **found[file, worn]} for file, worn in cases]
+        print(json.dumps(rows, indent=1))
+    else:
+        made = table("motion", "wears", "frames", "collide", "dips", "deepest mm", "at any time mm", "jerk rad/s^3")
+        made.columns[1].justify = "left"
+        for file, worn in cases:
+            one = found[file, worn]
+            told = (
+                (
+                    f"{one['frames']}", f"{one['frames_in_collision']}", f"{one['dips_between_frames']}",
+                    f"{1e3 * one['deepest']:.2f}", f"{1e3 * one['deepest_between']:.2f}", f"{one['jerk']:.0f}",
+                )
+                if "refused" not in one
+                else (f"[red]{escape(one['refused'])}[/]",)
+            )  # fmt: skip
+            made.add_row(escape(file.stem), escape(worn), *told)
+        Console(width=max(WIDE, Console().width)).print(made)
+    return 0 if all(one.get("free") and not one["limits"] for one in found.values()) else 1
+
+
+def _check_one(arguments: argparse.Namespace, file: Path, worn: str, depth: float) -> dict[str, Any]:
+    """Check a motion in a process of its own; what `ClipCheck.as_dict` gives, or why it was refused."""
+    from wholebody.errors import WholebodyError
+    from wholebody.motion.checking import check
+    from wholebody.motion.reading import read_clip
+    from wholebody.motion.ready_equipment import put_on
+
+    try:
+        scene = put_on(_scene(arguments), worn)
+        return check(read_clip(file, scene.figure), scene, depth=depth).as_dict()
+    except WholebodyError as error:
+        return {"refused": str(error)}
 
 
 def show(console: Console, found: ClipCheck) -> None:

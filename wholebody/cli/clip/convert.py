@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wholebody.cli.clip.arguments import add_clip, clip_of
+from wholebody.cli.clip.arguments import add_command, clip_of
 
 DESCRIPTION = """\
 Write a motion in another format: .npz (without loss), .bvh, .csv, .txt (joint profile) or .glb (glTF animation).
@@ -18,15 +18,7 @@ examples:
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser(
-        "convert",
-        help="write a motion in another format",
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=shape,
-    )
-    add_clip(parser)
+    parser = add_command(commands, "convert", "write a motion in another format", DESCRIPTION, EPILOG)
     parser.add_argument("out", type=Path, metavar="OUT", help="the file to write")
     parser.add_argument("--dt", type=float, metavar="S", help="seconds from frame to frame (default: as it is)")
     parser.add_argument("--mirror", action="store_true", help="exchange left and right")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from wholebody.cli.clip.arguments import add_clip, clip_of
+from wholebody.cli.clip.arguments import add_command, clip_of
 
 DESCRIPTION = """\
 Say what a file of motion holds: figure, frames, time step, duration, and of the joints that move most their range and
@@ -14,8 +14,7 @@ MOST = 12
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command."""
-    parser = commands.add_parser("info", help="what a file of motion holds", description=DESCRIPTION)
-    add_clip(parser)
+    parser = add_command(commands, "info", "what a file of motion holds", DESCRIPTION)
     parser.set_defaults(run=run)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wholebody.cli.clip.arguments import add_clip, clip_of
+from wholebody.cli.clip.arguments import add_command, clip_of
 
 DESCRIPTION = """\
 Show a motion. Without --out a page opens in the browser and plays it; with --out it is written as a page that opens
@@ -21,11 +21,7 @@ VIEW = (1.6, 1.0, 0.5)
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser(
-        "play", help="show a motion", description=DESCRIPTION, epilog=EPILOG, formatter_class=shape
-    )
-    add_clip(parser)
+    parser = add_command(commands, "play", "show a motion", DESCRIPTION, EPILOG)
     parser.add_argument("--ghost", type=Path, metavar="FILE", help="another motion of the figure, shown transparent")
     parser.add_argument("--out", type=Path, metavar="OUT", help=".html, .mp4, .gif or .png")
     parser.add_argument("--pictures", type=int, default=PICTURES, metavar="N", help="of a strip (default: 8)")

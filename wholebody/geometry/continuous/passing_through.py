@@ -8,8 +8,9 @@ describe. The remaining pairs are swept.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -21,10 +22,12 @@ from wholebody.geometry.proximity import Contacts, PairTable
 
 if TYPE_CHECKING:
     from wholebody.geometry.continuous.sweep import FirstContact, Sweep
+    from wholebody.geometry.continuous.swept_depth import Depths, SweptDepth
 
 
 DIP = 5e-4  # m: overlap that is allowed between two postures; half of the thinnest plate that counts
 OVERLAP = 2e-4  # m: overlap during a motion that is ignored; smaller than the width of any piece
+INSIDE = 1e-4  # m: overlap at the end of a motion that is ignored
 GRAZE = 5e-4  # m: a motion that gets deeper than this is blocked; held soles overlap a little between two postures
 SHORT = 0.03  # rad, m: a shorter motion whose every step was tested gets less deep than GRAZE
 HALVINGS = 3  # of a motion before doubtful pairs are swept
@@ -64,6 +67,55 @@ def is_free(queries: Queries, before: Array, after: Array, unswept: float) -> bo
     if np.isinf(unswept) or np.abs(pin.difference(queries.model, before, after)).max(initial=0.0) <= unswept:
         return True
     return queries.sweep.first_contact(before, after, tolerance=GRAZE) is None
+
+
+class Entered(NamedTuple):
+    """A pair that gets deeper during a motion than it may.
+
+    Attributes:
+        number: place among the collision pairs of the geometry model.
+        depth: at the end, metres, if it overlaps there, otherwise the largest on the way.
+        inside: whether it overlaps at the end.
+    """
+
+    number: int
+    depth: float
+    inside: bool
+
+
+def entered(sweep: Sweep, depths: SweptDepth, path: Sequence[Array], watched: NDArray[np.bool_]) -> list[Entered]:
+    """The pairs that one motion after the other leads through each other, and those that overlap where it ends.
+
+    Args:
+        sweep: of the model and geometry.
+        depths: of the same.
+        path: configurations (nq,), at least one.
+        watched: (pairs,) of which pairs an overlap at the end counts too that was there at the beginning.
+
+    Returns:
+        Pairs that get deeper on the way than at the beginning by `OVERLAP`, or overlap at the end by `INSIDE`: if they
+        are not watched, by that much more than at the beginning.
+    """
+    last = _by_pair(depths.start(path[-1]), len(watched))
+    if not (last > INSIDE).any() and all(
+        sweep.first_contact(q0, q1, tolerance=OVERLAP) is None for q0, q1 in pairwise(path)
+    ):
+        return []
+    first = _by_pair(depths.start(path[0]), len(watched))
+    most = first.copy()
+    for q in path[1:]:
+        most = np.maximum(most, _by_pair(depths.advance(q)[1], len(watched)))
+    inside = last > np.where(watched, INSIDE, first + INSIDE)
+    return [
+        Entered(number, float(last[number] if inside[number] else most[number]), bool(inside[number]))
+        for number in np.flatnonzero(inside | (most > first + OVERLAP)).tolist()
+    ]
+
+
+def _by_pair(depths: Depths, pairs: int) -> Array:
+    depth = np.zeros(pairs)
+    depth[depths.number] = depths.depth
+    return depth
 
 
 def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array], object], halvings: int) -> Array:

@@ -3,276 +3,210 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.arrays import Array
-from wholebody.checks import choice, flag, known, number, numbers, shown, text, whole
+from wholebody.checks import choice, flag, known, number, shown, whole
 from wholebody.errors import InputError
-from wholebody.geometry.pieces import check_length
+from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE
+from wholebody.methods.newton.assembly_goals import AssemblyGoal, to_target
+from wholebody.methods.newton.assembly_joints import AssemblyJoints
 from wholebody.methods.newton.assembly_solution import AssemblySolution, solved
+from wholebody.methods.newton.assembly_system import AssemblySystem
 from wholebody.methods.newton.batches import Batch, Key
-from wholebody.methods.newton.equations import EquationSet, axes_along, unit_lengths
+from wholebody.methods.newton.contacts import LEAVE
+from wholebody.methods.newton.equations import EquationSet, unit_lengths
+from wholebody.methods.newton.feasibility import reach
 from wholebody.methods.newton.inequalities import KINDS, Kind
-from wholebody.methods.newton.joint_register import JointRegister
 from wholebody.methods.newton.kkt import kkt_algebra
-from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
-from wholebody.methods.newton.linear_algebra.choice import NAMES, linear_algebra
+from wholebody.methods.newton.linear_algebra.choice import NAMES
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
-from wholebody.methods.newton.system import ActiveSystem, System, unit
+from wholebody.methods.newton.patterns import Patterns
+from wholebody.methods.newton.system import System
+from wholebody.moving_things import Collision, FrameMotion
 from wholebody.pool import OneAtATime
-from wholebody.tasks.inputs import direction, point, target_placement
+from wholebody.tasks.inputs import point
 
-WORLD = "world"
-UNIT_TOLERANCE = 1e-3  # largest deviation of a quaternion from unit length; more is refused as a mistake
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
 FINEST = 1e-12  # m, rad: least tolerance; below it only rounding remains
+FRAME_TOLERANCE = 1e-4  # m, rad: of the goals in the frames of a drag
+HARD_TOLERANCE = 1e-6  # m, rad: of joints and contacts there
+FRAME_ITERATIONS = 12  # most iterations of one frame; a farther goal is followed over several frames
 
 
 @dataclass
 class _Prepared:
-    """What solves of one pattern share.
+    """What solves share while bodies, things and joints stay.
 
     Attributes:
         algebra: name of the factorisation that was asked for.
-        laid: types and bodies of the goals.
-        held: batches of what must hold.
-        system: all equations; their numbers follow the goals.
-        factor: the analysed factorisation.
+        revision: of the assembly.
+        active: all equations; what was analysed serves while their pattern stays.
     """
 
     algebra: str
-    laid: tuple[tuple[Key, bytes], ...]
-    held: list[tuple[Batch, Key]]
-    system: System
-    factor: LinearAlgebra
-    _nearest: QuasiDefinite | None = None
+    revision: int
+    active: AssemblySystem
+    _nearest: tuple[System, QuasiDefinite] | None = None
 
     def nearest(self) -> QuasiDefinite:
         """The analysed factorisation for the nearest place."""
-        if self._nearest is None:
-            self._nearest = kkt_algebra(self.system)
-        return self._nearest
+        if self._nearest is None or self._nearest[0] is not self.active.system:
+            self._nearest = self.active.system, kkt_algebra(self.active.system)
+        return self._nearest[1]
 
 
-class Assembly:
+class AssemblyStep(NamedTuple):
+    """Answer of one frame of a drag.
+
+    Attributes:
+        goal_error: largest goal error, metres or radians.
+        joint_error: largest error of a joint, a constraint or a contact, metres or radians.
+        iterations: Newton iterations.
+        systems: linear systems solved.
+        taken: whether the bodies moved there.
+        collisions: what things that move passed through, or are inside of; empty if nothing.
+    """
+
+    goal_error: float
+    joint_error: float
+    iterations: int
+    systems: int
+    taken: bool
+    collisions: tuple[Collision, ...] = ()
+
+
+class Assembly(AssemblyJoints):
     """Rigid bodies, joints between them and with the world, and goals; solved in full coordinates.
 
     Joints are given at the bodies' present placements: `at` and `axis` in the world. If the two sides do not fit
     yet, `at_first` and `at_second` give the position in either body's frame instead. Bodies need not be connected.
 
+    Bodies with shapes touch, and do not penetrate, each other and the things around; not tested are bodies that a joint
+    connects or that fixed joints make one, and pairs that `ignore` names. Whole figures may be bodies too.
+
     A solve moves the bodies, so an assembly serves one thread at a time. It can be pickled; a copy is independent.
+
+    Attributes:
+        clearance: least distance of every tested pair, metres.
+        structures: number of patterns that were laid out and analysed.
     """
 
-    def __init__(self) -> None:
-        """Make an assembly with the world alone."""
-        self._names: dict[str, int] = {}
-        self._places: list[Array] = []
-        self._sizes: list[float] = []
-        self._joints = JointRegister()
-        self._holding, self._goals = EquationSet(), EquationSet()
+    def __init__(self, *, clearance: float = 0.0) -> None:
+        """Make an assembly with the world alone.
+
+        Args:
+            clearance: least distance of shapes, metres.
+
+        Raises:
+            InputError: the clearance is negative or more than half a metre.
+        """
+        super().__init__(clearance)
+        self._goals: list[AssemblyGoal] = []
         self._prepared: _Prepared | None = None
-        self._retargeted = False
         self._alone = OneAtATime("assembly")
-        self.structures = 0
+        self._analysed = 0
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the bodies, joints and goals, and the placements; data that a solve prepares are prepared anew."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("_prepared", "_alone")}
+        left_out = ("_prepared", "_alone", "_scene", "_analysed")
+        return {
+            **{name: value for name, value in self.__dict__.items() if name not in left_out},
+            "_analysed": self.structures,
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._prepared, self._alone = None, OneAtATime("assembly")
+        self._prepared, self._scene, self._alone = None, None, OneAtATime("assembly")
 
     def __copy__(self) -> Assembly:
         return copy.deepcopy(self)
 
-    # ---- bodies
+    # ---- goals
 
-    def body(self, name: str, at: PlacementLike = (0.0, 0.0, 0.0), *, size: float = 0.3) -> Assembly:
-        """Add a body.
+    def point_goal(self, body: str, target: ArrayLike, *, place: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
+        """Move a point of a body, (3,) in its frame, to a position in the world (3,), if possible."""
+        what = f"the goal of {shown(body)}"
+        index, local = self._moved(body, what)
+        offset = local * pin.SE3(np.eye(3), point(place, f"{what}: place"))
+        self._goals.append(AssemblyGoal(what, index, offset, to_target(target, False, what), whole=False))
+        return self
 
-        Args:
-            name: one that no other body has.
-            at: (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3.
-            size: metres from its origin to its rim; a rotation of the body counts as the motion of the rim.
-
-        Raises:
-            InputError: the name exists already, the size is not positive, or the placement cannot be read.
-        """
-        if text(name, "the name of a body") == WORLD or name in self._names:
-            raise InputError(f"body {name!r}: the name is taken; give another one")
-        length = check_length(size, f"body {name!r}: size")
-        placed = pin.SE3ToXYZQUAT(target_placement(at, f"body {name!r}"))
-        self._names[name] = len(self._places)
-        self._places.append(np.array(placed))
-        self._sizes.append(length)
-        self._prepared = None
+    def frame_goal(self, body: str, target: PlacementLike) -> Self:
+        """Move a body to a placement in the world, if possible."""
+        what = f"the goal of {shown(body)}"
+        index, local = self._moved(body, what)
+        self._goals.append(AssemblyGoal(what, index, local, to_target(target, True, what), whole=True))
         return self
 
     @property
-    def bodies(self) -> tuple[str, ...]:
-        """Their names."""
-        return tuple(self._names)
+    def goals(self) -> tuple[AssemblyGoal, ...]:
+        """The goals, in the order in which they were given."""
+        return tuple(self._goals)
 
-    def placement(self, name: str) -> Any:
-        """Placement of a body (pin.SE3)."""
-        return pin.XYZQUATToSE3(self._place(self._index(name, "placement")))
-
-    # ---- joints
-
-    def spherical(self, first: str, second: str, **where: Any) -> Assembly:
-        """A point of one body stays at a point of the other. Takes `at`, or `at_first` and `at_second`."""
-        a, b = self._pair(first, second, "spherical joint")
-        ends = self._ends(a, b, "spherical joint", first, second, **where)
-        self._holding.coincide(a, b, f"the spherical joint of {first!r} and {second!r}", *ends)
-        return self._changed()
-
-    def revolute(
-        self,
-        first: str,
-        second: str,
-        *,
-        axis: ArrayLike,
-        limits: Sequence[float] | None = None,
-        axis_second: ArrayLike | None = None,
-        **where: Any,
-    ) -> Assembly:
-        """Two bodies turn about one axis.
+    def retarget(self, goal: int, target: Any) -> Self:
+        """Move a goal to another position, or placement for a goal of `frame_goal`; nothing is analysed anew.
 
         Args:
-            first: name of a body, or "world".
-            second: another.
-            axis: (3,) direction in the world; in the first body's frame if `axis_second` is given.
-            limits: least and greatest angle from the present one, radians.
-            axis_second: (3,) the direction in the second body's frame.
-            where: `at`, or `at_first` and `at_second`.
+            goal: its index, in the order in which goals were given.
+            target: as for `point_goal` and `frame_goal`.
+
+        Raises:
+            InputError: there is no such goal, or the target is not one.
         """
-        what = f"the revolute joint of {shown(first)} and {shown(second)}"
-        a, b = self._pair(first, second, "revolute joint")
-        along = direction(axis, f"{what}: axis")
-        turn_a, turn_b = pin.Quaternion(self._place(a)[3:]), pin.Quaternion(self._place(b)[3:])
-        if axis_second is None:
-            ours, theirs = turn_a.inverse() * along, turn_b.inverse() * along
-        else:
-            ours, theirs = along, direction(axis_second, f"{what}: axis_second")
-        low, high = (-np.inf, np.inf) if limits is None else numbers(limits, (2,), f"{what}: limits").tolist()
-        if low >= high:
-            raise InputError(f"{what}: limits {low:g} and {high:g} leave no room; give the lower one first")
-        ends = self._ends(a, b, "revolute joint", first, second, **where)  # registers the joint, after all other checks
-        basis_a = axes_along(ours)
-        # the second body's axes agree with the first's at the present placements, so that the angle is zero now
-        basis_b = (turn_b.inverse() * turn_a * basis_a) if axis_second is None else axes_along(theirs)
-        self._holding.coincide(a, b, what, *ends)
-        self._holding.turn(a, b, what, basis_a, basis_b, 2)
-        if limits is not None:
-            self._holding.limit(a, b, f"the limit of {what[4:]}", basis_a, basis_b, low, high)
-        return self._changed()
+        index = self.goal_index(goal)
+        self._goals[index] = self._goals[index].moved(target)
+        return self
 
-    def prismatic(self, first: str, second: str, *, axis: ArrayLike) -> Assembly:
-        """Two bodies translate along one direction (3,) in the world, without rotation."""
-        what = f"the prismatic joint of {shown(first)} and {shown(second)}"
-        a, b = self._pair(first, second, "prismatic joint")
-        along = direction(axis, f"{what}: axis")
-        self._joints.add("prismatic joint", first, second)
-        turn_a, turn_b = pin.Quaternion(self._place(a)[3:]), pin.Quaternion(self._place(b)[3:])
-        basis = axes_along(turn_a.inverse() * along)
-        self._holding.turn(a, b, what, basis, turn_b.inverse() * turn_a * basis, 3)
-        way = turn_a.inverse() * (self._place(b)[:3] - self._place(a)[:3])
-        for side in basis.toRotationMatrix().T[:2]:
-            self._holding.slide(a, b, what, side, np.zeros(3), float(side @ way))
-        return self._changed()
+    def goal_index(self, goal: int) -> int:
+        """The index of a goal.
 
-    def fixed(self, first: str, second: str, *, placement_second: PlacementLike | None = None) -> Assembly:
-        """Two bodies keep their relative placement: the present one, or the second's given one in the first's frame."""
-        what = f"the fixed joint of {shown(first)} and {shown(second)}"
-        a, b = self._pair(first, second, "fixed joint")
-        here = pin.XYZQUATToSE3(self._place(a)).actInv(pin.XYZQUATToSE3(self._place(b)))
-        wanted = here if placement_second is None else target_placement(placement_second, what)
-        self._joints.add("fixed joint", first, second)
-        self._holding.coincide(a, b, what, np.array(wanted.translation), np.zeros(3))
-        self._holding.turn(a, b, what, pin.Quaternion(wanted.rotation), pin.Quaternion.Identity(), 3)
-        return self._changed()
-
-    def on_plane(
-        self, body: str, place: ArrayLike, *, normal: ArrayLike, through: ArrayLike, of: str = WORLD, side: str = "on"
-    ) -> Assembly:
-        """A point of a body, (3,) in its frame, stays in a plane that is fixed to the world or to another body.
-
-        Args:
-            body: name.
-            place: (3,) the point, metres.
-            normal: (3,) of the plane, in the frame of `of`.
-            through: (3,) a point of the plane, in the frame of `of`.
-            of: name of the body to which the plane is fixed.
-            side: "on", or "above" if the point may move along the normal.
+        Raises:
+            InputError: there is none.
         """
-        what = f"the plane of {shown(body)} and {shown(of)}"
-        choice(side, ("on", "above"), f"{what}: side")
-        a, b = self._index(of, what), self._index(body, what)
-        if a == b:
-            raise InputError(f"{what}: a body cannot stay on a plane of its own; name another one")
-        unit = direction(normal, f"{what}: normal")
-        height = float(unit @ point(through, f"{what}: through"))
-        self._holding.slide(a, b, what, unit, point(place, f"{what}: place"), height, above=side == "above")
-        return self._changed()
+        if not self._goals:
+            raise InputError("the assembly has no goals; give it one by point_goal or frame_goal")
+        return whole(goal, "the number of the goal", 0, len(self._goals) - 1)
 
-    # ---- goals
+    def goal_error(self, goal: int) -> float:
+        """Error of a goal at the present placements: the larger of metres and radians."""
+        one = self._goals[self.goal_index(goal)]
+        error = one.error(self._placed(one.index))
+        return max(float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])))
 
-    def point_goal(self, body: str, target: ArrayLike, *, place: ArrayLike = (0.0, 0.0, 0.0)) -> Assembly:
-        """Move a point of a body, (3,) in its frame, to a position in the world (3,), if possible."""
-        what = f"the goal of {shown(body)}"
-        ends = point(place, f"{what}: place"), point(target, f"{what}: target")
-        self._goals.coincide(self._moved(body, what), -1, what, *ends, goal=True)
-        return self._changed_goals()
+    def aim_between(self, goal: int, share: float, target: Any) -> Self:
+        """Move a goal to a share of the way from where its body is now to a target."""
+        one = self._goals[self.goal_index(goal)].moved(target)
+        self._goals[goal] = one.between(self._placed(one.index), number(share, "share", 0.0, 1.0))
+        return self
 
-    def frame_goal(self, body: str, target: PlacementLike) -> Assembly:
-        """Move a body to a placement in the world, if possible."""
-        what = f"the goal of {shown(body)}"
-        wanted, index = target_placement(target, what), self._moved(body, what)
-        self._goals.coincide(index, -1, what, np.zeros(3), np.array(wanted.translation), goal=True)
-        identity = pin.Quaternion.Identity()
-        self._goals.turn(index, -1, what, identity, pin.Quaternion(wanted.rotation), 3, goal=True)
-        return self._changed_goals()
-
-    def drop_goals(self) -> Assembly:
+    def drop_goals(self) -> Self:
         """Take all goals out.
 
         Where others of the same bodies come in their place, what earlier solves laid out and analysed serves again.
         """
-        self._goals = EquationSet()
-        return self._changed_goals()
+        self._goals = []
+        return self
 
     # ---- solving
 
+    @property
+    def structures(self) -> int:
+        """Number of patterns that were laid out and analysed."""
+        return self._analysed + (self._prepared.active.patterns.structures if self._prepared is not None else 0)
+
     def system(self) -> System:
-        """The equations as they stand."""
-        return System(len(self._places), [*self._held(), *self._goals.batches(len(self._places))], self._weight())
-
-    def variables(self) -> Array:
-        """(7 n,) the placements of the bodies."""
-        return np.concatenate(self._places)
-
-    def place(self, variables: ArrayLike) -> Assembly:
-        """Set the placements of the bodies.
-
-        Args:
-            variables: (7 n,) as `variables` returns them: for each body its origin [m] and quaternion (x, y, z, w).
-
-        Raises:
-            InputError: another number of values, one that is not finite, or a quaternion that is not of unit length.
-        """
-        bodies = numbers(variables, (7 * len(self._places),), "place: variables").reshape(-1, 7)
-        if (np.abs(np.linalg.norm(bodies[:, 3:], axis=1) - 1.0) > UNIT_TOLERANCE).any():
-            raise InputError("place: variables holds a quaternion that is not of unit length; divide it by its length")
-        self._places = list(unit(bodies).reshape(-1, 7))
-        return self
+        """The equations as they stand, without contacts."""
+        return System(len(self._places), [*self._held(), *self._goal_batches()], self._weight())
 
     def solve(
         self,
@@ -285,13 +219,16 @@ class Assembly:
     ) -> AssemblySolution:
         """Move the bodies until joints and goals hold; each step is the least motion. They keep their new placements.
 
+        No step jumps over a shape, and none of the states on the way is deeper in a shape than a centimetre; a shape
+        that a body is inside of at the start is left. The solution's `penetration` is judged by all pairs.
+
         Args:
             tolerance: metres and radians, from 1e-12.
             iterations: most Newton iterations.
             algebra: "auto", "normal", "llt", "kkt", "schur", "dense" or "svd".
             inequalities: "slack" or "barrier".
             nearest: find the placements nearest to those before (eq. 1), which many least steps miss by a
-                little; without inequalities only.
+                little; without inequalities, shapes and figures only.
 
         Raises:
             InputError: there are no bodies, a setting is out of range, or another thread solves this assembly.
@@ -304,91 +241,118 @@ class Assembly:
         flag(nearest, "nearest")
         with self._alone:
             prepared = self._ready(algebra)
-            if nearest and prepared.system.inequality.any():
-                raise InputError("nearest is for assemblies without limits and one-sided planes; leave it out")
+            active = prepared.active
+            start = active.begin(self.variables(), self._goal_batches())
+            if nearest and (active.contacts is not None or active.system.inequality.any()):
+                raise InputError("nearest is for assemblies without limits, one-sided planes and shapes; leave it out")
             x, solution = solved(
-                list(self._names), ActiveSystem(prepared.system, prepared.factor), self.variables(),
+                self.bodies, active, start,
                 tolerance=tolerance, iterations=iterations, kind=inequalities,
-                nearest=prepared.nearest() if nearest else None,
+                nearest=prepared.nearest() if nearest else None, scene=self._solid_scene(), to_scene=self._to_scene,
             )  # fmt: skip
             self._places = list(x.reshape(-1, 7))
             return solution
 
-    def _ready(self, algebra: str) -> _Prepared:
-        """The equations as they stand; what was laid out and analysed serves while their pattern stays."""
+    def prepare(self) -> Self:
+        """Lay the equations out now rather than in the first solve; things are seen to move from here."""
+        with self._alone:
+            self._ready(None)
+        return self
+
+    def step(self, tolerance: float = FRAME_TOLERANCE) -> AssemblyStep:
+        """One frame of a drag: the least motion towards the present goals, in a few iterations.
+
+        The bodies keep their new placements. A frame whose iterations were not enough for joints and contacts, or whose
+        motion passes through something, leaves the bodies where they were.
+
+        Args:
+            tolerance: of the goals, metres and radians.
+
+        Raises:
+            InputError: there are no bodies, the tolerance is out of range, or another thread solves this assembly.
+        """
+        number(tolerance, "tolerance", FINEST, TOLERANCE.high)
+        with self._alone:
+            active = self._ready(None).active
+            start = active.begin(self.variables(), self._goal_batches())
+            motion = None if active.contacts is None else active.workspace.next_frame()
+            if motion is None:
+                return self._newton_frame(active, start, tolerance)
+            return self._among_moving(active, start, tolerance, motion)
+
+    def _newton_frame(self, active: AssemblySystem, start: Array, tolerance: float) -> AssemblyStep:
+        """A few Newton steps from the variables `start` (7 n,) of a system that begun there."""
+        before = active.system.residual(start)
+        wrong = np.where(active.system.inequality, np.minimum(before, 0.0), before)[~active.system.goal]
+        found = reach(
+            active, start, tolerance=HARD_TOLERANCE, goal_tolerance=tolerance, iterations=FRAME_ITERATIONS,
+            early_exit=True,
+        )  # fmt: skip
+        holds = found.hard <= max(10.0 * HARD_TOLERANCE, float(np.abs(wrong).max(initial=0.0)))
+        taken = holds and (active.contacts is None or self._is_free(active, start, found.x))
+        if taken:
+            self._places = list(found.x.reshape(-1, 7))
+        return AssemblyStep(found.goal, found.hard, found.iterations, found.systems, taken)
+
+    def _among_moving(
+        self, active: AssemblySystem, x: Array, tolerance: float, motion: FrameMotion
+    ) -> AssemblyStep:  # fmt: skip
+        """A frame in which things move: in shares, at the ends of which no thing is deep in a body."""
+        workspace, path = active.workspace, [(0.0, self._to_scene(x))]
+        steps: list[AssemblyStep] = []
+        while path[-1][0] < 1.0:
+            share, q = path[-1]
+            workspace.place(motion.placements(share))
+            share = motion.next_share(share, workspace.near(q, LEAVE), LEAVE)
+            workspace.place(motion.placements(share))
+            x = active.begin(self.variables(), self._goal_batches())
+            steps.append(self._newton_frame(active, x, tolerance))
+            path.append((share, self.q))
+        collisions = motion.collisions(path)
+        workspace.keep(motion, collisions)
+        counts = [(step.iterations, step.systems) for step in steps]
+        iterations, systems = (sum(column) for column in zip(*counts, strict=True))
+        taken = any(step.taken for step in steps)
+        return AssemblyStep(steps[-1].goal_error, steps[-1].joint_error, iterations, systems, taken, collisions)
+
+    def _is_free(self, active: AssemblySystem, before: Array, after: Array) -> bool:
+        """Whether the motion of a frame passes through nothing."""
+        return is_free(active.workspace, self._to_scene(before), self._to_scene(after), SHORT)
+
+    def _ready(self, algebra: str | None) -> _Prepared:
+        """The equations as they stand; None for the factorisation of the last solve."""
         found = self._prepared
-        if found is not None and not self._retargeted and found.algebra == algebra:
-            return found
-        goals = self._goals.batches(len(self._places))
-        laid = tuple((key, batch.bodies.tobytes()) for batch, key in goals)
-        if found is None or (found.algebra, found.laid) != (algebra, laid):
-            held = self._held()
-            system = System(len(self._places), [*held, *goals], self._weight())
-            found = self._prepared = _Prepared(algebra, laid, held, system, linear_algebra(system.pattern, algebra))
-            self.structures += 1
-        else:
-            found.system.renew([*found.held, *goals])
-        self._retargeted = False
+        name = algebra or (found.algebra if found is not None else "auto")
+        if found is None or (found.algebra, found.revision) != (name, self.revision):
+            held, count, weight = self._held(), len(self._places), self._weight()
+            active = AssemblySystem(
+                held, list(self._figures.values()), self._solid_scene(), self._to_scene, self.clearance,
+                Patterns(count, weight, name),
+            )  # fmt: skip
+            self._analysed = self.structures
+            found = self._prepared = _Prepared(name, self.revision, active)
         return found
+
+    def _solid_scene(self) -> Any:
+        """The scene; None if nothing has a shape."""
+        return self.scene if self.has_shapes else None
+
+    def _goal_batches(self) -> list[tuple[Batch, Key]]:
+        equations = EquationSet()
+        for goal in self._goals:
+            goal.enter(equations)
+        return equations.batches(len(self._places))
 
     def _held(self) -> list[tuple[Batch, Key]]:
         """What must hold, in batches."""
         if not self._places:
             raise InputError("the assembly has no bodies; add some with body(...)")
-        return [unit_lengths(list(self._names)), *self._holding.batches(len(self._places))]
+        count = len(self._places)
+        held = [unit_lengths(list(self._names)), *self._holding.batches(count)]
+        for figure in self._figures.values():
+            held += figure.batches(count)
+        return held
 
     def _weight(self) -> Array:
         """(7 n,) of each variable in the least motion."""
-        rims = np.repeat((2.0 * np.array(self._sizes)) ** 2, 4).reshape(-1, 4)
-        return np.concatenate([np.ones((len(rims), 3)), rims], axis=1).ravel()
-
-    def _changed(self) -> Assembly:
-        self._prepared = None
-        return self
-
-    def _changed_goals(self) -> Assembly:
-        self._retargeted = True
-        return self
-
-    def _index(self, name: str, where: str) -> int:
-        found = known(name, [*self._names, WORLD], "body", where)
-        return -1 if found == WORLD else self._names[found]
-
-    def _moved(self, name: str, where: str) -> int:
-        index = self._index(name, where)
-        if index < 0:
-            raise InputError(f"{where}: the world does not move; name a body")
-        return index
-
-    def _place(self, index: int) -> Array:
-        return self._places[index] if index >= 0 else np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
-
-    def _pair(self, first: str, second: str, kind: str) -> tuple[int, int]:
-        a, b = self._index(first, kind), self._index(second, kind)
-        if a == b:
-            raise InputError(f"{kind}: {first!r} cannot be joined to itself; name two bodies")
-        return a, b
-
-    def _ends(
-        self,
-        a: int,
-        b: int,
-        kind: str,
-        first: str,
-        second: str,
-        at: Any = None,
-        at_first: Any = None,
-        at_second: Any = None,
-    ) -> tuple[Array, Array]:
-        """The joint's position in either body."""
-        where = f"{kind} of {first!r} and {second!r}"
-        if (at is None) == (at_first is None) or (at_first is None) != (at_second is None):
-            raise InputError(f"{where}: give its place as at=(x, y, z) in the world, or as at_first and at_second")
-        if at is None:
-            ends = point(at_first, f"{where}: at_first"), point(at_second, f"{where}: at_second")
-        else:
-            place = point(at, f"{where}: at")
-            sides = [pin.XYZQUATToSE3(self._place(index)).actInv(place) for index in (a, b)]
-            ends = np.array(sides[0]), np.array(sides[1])
-        self._joints.add(kind, first, second, ends)
-        return ends
+        return np.concatenate(self._sizes)

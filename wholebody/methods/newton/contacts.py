@@ -12,7 +12,6 @@ from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.geometry.proximity import Joints
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Coincide
-from wholebody.problem import Problem
 from wholebody.workspace import Workspace
 
 ENTER = 0.03  # m beyond the clearance: nearer pairs become inequalities; larger = more rows, fewer repeated steps
@@ -22,6 +21,7 @@ FAR = 1.0  # m: gap of an unused slot
 OVERLAP = 1e-3  # m: a step is undone if a pair that was no inequality gets deeper than this
 DEEPEST = 0.01  # m: largest overlap of linearised contacts after a step; a deeper one shortens the step
 SHALLOW = 0.25  # largest such overlap as a share of the thinner piece's width
+LONGEST = 0.08  # m: largest motion of a body in a step if pairs can touch; larger = faster, fewer contacts seen
 MORE = 1e-4  # m: growth of an existing overlap that a step is allowed
 
 
@@ -32,13 +32,12 @@ class ContactSet:
         pairs: (k,) indices among the collision pairs.
     """
 
-    def __init__(self, problem: Problem, workspace: Workspace) -> None:
-        """Make an empty set."""
-        self.workspace, self.clearances = workspace, problem.clearances
+    def __init__(self, clearances: Array, workspace: Workspace) -> None:
+        """Make an empty set of pairs whose least distances are `clearances` (pairs,), metres."""
+        self.workspace, self.clearances = workspace, clearances
         self.pairs: Indices = np.zeros(0, dtype=np.intp)
-        self.structures = 0
         self._forced: Indices = np.zeros(0, dtype=np.intp)
-        self._largest = float(problem.clearances.max(initial=0.0))
+        self._largest = float(clearances.max(initial=0.0))
         self._within = LEAVE + self._largest
         table = workspace.table
         self._names = tuple(piece.name for piece in workspace.geometry.geometryObjects)

@@ -10,6 +10,7 @@ from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.system import ActiveSystem
 
 RESTORATIONS = 30  # most steps that only restore the constraints, after the goals were not met
+SETTLING = 1e-2  # damping of goals out of reach, so that they give way to constraints by 1e8, not 1e3; larger = slower
 
 
 class FeasibilityResult(NamedTuple):
@@ -48,6 +49,7 @@ def reach(
     kind: Kind = "slack",
     goal_tolerance: float | None = None,
     early_exit: bool = False,
+    settle: bool = False,
 ) -> FeasibilityResult:
     """Satisfy all equations from x (7 n,), or reduce their error as far as possible.
 
@@ -58,6 +60,8 @@ def reach(
         iterations: most iterations.
         kind: treatment of inequalities.
         goal_tolerance: of the goals, if it differs.
+        settle: go on from where goals out of reach pulled the constraints open and these were restored, with goals that
+            give way; the end is nearer to the goals then.
         early_exit: end at the first steps that gain little, and do not minimise the error of goals that are not met.
     """
     run = Iteration(active_system, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
@@ -68,4 +72,18 @@ def reach(
         stationary = run.stationary
         run.iterate(RESTORATIONS, goals=False, measures="ignore")
         run.stationary = stationary if run.hard <= tolerance else run.stationary
+        if settle and run.hard <= tolerance and not run.met:
+            _settle(run, iterations, tolerance)
     return FeasibilityResult(run.x, run.met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)
+
+
+def _settle(run: Iteration, iterations: int, tolerance: float) -> None:
+    """Lower the error of goals out of reach, from a state that meets the constraints; it stays if that fails."""
+    best, goal, stationary = run.x, run.goal, run.stationary
+    run.least_damping = SETTLING
+    run.iterate(iterations, goals=True, measures="ignore")
+    if run.hard > tolerance:
+        run.iterate(RESTORATIONS, goals=False, measures="ignore")
+    if run.hard > tolerance or run.goal > goal:
+        run.begin(best)
+    run.stationary = stationary

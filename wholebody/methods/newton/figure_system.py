@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.methods.newton.batches import OBJECTIVE, Batch, Key, Unit
-from wholebody.methods.newton.contacts import ContactSet
+from wholebody.methods.newton.contacts import LONGEST, ContactSet
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.linear_algebra.base import LinearAlgebra
-from wholebody.methods.newton.linear_algebra.choice import linear_algebra
 from wholebody.methods.newton.objective import Objective
-from wholebody.methods.newton.system import ActiveSystem, System
+from wholebody.methods.newton.patterns import Patterns
+from wholebody.methods.newton.system import ActiveSystem
 from wholebody.methods.newton.terms import bound_equations, constraint_equations, goal_equations
 from wholebody.problem import Problem
 from wholebody.workspace import Workspace
 
-LONGEST = 0.08  # m: largest motion of a body in a step if pairs can touch; larger = faster, fewer contacts seen
-REMEMBERED = 32  # cached structures, for contacts that come and go; more = more memory
 HARD = Key("", False, False, 1.0)
 ONE_SIDED = Key("", False, True, 1.0)
 
@@ -32,8 +27,7 @@ class FigureSystem(ActiveSystem):
 
     Attributes:
         algebra_name: name of the factorisation in the settings.
-        structures: number of patterns that were analysed.
-        laying: processor's time of these analyses [s].
+        patterns: what was laid out and analysed.
     """
 
     def __init__(self, problem: Problem, workspace: Workspace, algebra: str, *, yielding: bool = False) -> None:
@@ -50,7 +44,7 @@ class FigureSystem(ActiveSystem):
         """
         self.problem, self.workspace, self.algebra_name = problem, workspace, algebra
         self.bodies = FigureBodies(problem.scene.figure)
-        self.contacts = ContactSet(problem, workspace) if len(workspace.table.pairs) else None
+        self.contacts = ContactSet(problem.clearances, workspace) if len(workspace.table.pairs) else None
         self.longest = LONGEST if self.contacts else np.inf
         count = self.bodies.count
         unit = Unit(np.arange(count)[:, None], [f"the Euler parameters of {name!r}" for name in self.bodies.names])
@@ -66,8 +60,7 @@ class FigureSystem(ActiveSystem):
         self.objective = Objective(problem, self.bodies, workspace.state)
         self._fixed.append((self.objective.rows, Key(OBJECTIVE, False, False, 1.0)))
         self.q = self._left = problem.start
-        self.structures, self.laying = 0, 0.0
-        self._known: dict[tuple[object, ...], tuple[System, LinearAlgebra]] = {}
+        self.patterns = Patterns(count, self.bodies.weight, algebra)
         self._ordered = np.zeros(0)
         self._laid: tuple[object, ...] = ()
         self.arrive(self.variables(problem.start))
@@ -125,15 +118,7 @@ class FigureSystem(ActiveSystem):
         changed = laid != self._laid
         if changed:
             self._laid = laid
-            if laid not in self._known:
-                if len(self._known) >= REMEMBERED:
-                    self._known.clear()
-                began = time.process_time()
-                system = System(self.bodies.count, batches, self.bodies.weight)
-                self._known[laid] = (system, linear_algebra(system.pattern, self.algebra_name))
-                self.structures += 1
-                self.laying += time.process_time() - began
-            self.system, self.algebra = self._known[laid]
+            self.system, self.algebra = self.patterns.system(laid, batches)
         self.system.renew(batches)
         self.objective.enter(self.system)
         return changed

@@ -7,12 +7,12 @@ from wholebody.compiled import compiled
 
 
 @compiled()
-def add_bending(total: Array, jacobian: Array, support: Array, point: Array, force: Array, moment: Array) -> None:
+def add_bending(total: Array, columns: Array, support: Array, point: Array, force: Array, moment: Array) -> None:
     """Add the second derivative of force times place and moment times angle to a total.
 
     Args:
         total: (n, n) symmetric; it is changed.
-        jacobian: (6, n) linear velocity of the world's origin and angular velocity for each column.
+        columns: (n, 6) of the joint Jacobian at the world's origin: linear, then angular velocity.
         support: (n,) nonzero for columns that move the point.
         point: (3,) where the force pulls, metres.
         force: (3,) what it pulls with.
@@ -25,14 +25,14 @@ def add_bending(total: Array, jacobian: Array, support: Array, point: Array, for
     for k in range(n):
         if support[k] == 0.0:
             continue
-        wx, wy, wz = jacobian[3, k], jacobian[4, k], jacobian[5, k]
-        moved_x = jacobian[0, k] + wy * pz - wz * py
-        moved_y = jacobian[1, k] + wz * px - wx * pz
-        moved_z = jacobian[2, k] + wx * py - wy * px
+        wx, wy, wz = columns[k, 3], columns[k, 4], columns[k, 5]
+        moved_x = columns[k, 0] + wy * pz - wz * py
+        moved_y = columns[k, 1] + wz * px - wx * pz
+        moved_z = columns[k, 2] + wx * py - wy * px
         for j in range(k + 1):
             if support[j] == 0.0:
                 continue
-            ux, uy, uz = jacobian[3, j], jacobian[4, j], jacobian[5, j]
+            ux, uy, uz = columns[j, 3], columns[j, 4], columns[j, 5]
             bent = (
                 (fy * uz - fz * uy) * moved_x
                 + (fz * ux - fx * uz) * moved_y

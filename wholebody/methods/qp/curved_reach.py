@@ -189,7 +189,7 @@ def _add_bending(total: Array, state: State, part: Wrench, force: Array) -> None
         pull, moment = np.zeros(3), force[:3]
     else:
         return
-    compiled_kernel().add_bending(total, state.jacobian, state.support[part.joint], point, pull, moment)
+    compiled_kernel().add_bending(total, state.columns, state.support[part.joint], point, pull, moment)
 
 
 @lru_cache(maxsize=1)
@@ -197,6 +197,6 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.methods.qp import bending_kernel
 
-    three, jacobian = np.zeros(3), np.zeros((6, 1), order="F")
-    bending_kernel.add_bending(np.zeros((1, 1)), jacobian, np.zeros(1), three, three, three)
+    three = np.zeros(3)
+    bending_kernel.add_bending(np.zeros((1, 1)), np.zeros((1, 6)), np.zeros(1), three, three, three)
     return bending_kernel

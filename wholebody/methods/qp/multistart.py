@@ -12,12 +12,13 @@ from wholebody.arrays import Array
 from wholebody.linearisation import Lineariser
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
+from wholebody.methods.qp.cancelling import parted
 from wholebody.methods.qp.curved_reach import CurvedReach
 from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP, LocalSolution
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.starts import Minima, restarts
+from wholebody.methods.starts import Minima, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.solution import TraceEntry
 from wholebody.workspace import Workspace
@@ -34,8 +35,9 @@ REACH_TRIAL_PROGRAMS = 60  # most programs of each
 FAR = (1.0, 0.6)  # shares of the joints' ranges that their starts may be away by
 HELD = 1e-3  # m, rad: by which constraints may be missed where such a descent ends
 AGREEING = 3  # of them that have to come to rest equally near
-AGREEING_FEW = 5  # the same for figures of few degrees of freedom, whose minima lie apart and whose programs are cheap
-FEW = 12  # degrees of freedom
+FEW = 12  # degrees of freedom that move the goals; fewer: minima lie apart, starts are all over the limits, and cheap
+AGREEING_FEW = 8  # the same for them
+REACH_TRIALS_FEW = 16  # most descents for them
 AGREE = 1.1  # times the least violation up to which they count as equally near
 COMING_NEAR = 40  # most programs from there to the nearest posture among things
 PUSHED_OUT = 2  # of the nearest ends of such descents, how many are pushed out of things
@@ -76,6 +78,7 @@ class Search:
         self._minima = Minima()  # where relaxed probes ended that were pushed out of things
         self._relaxed_minima = Minima()  # where the others ended
         self._nearest: list[LocalSolution] = []  # where probes without contacts ended
+        self._through: list[Array] = []  # where one of them from another start reached the goals
         self._out_of_reach: bool | None = None
         self._best: LocalSolution | None = None
 
@@ -109,9 +112,10 @@ class Search:
         self._least = least
         if self._proven():
             return
+        self._leave_cancelling()
         rng = np.random.default_rng(self.settings.seed)
         count = min(self.settings.restarts, INSIDE_PROBES) if least else self.settings.restarts
-        starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, count))
+        starts = chain([start], self._through, restarts(self.problem, self.lineariser.state, start, rng, count))
         for local, how in self._relaxed_probes(starts):
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
@@ -124,6 +128,14 @@ class Search:
             return local
         self._accept(local, "by feasibility first")
         return self._descend(local.q)
+
+    def _leave_cancelling(self) -> None:
+        """Where contacts hold the best posture inside of something and cancel, come near from where it is left."""
+        if _held(self.best, self.settings.tolerance):
+            return
+        q = parted(self.problem, self.lineariser.workspace, self.best.q)
+        if q is not None:
+            self._accept(self._probe(q, 0.0), "from where contacts that cancel are left")
 
     def _relaxed_probes(self, starts: Iterator[Array]) -> Iterator[tuple[LocalSolution, str]]:
         """Relaxed probes from the start and from seeded postures, and a descent from where one reaches the goals.
@@ -211,10 +223,15 @@ class Search:
         start = self.problem.scene.figure.clamp(self.problem.start)
         rng = np.random.default_rng(self.settings.seed)
         self._out_of_reach = False
-        agreeing = AGREEING_FEW if self.problem.scene.model.nv < FEW else AGREEING
-        for begin in chain([q], restarts(self.problem, state, start, rng, REACH_TRIALS - 1, FAR)):
+        if self._moving() < FEW:
+            agreeing, others = AGREEING_FEW, throughout(self.problem, state, start, rng, REACH_TRIALS_FEW - 1)
+        else:
+            agreeing, others = AGREEING, restarts(self.problem, state, start, rng, REACH_TRIALS - 1, FAR)
+        for begin in chain([q], others):
             local = reach.through_everything(begin, REACHED * tolerance, self._at_most(REACH_TRIAL_PROGRAMS))
             self.spent += local.iterations
+            if local.violation.worst <= REACHED * tolerance and begin is not q:
+                self._through = [local.q]
             if local.violation.worst <= REACHED * tolerance or not local.converged or self.control.over:
                 return False
             if local.violation.hold > HELD:
@@ -226,6 +243,11 @@ class Search:
                 self._out_of_reach = True
                 break
         return self._out_of_reach
+
+    def _moving(self) -> int:
+        """How many degrees of freedom move a goal at the best posture."""
+        rows = self.subproblem.rows(self.lineariser.at(self.best.q, 0.0))
+        return int(rows.soft[: rows.goals].any(axis=0).sum())
 
     def _near_best(self) -> None:
         """Come as near as goes from the best posture; where that comes to rest nothing nearer is near."""
@@ -333,7 +355,10 @@ def _held(local: LocalSolution, tolerance: float) -> bool:
 
 
 def _better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
-    """Whether one descent ended better: in what must hold, then in the goals, then in the measures."""
+    """Whether one descent ended better: where all is met, then in what must hold, the goals, the measures."""
+    met = one.violation.worst <= tolerance
+    if met != (other.violation.worst <= tolerance):
+        return met
     for left, right, alike in (
         (_broken(one), _broken(other), JUST * tolerance),
         (one.violation.goal, other.violation.goal, tolerance),

@@ -18,12 +18,12 @@ from wholebody.methods.qp.solvers.base import ACTIVE_SET
 from wholebody.methods.qp.subproblem import (
     BOX,
     ELASTIC_WEIGHT,
+    ERROR_CLAMP,
     FORCE,
     LEAST_CURVATURE,
     LEVER,
     MOST_ROWS,
     PROXIMAL_SHARE,
-    PULL,
     Rows,
     Subproblem,
 )
@@ -93,13 +93,17 @@ class StepProgram:
         self._joints = np.concatenate(
             [state.spread(places).astype(np.intp), state.column_joint, state.parents, workspace.table.joint]
         )
-        # without goals the measures are the task
-        gain = min(1.0, dt / SETTLING) if self.goals else 1.0
-        self._numbers = numbers_of(self._subproblem.scale, gain)
+        self.take(dt)
         self._before = np.zeros(state.model.nq + self._soft + 2)
         """See `tracking_kernel.solve`."""
         self._after = self._before.copy()
         self._grow(64)
+
+    def take(self, seconds: float) -> None:
+        """Make the next steps take so long, for what measures do meanwhile."""
+        # without goals the measures are the task
+        gain = min(1.0, seconds / SETTLING) if self.goals else 1.0
+        self._numbers = numbers_of(self._subproblem.scale, gain)
 
     def solve(self, at: Passing, measures: bool) -> Answer:
         """The answer of the step from where the workspace's state is, and its pieces' placements.
@@ -218,7 +222,17 @@ def numbers_of(scale: float, gain: float) -> Array:
         What `subproblem_kernel.program` takes (10), damping, what counts
         as rest, weight of elastic rows, most rows of a contact, force of goals (4), limits of the working set.
     """
-    program = (scale, LEAST_CURVATURE, PROXIMAL_SHARE, RADIUS, PULL * RADIUS, 0.0, LEVER, BOX * RADIUS, PULL * RADIUS)
+    program = (
+        scale,
+        LEAST_CURVATURE,
+        PROXIMAL_SHARE,
+        RADIUS,
+        ERROR_CLAMP * RADIUS,
+        0.0,
+        LEVER,
+        BOX * RADIUS,
+        ERROR_CLAMP * RADIUS,
+    )
     own = (gain, DAMPING, RESTING, ELASTIC_WEIGHT, MOST_ROWS)
     return np.array([*program, *own, *FORCE, *LIMITS])
 

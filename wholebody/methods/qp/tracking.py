@@ -20,6 +20,7 @@ from wholebody.methods.qp.step_program import StepProgram
 from wholebody.methods.qp.subproblem import Rows
 from wholebody.methods.qp.turning import OFF, Turning
 from wholebody.methods.qp.working_set import WorkingSet
+from wholebody.moving_things import MOST_SHARES, Collision, FrameMotion
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.solution import Solution
@@ -36,6 +37,7 @@ CORRECTIONS = 3  # programs that ask again for what turning brought nearer, befo
 CUTS = 6  # times that a step is halved before it is given up
 OF_A_FRAME = 1e-4  # m, rad: to which the goals of a frame are met
 PROGRAMS = 3  # most of a frame; more = nearer to a goal that turns quickly, dearer frames where it cannot be met
+OUT = 5e-5  # m: overlap with what came into the figure that is left; half of what counts as an overlap
 WORTH = 0.5  # share of the error that another program must leave at most for one more to follow
 
 
@@ -53,6 +55,8 @@ class QPStep(NamedTuple):
         by: what closed the last program, see `QPSolution`.
         programs: how many programs each closed: one a step, and more where it was looked at twice.
         share: how much of the program's displacement was gone: less than 1 where it was longer than what was looked at.
+        collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
+        path: shares of the step, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty.
     """
 
     q: Array
@@ -65,6 +69,8 @@ class QPStep(NamedTuple):
     by: str
     programs: Mapping[str, int]
     share: float
+    collisions: tuple[Collision, ...] = ()
+    path: tuple[tuple[float, Array], ...] = ()
 
 
 class FrameStep(NamedTuple):
@@ -73,10 +79,12 @@ class FrameStep(NamedTuple):
     Attributes:
         q: (nq,) the next posture.
         iterations: programs.
+        collisions: see `QPStep`.
     """
 
     q: Array
     iterations: int
+    collisions: tuple[Collision, ...] = ()
 
 
 class QPTracker:
@@ -124,10 +132,14 @@ class QPTracker:
         self.workspace = problem.workspace()
         self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_nearer`
         self._turning = Turning(self.workspace)
+        self._left: Array | None = None
         self._set_up()
 
     def step(self, q: Array, measures: bool = True) -> QPStep:
         """One step from q, shape (nq,); a posture out of limits is brought back first.
+
+        Things that move (`Scene.move` with `over`) are followed by as many programs as their speed needs; what
+        they could not be kept apart from is named in the answer.
 
         Without `measures` it is the least step that meets the goals, which puts right what a step with them left: it
         ends as near to the goals as its own curvature lets it, and does not go on to improve the measures.
@@ -138,7 +150,11 @@ class QPTracker:
         """
         flag(measures, "measures")
         with self._alone:
-            return self._step(q, measures)
+            self.problem.check_fresh()
+            self.workspace.refresh()
+            self._renew()
+            motion = self.workspace.next_frame()
+            return self._step(q, measures) if motion is None else self._among_moving(q, measures, motion)
 
     def frame(self, q: Array, tolerance: float | None = None) -> FrameStep:
         """One frame of a motion: programs until the goals are met as a frame should, or another brings little.
@@ -153,7 +169,10 @@ class QPTracker:
         enough = OF_A_FRAME if tolerance is None else number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
         # a bound on speeds is one of the way of a whole frame
         most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else PROGRAMS
-        here, error = self.step(q).q, np.inf
+        first, error = self.step(q), np.inf
+        if first.path:
+            return FrameStep(first.q, len(first.path) - 1, first.collisions)
+        here = first.q
         for spent in range(1, most):
             before, error = error, goal_error(self.problem, self.workspace, here)
             if error <= enough or error > WORTH * before:
@@ -172,23 +191,66 @@ class QPTracker:
         """The same with measures that count from q, and are minimised: they say what is near."""
         return self._minimising().solve(nearest_to(self.problem, q))
 
-    def ways_out(self, q: Array) -> Sequence[Array]:
+    def overlap_resolutions(self, q: Array) -> Sequence[Array]:
         """None: the steps lead out."""
         posture(q, self.workspace.model.nq)
         return ()
 
-    def _step(self, q: Array, measures: bool) -> QPStep:
-        self.problem.check_fresh()
-        self.workspace.refresh()
-        self._renew()
-        program = self._program
+    def _among_moving(self, q: Array, measures: bool, motion: FrameMotion) -> QPStep:
+        """A step in which things move, or did and are still in the figure: they advance by shares, and it gives way.
+
+        Bounds on speeds are bounds on the way of the whole step.
+        """
+        workspace, model = self.workspace, self.workspace.model
+        q = posture(q, model.nq)
+        most = self._speeds(q)
+        path, steps = [(0.0, q)], list[QPStep]()
+        before = np.inf
+        while True:
+            share, here = path[-1]
+            if share < 1.0:
+                workspace.place(motion.placements(share))
+                following = motion.next_share(share, workspace.near(here, self._query_distance), self._query_distance)
+                workspace.place(motion.placements(following))
+            else:
+                following, depth = share, -float(workspace.near(here, 0.0).distance.min(initial=0.0))
+                if depth <= OUT or depth > WORTH * before or len(steps) > MOST_SHARES:
+                    break
+                before = depth
+            self._left = None if most is None else most - pin.difference(model, q, here)
+            self._program.take((following - share) * self.dt)
+            steps.append(self._step(here, measures and following > share))
+            path.append((following, steps[-1].q))
+        self._left = None
+        self._program.take(self.dt)
+        collisions = motion.collisions(path)
+        workspace.keep(motion, collisions)
+        return _together(model, path, steps, self.dt)._replace(collisions=collisions)
+
+    def _speeds(self, q: Array) -> Array | None:
+        """Largest displacements (2, nv) of the step from q (nq,) that bounds on speeds allow; None without."""
+        limits = [bound for bound in self.problem.bounds if isinstance(bound, StepLimit)]
+        if not limits:
+            return None
+        state = self.workspace.state.update(q)
+        ranges = np.array([bound.bounds(state, self.dt) for bound in limits])
+        return np.array([ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0)])
+
+    def _linearised(self, q: Array) -> Passing:
         at = self._lineariser.passing(q, self._query_distance)
+        if self._left is not None:
+            np.clip(at.box, np.minimum(self._left[0], 0.0), np.maximum(self._left[1], 0.0), out=at.box)
+        return at
+
+    def _step(self, q: Array, measures: bool) -> QPStep:
+        program = self._program
+        at = self._linearised(q)
         answer = program.solve(at, measures)
         motion = answer.motion
         if motion > 0.5 * self._query_distance and answer.worst > UNSEEN:
             # something came in fast: to get out of its way, one must look as far as one has to go
             self._query_distance = min(HEADROOM * motion, LARGEST_WITHIN)
-            at = self._lineariser.passing(q, self._query_distance)
+            at = self._linearised(q)
             answer = program.solve(at, measures)
             motion = answer.motion
         share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
@@ -295,12 +357,30 @@ class QPTracker:
             anew = moved and self._signatures() != self._goals
         if anew:
             self._set_up()
-            self._working_set.forget()
+            self._working_set.reset()
 
     def _signatures(self) -> list[tuple[type, float, int]]:
         """What programs are set up from: kind, weight and number of rows of each goal."""
         rows = self._lineariser.goal_rows()
         return [(type(goal), goal.weight, count) for goal, count in zip(self._lineariser.goals, rows, strict=True)]
+
+
+def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequence[QPStep], dt: float) -> QPStep:
+    """One step of several that follow each other along a path."""
+    displacement = np.asarray(pin.difference(model, path[0][1], path[-1][1]))
+    programs: dict[str, int] = {}
+    for step in steps:
+        for by, count in step.programs.items():
+            programs[by] = programs.get(by, 0) + count
+    return steps[-1]._replace(
+        displacement=displacement,
+        velocity=displacement / dt,
+        exact=all(step.exact for step in steps),
+        iterations=sum(step.iterations for step in steps),
+        programs=programs,
+        share=min(step.share for step in steps),
+        path=tuple(path),
+    )
 
 
 def _unseen(asked: Array) -> Array:

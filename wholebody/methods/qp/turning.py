@@ -66,7 +66,7 @@ def compiled_kernel() -> Any:
     none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
     turning_kernel.bent(
         np.zeros(1), np.zeros((6, 1)).T, np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp), index, none,
-        np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), np.zeros((0, 2))[:, 0], none,
+        np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), none, none,
         none, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(4),
     )  # fmt: skip
     return turning_kernel

@@ -84,7 +84,7 @@ class Trajectory:
         constraints = tuple(listed(constraints, "avoid: constraints", "[wb.Freeze('root')]"))
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
         _, solve = banded_solver(self.solver)
-        with scene.lend() as workspace:
+        with scene.borrow() as workspace:
             loads = None
             if self.dynamics is not None:
                 stands = standing_feet(clip, usual_feet(scene.figure, constraints))

@@ -127,12 +127,12 @@ class ClipRun:
         looking = Looking(self._workspace, chart, held, self._settings.clearance, loads)
         always = {gap - window.first for gap in gaps}
         best: _Attempt | None = None
-        for start in self._starts(window, chart, limits, depths):
+        for start in self._starts(window, chart, limits, depths, always):
             attempt = self._attempt(start, chart, looking, objective, limits, always, cancel)
             if attempt is None:
                 return Freed(chart.original, "")
             best = attempt if best is None or attempt.rank < best.rank else best
-            if best.worst <= MET:
+            if best.worst <= MET and not best.dipping:
                 break
         assert best is not None
         missed = ""
@@ -144,11 +144,20 @@ class ClipRun:
         q[changed] = chart.postures(best.x)[changed]
         return Freed(q, missed)
 
-    def _starts(self, window: Window, chart: Chart, limits: Limits, depths: Array) -> Iterable[Array]:
-        """Deviations (n, nv) to begin with: none; then what following gives, from the deepest frame and both ends."""
+    def _starts(self, window: Window, chart: Chart, limits: Limits, depths: Array, always: set[int]) -> Iterable[Array]:
+        """Deviations (n, nv) to begin with.
+
+        None; frames kept on one side of what motions between them pass; what following gives, from the deepest frame
+        and both ends.
+        """
         yield np.zeros((len(window), self._workspace.model.nv))
         if not (limits.lower < limits.upper).any():
             return  # nothing can move
+        if always:
+            q = self._carried.beside(window, chart.original, always, self._workspace)
+            x = np.array([chart.deviation(frame, posture) for frame, posture in enumerate(q)])
+            if x.any():
+                yield np.clip(x, limits.lower, limits.upper)
         deepest = window.first + int(np.argmax(depths[window.first : window.end]))
         for middle in dict.fromkeys((deepest, window.first, window.end - 1)):
             q = self._carried.outwards(window, middle)

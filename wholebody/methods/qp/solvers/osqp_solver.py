@@ -1,17 +1,24 @@
-"""OSQP with a workspace that lives on: set up once for a sparsity, warm from program to program, finished exactly."""
+"""OSQP with a workspace that lives on: set up once for a sparsity, warm from program to program, finished exactly.
+
+A second solver asks it only where active sets, corrected from the rows that lack, are not right after many corrections.
+"""
 
 from __future__ import annotations
 
+import sys
 from functools import lru_cache
+from importlib import import_module
+from importlib.machinery import PathFinder
+from importlib.util import find_spec, module_from_spec
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
-from wholebody.methods.qp.active_set import solve_from
+from wholebody.methods.qp.active_set import lacking, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
 from wholebody.methods.qp.solvers.fallback import CORRECTIONS, last_resort
 from wholebody.methods.qp.solvers.split_form import HEAVIEST, IDLE, SCALE, read_active, slots_for
 
@@ -19,6 +26,7 @@ RHO = 0.1  # OSQP's step length at the beginning; it adapts
 ROUNDS = (25, 50, 100, 200, 400)  # iterations, until an active set read off the multipliers settles
 HOT_ROUNDS = 2  # of them with a hot start: more take several times as long as semismooth Newton steps
 FAR = 1e30  # OSQP's infinity
+EXTENSION = "osqp.ext_builtin"
 
 
 class OSQPSolver(QPSolver):
@@ -61,6 +69,26 @@ class OSQPSolver(QPSolver):
             self._workspace = Workspace(program, self._workspace)
         self._workspace.load(program)
         return self._workspace
+
+
+class ActiveSetSolver(QPSolver):
+    """The primal-dual active set method throughout; OSQP where the sets do not settle."""
+
+    name = "active_set"
+
+    def __init__(self, hot_start: bool = True) -> None:
+        """Begin without a workspace."""
+        super().__init__(hot_start)
+        self._osqp = OSQPSolver()
+
+    def load(self) -> None:
+        """Import OSQP."""
+        self._osqp.load()
+
+    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
+        """Minimise from no bounds and the rows that x = 0 does not meet; see `QPSolver.solve_cold`."""
+        solution = solve_from(program, lacking(program), WARM_CORRECTIONS)
+        return self._osqp.solve_cold(program) if solution is None else solution._replace(by=ACTIVE_SET)
 
 
 class Workspace:
@@ -165,10 +193,17 @@ def _structure(n: int, m: int, slots: int, pattern: bytes) -> tuple[Any, Any, ND
 
 @lru_cache(maxsize=1)
 def extension() -> Any:
-    """OSQP's compiled module: its Python class around it takes five times as long as 25 iterations."""
-    import osqp
+    """OSQP's compiled module, without the package around it, which loads jinja2 and asyncio to write C code.
 
-    return osqp.OSQP().ext
+    The package's Python class takes five times as long as 25 iterations.
+    """
+    package = find_spec("osqp")
+    found = None if package is None else PathFinder.find_spec(EXTENSION, package.submodule_search_locations)
+    if EXTENSION in sys.modules or found is None or found.loader is None:
+        return import_module(EXTENSION)
+    module = sys.modules[EXTENSION] = module_from_spec(found)
+    found.loader.exec_module(module)
+    return module
 
 
 @lru_cache(maxsize=1)

@@ -1,0 +1,112 @@
+"""The engine against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.dynamics.rigid_bodies import RigidBodies
+from wholebody.dynamics.step_program import SKIN
+from wholebody.errors import InputError
+
+G = 9.81
+
+
+@pytest.fixture(scope="module")
+def hand() -> wb.Figure:
+    return wb.load("hand")
+
+
+def floor(hand: wb.Figure, normal: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> wb.Scene:
+    return wb.Scene(hand).add(wb.HalfSpace(normal, -2.0), name="floor")
+
+
+def test_a_ball_bounces_as_the_closed_form_says(hand: wb.Figure) -> None:
+    share, height = 0.5, 1.0
+    rubber = wb.Material("rubber", others=(share, 0.3))
+    scene = floor(hand).add(wb.Sphere(0.05), name="ball", at=(3, 0, height - 1.95), body=wb.Body(1e3, material=rubber))
+    engine = RigidBodies(scene)
+    first = np.sqrt(2.0 * (height - SKIN) / G)
+    speed = G * first
+    times, speeds = [], []
+    for frame in range(180):
+        for event in engine.advance(1 / 60).events:
+            times.append(frame / 60 + event.time)
+            speeds.append(event.speed)
+    expected = [speed * share**k for k in range(len(speeds))]
+    assert len(speeds) >= 7  # the eighth falls 20 um: the ball of Zeno ends
+    assert speeds[:7] == pytest.approx(expected[:7], rel=1e-3)
+    whole = [first + sum(2.0 * speed * share**j / G for j in range(1, k + 1)) for k in range(7)]
+    assert times[:7] == pytest.approx(whole, abs=1e-4)
+    assert np.abs(engine.twist("ball")).max() < 1e-9
+    assert engine.placement("ball").translation[2] == pytest.approx(-1.95 + SKIN, abs=2e-6)
+
+
+def test_a_thrown_body_follows_its_parabola_and_keeps_momentum_and_energy(hand: wb.Figure) -> None:
+    body = wb.Body(mass=2.0, velocity=(1.0, 2.0, 3.0), angular_velocity=(0.3, 8.0, 0.2))
+    scene = wb.Scene(hand).add(wb.Box((0.1, 0.2, 0.4)), name="box", at=(3.0, 0.0, 5.0), body=body)
+    engine = RigidBodies(scene)
+    energy, momentum = engine.energy(), engine.momentum()
+    for _ in range(60):
+        engine.advance(1 / 60)
+    at = engine.placement("box").translation
+    assert at == pytest.approx([4.0, 2.0, 8.0 - 0.5 * G], abs=1e-10)
+    assert engine.energy() == pytest.approx(energy, abs=1e-9)
+    own = engine.momentum()[3:] - np.cross(at, engine.momentum()[:3])
+    before = momentum[3:] - np.cross((3.0, 0.0, 5.0), momentum[:3])
+    assert own == pytest.approx(before, abs=1e-10)
+
+
+def test_a_box_slides_as_far_as_friction_lets_it(hand: wb.Figure) -> None:
+    speed, mu = 2.0, 0.3
+    body = wb.Body(mass=1.0, velocity=(speed, 0.0, 0.0))
+    scene = floor(hand).add(wb.Box((0.2, 0.2, 0.1)), name="box", at=(3, 0, -1.95 + SKIN), body=body)
+    engine = RigidBodies(scene)
+    deepest = max(engine.advance(1 / 60).deepest for _ in range(60))
+    whole = speed**2 / (2 * mu * G) - speed / 480  # a step moves a body with its velocity at the end: short by v h / 2
+    assert engine.placement("box").translation[0] - 3.0 == pytest.approx(whole, abs=5e-4)
+    assert np.abs(engine.twist("box")).max() < 1e-6
+    assert deepest == 0.0
+
+
+@pytest.mark.parametrize("slope", [0.29, 0.31])
+def test_a_box_on_a_slope_slides_where_the_slope_is_above_mu(hand: wb.Figure, slope: float) -> None:
+    angle = np.arctan(slope)
+    turned = pin.utils.rotate("y", float(angle))
+    scene = floor(hand, (float(np.sin(angle)), 0.0, float(np.cos(angle))))
+    start = pin.SE3(turned, turned @ np.array([0.0, 0.0, -1.95 + SKIN]))
+    scene.add(wb.Box((0.2, 0.2, 0.1)), name="box", at=start, body=wb.Body(mass=1.0))
+    engine = RigidBodies(scene)
+    for _ in range(60):
+        engine.advance(1 / 60)
+    way = turned.T @ (engine.placement("box").translation - start.translation)
+    expected = max(0.0, 0.5 * G * (np.sin(angle) - 0.3 * np.cos(angle)))
+    assert way[0] == pytest.approx(expected, abs=3e-4)
+    assert abs(way[2]) < 1e-4
+
+
+def test_a_stack_of_ten_stands_and_sleeps(hand: wb.Figure) -> None:
+    scene = floor(hand)
+    for k in range(10):
+        at = (3.0, 0.0, -1.9 + 0.2 * k + SKIN * (k + 1))
+        scene.add(wb.Box((0.2, 0.2, 0.2)), name=f"box {k}", at=at, body=wb.Body())
+    engine = RigidBodies(scene)
+    frames = [engine.advance(1 / 60) for _ in range(120)]
+    assert frames[-1].sleeping == 10
+    assert max(frame.deepest for frame in frames) <= 1e-4
+    for k in range(10):
+        away = engine.placement(f"box {k}").translation - (3.0, 0.0, -1.9 + 0.2 * k)
+        assert np.abs(away).max() < 2e-3
+
+
+def test_what_overlaps_at_the_start_is_refused(hand: wb.Figure) -> None:
+    scene = floor(hand).add(wb.Sphere(0.05), name="ball", at=(3, 0, -1.96), body=wb.Body())
+    with pytest.raises(InputError, match="'floor' and 'ball' overlap by 10 mm at the start; move one of them away"):
+        RigidBodies(scene)
+
+
+def test_a_scene_without_bodies_is_refused(hand: wb.Figure) -> None:
+    with pytest.raises(InputError, match="nothing in the scene moves by itself"):
+        RigidBodies(floor(hand))

@@ -1,0 +1,273 @@
+"""Things that move during a frame: nothing passes through anybody silently, and "qp" gets out of their way.
+
+What is true is found by fine subdivision: the thing is put, share by share, into a scene of its own, and all pairs are
+asked.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody import tracking
+from wholebody.methods.solve import as_method
+from wholebody.tracking.loop import FrameLoop
+
+DT = 1.0 / 60.0
+SHAPES = {
+    "plate": wb.Box((0.001, 0.5, 0.5)),
+    "board": wb.Box((0.02, 0.6, 0.4)),
+    "ball": wb.Sphere(0.08),
+    "rod": wb.Capsule(0.01, 0.9),
+}
+Path = Sequence[tuple[float, np.ndarray]]
+
+
+class Throw:
+    """A thing that flies towards the body of a person with constant velocity, and turns."""
+
+    def __init__(self, seed: int, kind: str, speed: float, turn: float = 0.0) -> None:
+        rng = np.random.default_rng(seed)
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        self.way = np.array([np.cos(angle), np.sin(angle), 0.0])
+        self.at = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), -0.5 * self.way + [0.0, 0.0, rng.uniform(0.7, 1.5)])
+        self.speed, self.spin = speed, turn * rng.normal(size=3)
+        self.scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+        self.scene.add(SHAPES[kind], name="thing", at=self.at)
+        self.truth = copy.copy(self.scene)
+        self.frames = int(0.7 / (speed * DT)) + 1
+
+    def next(self) -> tuple[pin.SE3, pin.SE3]:
+        before = self.at
+        rotation = before.rotation @ pin.exp3(self.spin * DT)
+        self.at = pin.SE3(rotation, before.translation + self.speed * DT * self.way)
+        self.scene.move("thing", at=self.at, over=DT)
+        return before, self.at
+
+    def deepest(self, path: Path, way: tuple[pin.SE3, pin.SE3], parts: int = 0) -> float:
+        """Depth of the thing in the body along a path, metres, by fine subdivision."""
+        turn = pin.log3(way[0].rotation.T @ way[1].rotation)
+        parts = parts or max(4, 120 // len(path))
+        worst = 0.0
+        for (s0, q0), (s1, q1) in pairwise(path):
+            for share in np.linspace(0.0, 1.0, parts):
+                s = s0 + share * (s1 - s0)
+                centre = (1.0 - s) * way[0].translation + s * way[1].translation
+                self.truth.move("thing", at=pin.SE3(way[0].rotation @ pin.exp3(s * turn), centre))
+                found = self.truth.contacts(pin.interpolate(self.truth.model, q0, q1, share), 0.0)
+                owner = self.truth.piece_owner
+                own = [row for row, pair in enumerate(found.pair) if "thing" in {owner[k] for k in pair}]
+                worst = max(worst, float(-found.distance[own].min(initial=0.0)))
+        return worst
+
+    def ends(self, q: np.ndarray) -> float:
+        """Deepest overlap of all pairs at a posture, metres."""
+        return wb.assess(wb.Problem(self.scene, q), q).penetration
+
+
+def problem_of(scene: wb.Scene, **more: object) -> wb.Problem:
+    start = scene.figure.posture("standing")
+    tip = scene.state(start).frame(scene.frame_id("right_index_tip")).translation.copy()
+    return wb.Problem(scene, start, goals=[wb.Point("right_index_tip", tip)], clearance=0.001, **more)
+
+
+@pytest.mark.parametrize("kind", list(SHAPES))
+@pytest.mark.parametrize(("speed", "turn"), [(1.0, 0.0), (2.5, 3.0)])
+def test_whoever_is_fast_enough_gets_out_of_the_way(kind: str, speed: float, turn: float) -> None:
+    """The body may move by 4 m/s along any axis, so a free posture exists in every frame: it may go with the thing."""
+    throw = Throw(hash_of(kind, speed), kind, speed, turn)
+    limits = wb.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
+    problem = problem_of(throw.scene, constraints=[limits])
+    tracker, q, touched = wb.QP().tracker(problem, DT), problem.start, 0
+    for _ in range(throw.frames):
+        way = throw.next()
+        step = tracker.step(q)
+        assert not step.collisions
+        assert throw.ends(step.q) < 1e-4
+        assert np.abs(step.velocity[:3]).max() < 4.1  # of a path whose axes turn
+        assert np.abs(step.velocity[6:]).max() < 12.0 + 1e-9
+        assert step.path[0][1] == pytest.approx(q)
+        assert step.path[-1][0] == 1.0
+        touched += np.abs(step.q - q).max() > 0.005
+        assert throw.deepest(step.path, way) < 2.5e-4
+        q = step.q
+    assert touched > 3
+
+
+def hash_of(kind: str, speed: float) -> int:
+    return 10 * list(SHAPES).index(kind) + int(speed)
+
+
+@pytest.mark.parametrize("method", ["qp", "newton", "ccd", "dls"])
+@pytest.mark.parametrize("kind", list(SHAPES))
+def test_what_passes_through_a_dragged_person_is_named(method: str, kind: str) -> None:
+    named = free = through = 0
+    for seed, speed in enumerate((4.0, 20.0, 45.0)):
+        throw = Throw(hash_of(kind, 5.0) + seed, kind, speed, turn=2.0)
+        drag = wb.Drag(problem_of(throw.scene), method)
+        target, before = np.array(drag.problem.goals[0].target), drag.q
+        for frame in range(throw.frames):
+            way = throw.next()
+            if (frame + 1) * DT * speed < 0.3:
+                continue  # nothing is near yet
+            answer = drag.to(target + (0.0, 0.0, 0.002 * frame))
+            began, ends = (throw.deepest(((s, q), (s, q)), way, 1) for s, q in ((0.0, before), (1.0, answer.q)))
+            names = {name for one in answer.collisions for name in (one.first, one.second)}
+            if ends > 1.2e-4:
+                assert "thing" in names
+                assert any(one.inside and one.depth == pytest.approx(ends, abs=1e-4) for one in answer.collisions)
+            if method != "qp" and began < 1e-5:  # others go straight
+                assert "thing" in names or throw.deepest(((0.0, before), (1.0, answer.q)), way, 100) < 3e-4
+            named += bool(names)
+            free += not names
+            through += any(not one.inside for one in answer.collisions)
+            before = answer.q
+            if speed < 10.0 and named:
+                break
+    assert free
+    assert through or method == "qp"
+
+
+@pytest.mark.parametrize("overlap", ["qp", "ccd"])
+@pytest.mark.parametrize("kind", ["plate", "ball"])
+def test_the_frame_loop_names_what_it_cannot_avoid(overlap: str, kind: str) -> None:
+    for seed, speed in ((1, 1.5), (2, 15.0)):
+        throw = Throw(seed, kind, speed)
+        q = throw.scene.figure.posture("standing")
+        loop = FrameLoop(throw.scene, q, overlap=overlap)
+        named = 0
+        for _ in range(min(throw.frames, 20)):
+            before, way = loop.shown, throw.next()
+            frame = loop.frame(q)
+            ends = throw.deepest(((1.0, frame.q), (1.0, frame.q)), way, 2)
+            if ends > 1.2e-4:
+                assert frame.collisions
+            if overlap == "ccd" and not frame.collisions:
+                assert throw.deepest(((0.0, before), (1.0, frame.q)), way, 60) < 3e-4
+            for one in frame.collisions:
+                assert str(one) in frame.note
+            named += bool(frame.collisions)
+        if speed > 10.0:
+            assert named
+        elif overlap == "qp":
+            assert not named
+
+
+def test_what_was_put_somewhere_did_not_move(planar_arm) -> None:
+    """A thing that is put on the other side of an arm passed through nothing; one that moved there did."""
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.02), name="ball", at=(0.7, 0.3, 0.0))
+    problem = wb.Problem(scene, np.array([0.1, 0.2, 0.2]), constraints=[wb.StepLimit(0.1)])
+    tracker = wb.QP().tracker(problem, DT)
+    q = tracker.step(problem.start).q
+    scene.move("ball", at=(0.7, -0.3, 0.0))
+    assert tracker.step(q).collisions == ()
+    scene.move("ball", at=(0.7, 0.3, 0.0), over=DT)
+    first = tracker.step(q)
+    assert [one.second for one in first.collisions][:1] == ["ball"]
+    assert not first.collisions[0].inside
+    assert "ball" in str(first.collisions[0])
+    assert tracker.step(first.q).collisions == ()  # it is out, and stays where it is
+
+
+def test_what_stays_inside_is_named_until_it_is_out(planar_arm) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.05), name="ball", at=(0.7, 0.6, 0.0))
+    start = np.array([0.1, 0.2, 0.2])
+    problem = wb.Problem(scene, start, constraints=[wb.StepLimit(0.5)])
+    tracker = wb.QP().tracker(problem, DT)
+    q = start
+    elbow = scene.state(start).frame(scene.frame_id("tip")).translation
+    scene.move("ball", at=elbow + (-0.05, 0.02, 0.0), over=DT)
+    frames = 0
+    while frames < 60:
+        step = tracker.step(q)
+        q, inside = step.q, -scene.contacts(step.q, 0.0).distance.min(initial=0.0)
+        assert bool(step.collisions) == (inside > 1e-4)
+        if not step.collisions:
+            break
+        frames += 1
+    assert 0 < frames < 60
+
+
+def test_a_sweep_may_have_things_that_move(planar_arm) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Box((0.3, 0.001, 0.3)), name="plate", at=(0.6, 0.5, 0.0))
+    q = np.array([0.0, 0.0, 0.0])
+    assert scene.sweep(q, q) is None
+    found = scene.sweep(q, q, moves={"plate": ((0.6, 0.5, 0.0), (0.6, -0.5, 0.0))})
+    assert found is not None
+    assert found.q.shape == q.shape
+    there = (0.6, 0.5 - found.fraction, 0.0)
+    touching = scene.move("plate", at=there).contacts(q, 0.01)
+    assert touching.distance[0] == pytest.approx(found.distance, abs=1e-6)
+    assert -1e-4 <= found.distance <= 0.0
+    assert scene.sweep(q, q, moves={"plate": ((0.6, 0.5, 0.0), (0.6, 0.3, 0.0))}) is None
+    # moving along with the arm, it meets nothing
+    turned = pin.SE3(pin.exp3(np.array([0.0, 0.0, 0.1])), np.zeros(3))
+    first = pin.SE3(np.eye(3), np.array([0.6, 0.2, 0.0]))
+    assert scene.sweep(q, np.array([0.1, 0.0, 0.0]), moves={"plate": (first, turned * first)}) is None
+
+
+def test_wrong_motions_are_one_sentence(planar_arm) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.02), name="ball", at=(0.7, 0.3, 0.0))
+    for over in (0.0, -1.0, np.inf, "fast"):
+        with pytest.raises(wb.InputError, match="over"):
+            scene.move("ball", at=(0.0, 1.0, 0.0), over=over)
+    assert scene.objects["ball"].motion is None
+    scene.move("ball", at=(0.0, 1.0, 0.0), over=0.5)
+    assert scene.objects["ball"].motion.seconds == 0.5
+    assert scene.objects["ball"].motion.start.translation == pytest.approx([0.7, 0.3, 0.0])
+    assert scene.move("ball", at=(0.0, 2.0, 0.0)).objects["ball"].motion is None
+    q = np.zeros(3)
+    with pytest.raises(wb.UnknownNameError, match="ball"):
+        scene.sweep(q, q, moves={"bal": ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))})
+    with pytest.raises(wb.InputError, match="two placements"):
+        scene.sweep(q, q, moves={"ball": (0.0, 0.0, 0.0)})
+    with pytest.raises(wb.InputError, match="end"):
+        scene.sweep(q, q, moves={"ball": ((0.0, 0.0, 0.0), (np.nan, 0.0, 0.0))})
+
+
+def test_a_whole_track_with_a_thing_that_moves_is_judged_with_it(planar_arm) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.05), name="ball", at=(0.7, 0.5, 0.0))
+    q = np.array([0.1, 0.2, 0.2])
+    ys = np.concatenate([np.linspace(0.5, 0.1, 30), np.linspace(0.1, 0.5, 20)])
+    places = [(0.7, float(y), 0.0) for y in ys]
+    track = tracking.Track.of(scene.figure, np.tile(q, (50, 1)), DT)
+    recording = tracking.follow(scene, track, moves={"ball": places})
+    assert scene.objects["ball"].placement.translation == pytest.approx([0.7, 0.5, 0.0])
+    assert np.abs(recording.q - q).max() > 0.1  # it gave way
+    judged = tracking.judge(scene, recording)
+    deepest = []
+    for shown, tracked, place in zip(recording.q, recording.tracked, places, strict=True):
+        scene.move("ball", at=place)
+        deepest.append([-scene.contacts(one, 0.0).distance.min(initial=0.0) for one in (shown, tracked)])
+    assert pytest.approx(np.array(deepest), abs=1e-9) == np.array([judged.depth, judged.tracked_depth]).T
+    assert judged.depth.max() < 1e-4
+    assert judged.tracked_depth.max() > 0.02
+    assert judged.passed == ()
+    held = replace(recording, q=recording.tracked)
+    assert tracking.judge(scene, held).passed  # who stays is passed through
+    for wrong in ({"ball": places[1:]}, {"ball": 3}, 4):
+        with pytest.raises(wb.InputError, match="moves"):
+            tracking.follow(scene, track, moves=wrong)
+    with pytest.raises(wb.UnknownNameError, match="ball"):
+        tracking.follow(scene, track, moves={"bell": places})
+
+
+@pytest.mark.parametrize("method", ["qp", "newton", "ccd", "dls"])
+def test_the_steps_of_every_tracker_name_what_passed(planar_arm, method: str) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.02), name="ball", at=(0.7, 0.8, 0.0))
+    q = np.array([0.1, 0.2, 0.2])
+    tip = scene.state(q).frame(scene.frame_id("tip")).translation.copy()
+    problem = wb.Problem(scene, q, goals=[wb.Point("tip", tip)], constraints=[wb.StepLimit(0.5)])
+    tracker = as_method(method).tracker(problem, DT)
+    q = tracker.step(q).q
+    assert tracker.step(q).collisions == ()
+    scene.move("ball", at=(0.7, -0.8, 0.0), over=DT)
+    named = tracker.step(q).collisions
+    assert [(one.second, one.inside) for one in named][:1] == [("ball", False)]

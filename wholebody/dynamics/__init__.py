@@ -1,0 +1,1 @@
+"""Rigid bodies that move by themselves: motion, impacts, resting contact."""

@@ -1,0 +1,117 @@
+"""The spring between a tracker and what it drives: equation 6 of Schmidl and Lin, m x'' = -K x - R x'.
+
+x is where the driven posture is, seen from the tracked one, in the tangent space of postures: one equation for each
+degree of freedom. During a frame the tracked posture moves with constant velocity, and x' is relative to that, so a
+figure that follows a steady motion does not lag behind. The equation is solved exactly for a frame, so any mass is
+stable at any frame time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, exp, sin, sqrt
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.checks import number, posture, time_step
+
+LIGHTEST, HEAVIEST = 1e-9, 1e6  # kg
+STIFFNESS, DAMPING = 1000.0, 40.0  # N/m, N s/m: K and R of Schmidl and Lin
+MASS = DAMPING**2 / (4.0 * STIFFNESS)  # kg: a hand's 0.4, with which the spring is critically damped
+BLOCKED = 1e-3  # rad, m: by which contact keeps a joint from where the spring wants it; less is the method's accuracy
+NEAR_CRITICAL = 1e-6  # share of the squared rate within which the two roots count as one
+
+
+@dataclass(frozen=True)
+class Spring:
+    """Constants of equation 6.
+
+    Attributes:
+        stiffness: K [N/m].
+        damping: R [N s/m].
+        mass: m [kg].
+
+    Raises:
+        InputError: K or m is not positive, R is negative, one is not finite, or the mass is not within 1e-9 and 1e6 kg.
+    """
+
+    stiffness: float = STIFFNESS
+    damping: float = DAMPING
+    mass: float = MASS
+
+    def __post_init__(self) -> None:
+        """Check the constants."""
+        number(self.stiffness, "Spring: stiffness", LIGHTEST, 1e12, "N/m")
+        number(self.damping, "Spring: damping", 0.0, 1e12, "N s/m")
+        number(self.mass, "Spring: mass", LIGHTEST, HEAVIEST, "kg")
+
+    def transition(self, time: float) -> Array:
+        """The matrix (2, 2) that takes x and x' over a time of so many seconds.
+
+        With a = R / 2m and s^2 = a^2 - K / m it is exp(-a t) [[C + a S, S], [-K / m S, C - a S]], C = cosh(s t) and
+        S = sinh(s t) / s, or cos and sin where s^2 is negative.
+
+        Raises:
+            InputError: the time is not positive and finite.
+        """
+        time = time_step(time, "time")
+        rate, stiff = 0.5 * self.damping / self.mass, self.stiffness / self.mass
+        square = rate * rate - stiff
+        if abs(square) <= NEAR_CRITICAL * rate * rate:
+            c = exp(-rate * time)
+            s = c * time
+        elif square < 0.0:
+            turn = sqrt(-square)
+            c, s = exp(-rate * time) * cos(turn * time), exp(-rate * time) * sin(turn * time) / turn
+        else:
+            root = sqrt(square)
+            slow = exp(-stiff / (rate + root) * time)  # (rate - root) without the loss of digits
+            fast = exp(-(rate + root) * time)
+            c, s = 0.5 * (slow + fast), 0.5 * (slow - fast) / root
+        return np.array([[c + rate * s, s], [-stiff * s, c - rate * s]])
+
+
+class Coupling:
+    """The driven posture of one figure on its spring.
+
+    Attributes:
+        spring: its constants.
+        velocity: (nv,) of the driven posture [rad/s, m/s].
+    """
+
+    def __init__(self, model: pin.Model, q: Array, spring: Spring | None = None) -> None:
+        """Begin at rest, at the posture q (nq,), which is tracked too."""
+        self.spring = Spring() if spring is None else spring
+        self._model = model
+        self._shown = self._tracked = posture(q, model.nq)
+        self.velocity: Array = np.zeros(model.nv)
+
+    def toward(self, tracked: Array, dt: float) -> Array:
+        """The posture (nq,) to which the spring would bring the driven one in a frame of `dt` seconds, by itself.
+
+        Args:
+            tracked: (nq,) where the tracker is at the end of the frame.
+            dt: seconds.
+        """
+        dt, model = time_step(dt, "dt"), self._model
+        tracked = posture(tracked, model.nq, "tracked")
+        steady = pin.difference(model, self._tracked, tracked) / dt
+        apart = pin.difference(model, self._tracked, self._shown)
+        (xx, xv), (vx, vv) = self.spring.transition(dt)
+        relative = self.velocity - steady
+        self.velocity = steady + vx * apart + vv * relative
+        self._tracked = tracked
+        return np.asarray(pin.integrate(model, tracked, xx * apart + xv * relative))
+
+    def stopped(self, shown: Array, wanted: Array, dt: float) -> None:
+        """Take the posture (nq,) that contact allowed in place of the one (nq,) that the spring wanted.
+
+        Where they differ, the velocity becomes that of what was done in the `dt` seconds of the frame.
+        """
+        model = self._model
+        missed = np.abs(pin.difference(model, wanted, shown))
+        done = pin.difference(model, self._shown, shown) / dt
+        self.velocity = np.where(missed > BLOCKED, done, self.velocity)
+        self._shown = np.array(shown)

@@ -1,0 +1,88 @@
+"""What happened in a frame of the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array
+
+
+class Event(NamedTuple):
+    """One impact.
+
+    Attributes:
+        time: since the start of the frame, seconds.
+        first: name of body A.
+        second: name of body B.
+        point: (3,) metres.
+        normal: (3,) unit normal from A to B.
+        speed: of approach, m/s.
+        impulse: (3,) on B, N s; its opposite acts on A.
+    """
+
+    time: float
+    first: str
+    second: str
+    point: Array
+    normal: Array
+    speed: float
+    impulse: Array
+
+
+class EngineFrame(NamedTuple):
+    """What happened in a frame.
+
+    Attributes:
+        events: impacts in the order of their times.
+        impulses: name of a body to the impulse (3,) of all its contacts during the frame, N s.
+        contacts: contact points that bore a force in the last step.
+        deepest: greatest depth of pieces in each other after any step, metres; 0 if none were.
+        energy: kinetic and potential energy of the bodies that move by themselves, joules.
+        signorini: largest residual of the programs, m/s; see `contact_kernel.residuals`.
+        coulomb: likewise.
+        steps: how many steps were made, those made again included.
+        sleeping: bodies that sleep.
+    """
+
+    events: tuple[Event, ...]
+    impulses: Mapping[str, Array]
+    contacts: int
+    deepest: float
+    energy: float
+    signorini: float
+    coulomb: float
+    steps: int
+    sleeping: int
+
+
+@dataclass
+class FrameRecord:
+    """A frame while it is being made; attributes as in `EngineFrame`.
+
+    Attributes:
+        stops: early ends of steps that are left.
+        time: since the start of the frame, seconds.
+        impulse: (n, 3) of each body.
+    """
+
+    stops: int
+    impulse: Array
+    time: float = 0.0
+    events: list[Event] = field(default_factory=list)
+    contacts: int = 0
+    deepest: float = 0.0
+    signorini: float = 0.0
+    coulomb: float = 0.0
+    steps: int = 0
+
+    def finished(self, names: tuple[str, ...], energy: float, sleeping: int) -> EngineFrame:
+        """The frame, with the names of the bodies."""
+        pushed = np.flatnonzero(self.impulse.any(axis=1)).tolist()
+        return EngineFrame(
+            tuple(self.events), {names[k]: self.impulse[k] for k in pushed}, self.contacts, self.deepest, energy,
+            self.signorini, self.coulomb, self.steps, sleeping,
+        )  # fmt: skip

@@ -1,0 +1,158 @@
+"""Impacts, resolved one by one, as compiled loops.
+
+The pair that approaches fastest comes first. At one point the impulse is that of Schmidl and Lin (2004), eqs. 8 to 10:
+
+    j = -(1 + e) u_n / (1/m_A + 1/m_B + n . (I_A^-1 (r_A x n) x r_A) + n . (I_B^-1 (r_B x n) x r_B))
+    j_t = -min(mu j, sticking) u_t / |u_t|
+
+where `sticking` is the impulse that ends the sliding. Where several points of a pair touch (a box falls flat), the pair
+has one program with u_n+ >= -e u_n- at every point. An impulse that would add kinetic energy, as friction can where its
+direction is coupled with the normal (Kane and Levinson, 1985), is reduced until it adds none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.arrays import Array, Indices
+from wholebody.compiled import compiled
+from wholebody.dynamics.contact_kernel import coupling, push, relative, solve
+
+EXACT = 1e-10  # m/s: to which the program of one pair is solved
+SWEEPS = 200  # of it
+
+
+@compiled()
+def resolve(
+    touching: Indices,
+    pair: Indices,
+    bodies: Indices,
+    axes: Array,
+    jacobian: Array,
+    answer: Array,
+    mobility: Array,
+    restitution: Array,
+    friction: Array,
+    twist: Array,
+    slow: float,
+    most: int,
+    impulse: Array,
+    events: Array,
+) -> tuple[int, bool]:
+    """Resolve impacts until none is left, at most `most`.
+
+    Args:
+        touching: (k,) contact points that touch.
+        pair: (m,) pair of each point; the other arrays are as in `contact_kernel`.
+        bodies: (m, 2).
+        axes: (m, 3, 3).
+        jacobian: (m, 3, 2, 6).
+        answer: (m, 3, 2, 6).
+        mobility: (m, 2).
+        restitution: (m,).
+        friction: (m,).
+        twist: (n, 6) changed in place.
+        slow: approach that is no impact, m/s.
+        most: events.
+        impulse: (m, 3) room for the impulses of one event.
+        events: (most, 5) room for the point, the approach [m/s] and the impulse [N s] along the world's axes.
+
+    Returns:
+        How many events there were, and whether all are resolved.
+    """
+    chosen, before = np.empty(len(touching), dtype=np.intp), np.empty((len(touching), 3))
+    target = np.zeros(len(pair))
+    for event in range(most):
+        worst, speed = -1, -slow
+        for c in touching:
+            u = relative(c, 0, bodies, jacobian, twist)
+            if u < speed and mobility[c, 0] > 0.0:
+                worst, speed = c, u
+        if worst < 0:
+            return event, True
+        count = 0
+        for c in touching:
+            if pair[c] == pair[worst]:
+                chosen[count] = c
+                for row in range(3):
+                    before[count, row] = relative(c, row, bodies, jacobian, twist)
+                    impulse[c, row] = 0.0
+                target[c] = -restitution[c] * before[count, 0]
+                count += 1
+        if count == 1:
+            _single(
+                worst, bodies, jacobian, answer, mobility, restitution[worst], friction[worst], twist, before[0],
+                impulse[worst],
+            )  # fmt: skip
+        else:
+            solve(chosen[:count], bodies, jacobian, answer, mobility, friction, target, twist, impulse, EXACT, SWEEPS)
+            _lose(chosen[:count], bodies, jacobian, answer, twist, before, impulse)
+        events[event, 0], events[event, 1] = worst, -speed
+        events[event, 2:] = 0.0
+        for number in range(count):
+            for row in range(3):
+                for k in range(3):
+                    events[event, 2 + k] += impulse[chosen[number], row] * axes[chosen[number], row, k]
+    return most, False
+
+
+@compiled()
+def _single(
+    c: int,
+    bodies: Indices,
+    jacobian: Array,
+    answer: Array,
+    mobility: Array,
+    restitution: float,
+    friction: float,
+    twist: Array,
+    before: Array,
+    impulse: Array,
+) -> None:
+    """The impulse at one point; eqs. 8 to 10."""
+    normal = -(1.0 + restitution) * before[0] / mobility[c, 0]
+    push(c, 0, normal, bodies, answer, twist)
+    impulse[0] = normal
+    sliding = np.sqrt(before[1] ** 2 + before[2] ** 2)
+    if sliding < 1e-12 or friction == 0.0:
+        return
+    one, two = before[1] / sliding, before[2] / sliding
+    along = one * one * coupling(c, 1, 1, jacobian, answer) + two * two * coupling(c, 2, 2, jacobian, answer)
+    along += 2.0 * one * two * coupling(c, 1, 2, jacobian, answer)
+    now = one * relative(c, 1, bodies, jacobian, twist) + two * relative(c, 2, bodies, jacobian, twist)
+    size = min(friction * normal, max(0.0, now / along))
+    # energy added by the share f of friction: lost + f linear + f^2 square
+    lost = 0.5 * normal * before[0] * (1.0 - restitution)
+    linear, square = -size * now, 0.5 * size * size * along
+    if lost + linear + square > 0.0:
+        size *= max(0.0, (-linear + np.sqrt(max(linear * linear - 4.0 * square * lost, 0.0))) / (2.0 * square))
+    for row, part in ((1, -size * one), (2, -size * two)):
+        push(c, row, part, bodies, answer, twist)
+        impulse[row] = part
+
+
+@compiled()
+def _lose(
+    chosen: Indices,
+    bodies: Indices,
+    jacobian: Array,
+    answer: Array,
+    twist: Array,
+    before: Array,
+    impulse: Array,
+) -> None:
+    """Scale the impulses of a pair down to what adds no kinetic energy."""
+    linear, square = 0.0, 0.0
+    for number in range(len(chosen)):
+        c = chosen[number]
+        for row in range(3):
+            now = relative(c, row, bodies, jacobian, twist)
+            linear += impulse[c, row] * before[number, row]
+            square += impulse[c, row] * (now - before[number, row])
+    if linear + 0.5 * square <= 0.0 or square <= 0.0:
+        return
+    share = max(0.0, -2.0 * linear / square)
+    for c in chosen:
+        for row in range(3):
+            push(c, row, (share - 1.0) * impulse[c, row], bodies, answer, twist)
+            impulse[c, row] *= share

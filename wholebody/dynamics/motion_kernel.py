@@ -1,0 +1,219 @@
+"""The motion of rigid bodies during a step, as compiled loops.
+
+The centre of mass goes straight, or along its parabola where no contact acts. The body turns about it with its angular
+momentum constant: midpoint steps of the rotation (order 2), each followed by the least rotation that restores the
+kinetic energy, so that momentum and energy of free bodies are constant to rounding.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.compiled import compiled
+
+LARGEST_TURN = 0.1  # rad: of one midpoint step; smaller is more accurate and slower
+STILL = 1e-12  # rad/s: slower than this a body does not turn
+
+
+@compiled()
+def exponential(turn: Array, rotation: Array) -> None:
+    """Write the rotation (3, 3) by a rotation vector (3,)."""
+    angle = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    if angle < 1e-6:
+        sine, versed = 1.0 - angle * angle / 6.0, 0.5 - angle * angle / 24.0
+    else:
+        sine, versed = np.sin(angle) / angle, (1.0 - np.cos(angle)) / (angle * angle)
+    for i in range(3):
+        for j in range(3):
+            rotation[i, j] = versed * turn[i] * turn[j]
+        rotation[i, i] += 1.0 - versed * angle * angle
+    rotation[0, 1] -= sine * turn[2]
+    rotation[1, 0] += sine * turn[2]
+    rotation[0, 2] += sine * turn[1]
+    rotation[2, 0] -= sine * turn[1]
+    rotation[1, 2] -= sine * turn[0]
+    rotation[2, 1] += sine * turn[0]
+
+
+@compiled()
+def _turned(turn: Array, rotation: Array, result: Array) -> None:
+    """Write exp(turn) rotation."""
+    by = np.empty((3, 3))
+    exponential(turn, by)
+    for i in range(3):
+        for j in range(3):
+            result[i, j] = by[i, 0] * rotation[0, j] + by[i, 1] * rotation[1, j] + by[i, 2] * rotation[2, j]
+
+
+@compiled()
+def _spin(rotation: Array, inverse: Array, momentum: Array, spin: Array) -> None:
+    """Write the angular velocity R I^-1 R^T L."""
+    local, other = np.empty(3), np.empty(3)
+    for i in range(3):
+        local[i] = rotation[0, i] * momentum[0] + rotation[1, i] * momentum[1] + rotation[2, i] * momentum[2]
+    for i in range(3):
+        other[i] = inverse[i, 0] * local[0] + inverse[i, 1] * local[1] + inverse[i, 2] * local[2]
+    for i in range(3):
+        spin[i] = rotation[i, 0] * other[0] + rotation[i, 1] * other[1] + rotation[i, 2] * other[2]
+
+
+@compiled()
+def _momentum(rotation: Array, inertia: Array, spin: Array, momentum: Array) -> None:
+    """Write the angular momentum R I R^T w."""
+    _spin(rotation, inertia, spin, momentum)
+
+
+@compiled()
+def turn_freely(rotation: Array, inertia: Array, inverse: Array, spin: Array, time: float) -> None:
+    """Turn a free body for a time: `rotation` (3, 3) and `spin` (3,) are changed in place.
+
+    Args:
+        rotation: of the body.
+        inertia: (3, 3) in the body.
+        inverse: of the inertia.
+        spin: angular velocity in the world, rad/s.
+        time: seconds.
+    """
+    speed = np.sqrt(spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2)
+    if speed < STILL:
+        return
+    momentum, turn, middle, now = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    pull = np.empty(3)
+    _momentum(rotation, inertia, spin, momentum)
+    energy = momentum[0] * spin[0] + momentum[1] * spin[1] + momentum[2] * spin[2]
+    steps = int(speed * time / LARGEST_TURN) + 1
+    h = time / steps
+    for _ in range(steps):
+        for k in range(3):
+            turn[k] = 0.5 * h * spin[k]
+        _turned(turn, rotation, middle)
+        _spin(middle, inverse, momentum, spin)
+        for k in range(3):
+            turn[k] = h * spin[k]
+        _turned(turn, rotation, now)
+        _spin(now, inverse, momentum, spin)
+        for _ in range(2):  # Newton's steps along the gradient w x L of the energy
+            change = energy - (momentum[0] * spin[0] + momentum[1] * spin[1] + momentum[2] * spin[2])
+            square = 0.0
+            for k in range(3):
+                i, j = (k + 1) % 3, (k + 2) % 3
+                pull[k] = spin[i] * momentum[j] - spin[j] * momentum[i]
+                square += pull[k] * pull[k]
+            if square * h * h < 1e-20 * energy * energy or abs(change) < 1e-15 * energy:
+                break
+            for k in range(3):
+                turn[k] = 0.5 * change / square * pull[k]
+            _turned(turn, now, middle)
+            now[:] = middle
+            _spin(now, inverse, momentum, spin)
+        _orthonormal(now)
+        rotation[:] = now
+
+
+@compiled()
+def _orthonormal(rotation: Array) -> None:
+    """Remove rounding from a rotation: one step of Newton's iteration for the polar factor."""
+    product = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            product[i, j] = 0.0
+            for k in range(3):
+                product[i, j] += rotation[k, i] * rotation[k, j]
+    before = rotation.copy()
+    for i in range(3):
+        for j in range(3):
+            rotation[i, j] = 1.5 * before[i, j]
+            for k in range(3):
+                rotation[i, j] -= 0.5 * before[i, k] * product[k, j]
+
+
+@compiled()
+def drift(
+    position: Array,
+    rotation: Array,
+    twist: Array,
+    inertia: Array,
+    inverse: Array,
+    moving: Mask,
+    given: Mask,
+    pushed: Mask,
+    gravity: Array,
+    time: float,
+) -> None:
+    """Move all bodies for a time; positions, rotations and angular velocities change in place.
+
+    Args:
+        position: (n, 3) centres of mass.
+        rotation: (n, 3, 3) of the bodies.
+        twist: (n, 6) velocities at the end of the time and angular velocities, m/s and rad/s.
+        inertia: (n, 3, 3) in the body.
+        inverse: (n, 3, 3) their inverses.
+        moving: (n,) which bodies move by themselves.
+        given: (n,) which ones move with constant velocity and angular velocity.
+        pushed: (n,) bodies on which a contact acts: they move with the velocity at the end, the others with the mean
+            of those at the start and at the end.
+        gravity: (3,) m/s2.
+        time: seconds.
+    """
+    now = np.empty((3, 3))
+    for b in range(len(position)):
+        if not moving[b] and not given[b]:
+            continue
+        half = 0.0 if pushed[b] or given[b] else 0.5 * time * time
+        for k in range(3):
+            position[b, k] += time * twist[b, k] - half * gravity[k]
+        if moving[b]:
+            turn_freely(rotation[b], inertia[b], inverse[b], twist[b, 3:], time)
+        else:
+            _turned(time * twist[b, 3:], rotation[b], now)
+            rotation[b] = now
+
+
+@compiled()
+def displace(position: Array, rotation: Array, way: Array, moving: Mask) -> None:
+    """Displace the bodies that move by themselves by (n, 6) metres and radians, in place."""
+    now = np.empty((3, 3))
+    for b in range(len(position)):
+        if moving[b]:
+            for k in range(3):
+                position[b, k] += way[b, k]
+            _turned(way[b, 3:], rotation[b], now)
+            rotation[b] = now
+
+
+@compiled()
+def world_inverses(rotation: Array, inverse: Array, moving: Mask, result: Array) -> None:
+    """Write the inverse inertias (n, 3, 3) along the world's axes; zero for bodies that do not move by themselves."""
+    for b in range(len(rotation)):
+        for i in range(3):
+            for j in range(3):
+                result[b, i, j] = 0.0
+        if moving[b]:
+            half = rotation[b] @ inverse[b]
+            result[b] = half @ rotation[b].T
+
+
+@compiled()
+def place_pieces(
+    position: Array, rotation: Array, centre: Array, body: Indices, local: Array, placement: Array
+) -> None:
+    """Write where all pieces are.
+
+    Args:
+        position: (n, 3) centres of mass.
+        rotation: (n, 3, 3) of the bodies.
+        centre: (n, 3) centre of mass in the body's axes.
+        body: (pieces,) the body of each piece.
+        local: (pieces, 4, 3) placement of each in its body; see `Contacts.placements`.
+        placement: (pieces, 4, 3) room for their placements in the world.
+    """
+    for p in range(len(body)):
+        b = body[p]
+        for row in range(4):
+            for k in range(3):
+                total = position[b, k] if row == 3 else 0.0
+                for j in range(3):
+                    part = local[p, row, j] - (centre[b, j] if row == 3 else 0.0)
+                    total += rotation[b, k, j] * part
+                placement[p, row, k] = total

@@ -1,0 +1,61 @@
+"""Which objects overlap, each figure counted as one, and by what each of the two would move to part them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.geometry.penetration import global_depth
+from wholebody.scene import Scene
+
+
+class Overlap(NamedTuple):
+    """Two objects that overlap.
+
+    Attributes:
+        first: name of the figure, or of a thing.
+        second: name of the other.
+        depth: (3,) PD_g of the two, out of the second into the first, metres: equation 1 of Schmidl and Lin, over all
+            pairs of pieces of the two objects.
+        moves_first: (3,) translation of the first that the estimate suggests: all of PD_g where only it may move, half
+            of it where both may.
+        moves_second: (3,) the same of the second.
+        pairs: number of overlapping pairs of pieces.
+    """
+
+    first: str
+    second: str
+    depth: Array
+    moves_first: Array
+    moves_second: Array
+    pairs: int
+
+
+def overlaps(scene: Scene, q: Array) -> tuple[Overlap, ...]:
+    """Every two objects that overlap at a posture q (nq,), the deepest first.
+
+    The figure with what it carries is one object; overlap of its own parts is not among these. It may move, and so may
+    things with a `wb.Body`; all others are fixed.
+    """
+    near, owners, objects = scene.contacts(q, 0.0), scene.piece_owner, scene.objects
+    figure = scene.figure.name
+
+    def whole(owner: str) -> str:
+        return owner if owner in objects and objects[owner].segment is None else figure
+
+    found: dict[tuple[str, str], list[tuple[float, Array]]] = {}
+    for (i, j), distance, normal in zip(near.pair.tolist(), near.distance.tolist(), near.normal, strict=True):
+        first, second = whole(owners[i]), whole(owners[j])
+        if first == second:
+            continue
+        key, out = ((first, second), -normal) if first == figure or second != figure else ((second, first), normal)
+        found.setdefault(key, []).append((-distance, out))
+    made = []
+    for (first, second), pairs in found.items():
+        depth = global_depth(np.array([d for d, _ in pairs]), np.array([n for _, n in pairs]))
+        free = [name == figure or objects[name].body is not None for name in (first, second)]
+        share = 0.5 if all(free) else 1.0
+        made.append(Overlap(first, second, depth, share * free[0] * depth, -share * free[1] * depth, len(pairs)))
+    return tuple(sorted(made, key=lambda one: -float(np.linalg.norm(one.depth))))

@@ -1,0 +1,190 @@
+"""The pieces of a scene as parts of bodies, and the pairs of them that dynamics looks at."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.geometry.large_models import geometry_model
+from wholebody.geometry.placement import FARTHEST
+from wholebody.geometry.proximity import Kinematics, PairTable, Proximity
+from wholebody.matter.inertia import MassProperties, mass_properties
+from wholebody.matter.materials import MATERIALS, Material, surface
+from wholebody.scene import Scene
+
+HUMAN = MATERIALS["human"]  # of every figure
+
+
+class PlacedPieces(NamedTuple):
+    """Pieces whose placements (pieces, 4, 3) are known; see `Contacts.placements`."""
+
+    placement: Array
+
+    @property
+    def data(self) -> Any:
+        """None: no model has placed them."""
+        return None
+
+
+class PlacedProximity(Proximity):
+    """Distances between pieces that stand where they are said to stand."""
+
+    def placements(self, state: Kinematics) -> Array:
+        """Take the placements over; `state` is `PlacedPieces`."""
+        placement = cast(PlacedPieces, state).placement
+        if self._placements is not None:
+            self._placements[:] = placement
+        else:
+            for k, rows in enumerate(placement):
+                self.results.oMg[k] = pin.SE3(rows[:3].T, rows[3])
+        return placement
+
+
+class Pieces:
+    """The bodies of a scene, their pieces, and the pairs of pieces that can meet and of which one moves by itself.
+
+    A body is a thing, or a segment with what it carries. Things that move by themselves come first.
+
+    Attributes:
+        names: (n,) of the bodies.
+        index: name to number; a carried thing has that of its segment.
+        dynamic: (n,) which bodies move by themselves.
+        mass: (n,) kg; infinite where nothing is known.
+        centre: (n, 3) centre of mass in the body's axes.
+        inertia: (n, 3, 3) about it, along the body's axes; identity where nothing is known.
+        placement: name to the body's placement in the scene; of segments in the figure's first posture.
+        body: (pieces,) the body of each piece.
+        local: (pieces, 4, 3) placement of each piece in its body.
+        table: pieces and pairs.
+        restitution: (pairs,).
+        friction: (pairs,).
+        levers: (n,) greatest distance of a body's swept points from its centre of mass, metres; 0 for a half-space.
+        notes: what was assumed about masses.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        """Gather bodies, pieces and pairs.
+
+        Raises:
+            InputError: two materials can meet of which neither knows the other.
+        """
+        figure, objects = scene.figure, scene.objects
+        free = [thing for thing in objects.values() if thing.body is not None]
+        fixed = [thing for thing in objects.values() if thing.body is None and thing.segment is None]
+        segments = list(dict.fromkeys(self._segment(scene, k) for k in range(figure.geometry.ngeoms)))
+        for thing in objects.values():
+            if thing.segment is not None and thing.segment not in segments:
+                segments.append(thing.segment)
+        self.names = tuple([thing.name for thing in free] + [thing.name for thing in fixed] + segments)
+        self.index = {name: number for number, name in enumerate(self.names)}
+        self.dynamic: Mask = np.arange(len(self.names)) < len(free)
+        self.mass = np.full(len(self.names), np.inf)
+        self.centre = np.zeros((len(self.names), 3))
+        self.inertia = np.tile(np.eye(3), (len(self.names), 1, 1))
+        self.placement: dict[str, pin.SE3] = {thing.name: thing.placement for thing in (*free, *fixed)}
+        self.placement.update(segment_placements(scene, figure.posture(figure.postures[0])))
+        self.notes: tuple[str, ...] = ()
+        for number, thing in enumerate(free):
+            known = mass_properties(thing.shape, thing.body, thing.name)  # type: ignore[arg-type]
+            self._weigh(number, known)
+            self.notes += (known.note,) if known.note else ()
+        for name in segments:
+            self._weigh_segment(scene, name)
+        self._lay_pieces(scene)
+
+    @staticmethod
+    def _segment(scene: Scene, piece: int) -> str:
+        return str(scene.model.frames[scene.figure.geometry.geometryObjects[piece].parentFrame].name)
+
+    def _weigh(self, number: int, known: MassProperties) -> None:
+        self.mass[number], self.centre[number], self.inertia[number] = known.mass, known.centre, known.inertia
+
+    def _weigh_segment(self, scene: Scene, name: str) -> None:
+        """The mass of a segment is that of all that its joint carries."""
+        frame = scene.model.frames[scene.frame_id(name)]
+        carried = scene.model.inertias[frame.parentJoint]
+        if frame.parentJoint > 0 and carried.mass > 0.0 and np.linalg.eigvalsh(carried.inertia).min() > 0.0:
+            inertia = frame.placement.actInv(carried)
+            self._weigh(self.index[name], MassProperties(inertia.mass, inertia.lever, inertia.inertia))
+
+    def _lay_pieces(self, scene: Scene) -> None:
+        built, objects = scene.built, scene.objects
+        pieces, body, local, made_of = [], [], [], []
+        local_of = {index: (name, at) for name, parts in built.pieces_of.items() for index, at in parts}
+        for number, piece in enumerate(built.geometry.geometryObjects):
+            if number in local_of:
+                name, at = local_of[number]
+                thing = objects[name]
+                owner = name if thing.segment is None else thing.segment
+                at = at if thing.segment is None else thing.placement * at
+                made_of.append(thing.material)
+            else:
+                owner = self._segment(scene, number)
+                at = scene.model.frames[scene.frame_id(owner)].placement.actInv(piece.placement)
+                made_of.append(HUMAN)
+            pieces.append(pin.GeometryObject(piece.name, 0, 0, pin.SE3.Identity(), piece.geometry))
+            body.append(self.index[owner])
+            local.append([*at.rotation.T, at.translation])
+        self.body: Indices = np.array(body, dtype=np.intp)
+        self.local = np.array(local, dtype=float).reshape(-1, 4, 3)
+        geometry = geometry_model(pieces)
+        first, second = np.triu_indices(len(pieces), 1)
+        a, b = self.body[first], self.body[second]
+        kept = (a != b) & (self.dynamic[a] | self.dynamic[b])
+        for i, j in zip(first[kept].tolist(), second[kept].tolist(), strict=True):
+            geometry.addCollisionPair(pin.CollisionPair(i, j))
+        self.table = PairTable(pin.Model(), geometry)
+        surfaces = self._surfaces(made_of)
+        self.restitution, self.friction = surfaces[:, 0].copy(), surfaces[:, 1].copy()
+        self._lay_heights()
+
+    def _surfaces(self, made_of: list[Material]) -> Array:
+        known: dict[tuple[int, int], tuple[float, float]] = {}
+        found = np.zeros((len(self.table.pairs), 2))
+        for number, (i, j) in enumerate(self.table.pairs.tolist()):
+            key = (id(made_of[i]), id(made_of[j]))
+            if key not in known:
+                known[key] = tuple(surface(made_of[i], made_of[j]))  # type: ignore[assignment]
+            found[number] = known[key]
+        return found
+
+    def _lay_heights(self) -> None:
+        """Arrays for `passing_kernel.highest`, and the distances of points from centres of mass."""
+        swept = self.table.swept
+        self.points = np.vstack([one.points for one in swept] or [np.zeros((0, 3))])
+        self.count: Indices = np.array([len(one.points) for one in swept], dtype=np.intp)
+        self.start: Indices = (np.cumsum(self.count) - self.count).astype(np.intp)
+        self.radius = np.array([one.radius for one in swept], dtype=float)
+        self.axes, self.plane = np.zeros((len(swept), 3)), np.zeros((len(swept), 4))
+        centres = self.centre[self.body]
+        offset = np.linalg.norm(self.local[:, 3] - centres, axis=1)
+        self.lever = offset.copy()
+        for k, (one, piece) in enumerate(zip(swept, self.table.geometry.geometryObjects, strict=True)):
+            if len(one.points):
+                placed = one.points @ self.local[k, :3] + self.local[k, 3] - centres[k]
+                self.lever[k] = float(np.linalg.norm(placed, axis=1).max())
+            elif np.isinf(one.reach):
+                self.plane[k], self.lever[k] = one.faces[0], FARTHEST
+            else:
+                self.axes[k] = piece.geometry.radii
+                self.lever[k] += one.reach
+        self.levers = np.zeros(len(self.names))
+        np.maximum.at(self.levers, self.body, np.where(np.isinf([one.reach for one in swept]), 0.0, self.lever))
+
+    @property
+    def heights(self) -> tuple[Array, Indices, Indices, Array, Array, Array]:
+        """The last six arguments of `passing_kernel.highest`."""
+        return self.points, self.start, self.count, self.radius, self.axes, self.plane
+
+
+def segment_placements(scene: Scene, q: Array) -> dict[str, pin.SE3]:
+    """Where every segment of the figure is at a posture q, shape (nq,)."""
+    model = scene.model
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    pin.updateFramePlacements(model, data)
+    names = {*scene.figure.segments, *(thing.segment for thing in scene.objects.values() if thing.segment is not None)}
+    return {name: pin.SE3(data.oMf[scene.frame_id(name)]) for name in names}

@@ -1,0 +1,345 @@
+"""Rigid bodies that move by themselves among things and a figure that do not.
+
+A frame is advanced in steps of at most `SUBSTEP`. A step ends early at the next impact; there the impacts are resolved
+one by one (`impact_kernel`), and the motion goes on. In a step all contacts together have one program (`step_program`)
+that keeps every gap at `SKIN` or more at its end; then the bodies move (`motion_kernel`). A step after which
+pieces are in each other, or may have passed through each other on the way, is made again with half the time. After
+too many stops in a frame the impacts of a step become part of its program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody import checks
+from wholebody.arrays import Array, Mask
+from wholebody.dynamics import contact_kernel, impact_kernel, motion_kernel, passing_kernel
+from wholebody.dynamics.bodies_state import BodiesState
+from wholebody.dynamics.contact_points import ContactFinder
+from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord
+from wholebody.dynamics.pieces import Pieces
+from wholebody.dynamics.sleeping import Sleepers
+from wholebody.dynamics.step_program import NOTHING, SKIN, StepProgram
+from wholebody.errors import InputError
+from wholebody.geometry.placement import FARTHEST, placement
+from wholebody.geometry.proximity import Contacts
+from wholebody.scene import Scene
+
+GRAVITY = (0.0, 0.0, -9.81)  # m/s2
+SUBSTEP = 1.0 / 240.0  # s: longest step; smaller is more accurate and slower
+SHORTEST = 1e-6  # s: of a step that ends with an impact
+INSIDE = 1e-4  # m: a step that leaves pieces deeper in each other is made again with half the time
+LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
+PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
+HALVINGS = 6  # of a step, at most
+MARGIN = 2e-3  # m: pairs are looked at from this much farther than bodies come in a step
+STOPS = 12  # early ends of steps in a frame, at most
+DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
+FASTEST = 1e3  # m/s2: of gravity
+STRONGEST = 1e6  # N s
+PARTINGS = 4  # rounds of parting pieces after a step
+
+
+class RigidBodies:
+    """The things of a scene that have a `wb.Body`, and everything that they can touch.
+
+    Attributes:
+        state: where all bodies are, and how they move.
+        names: of the bodies.
+        notes: what was assumed about masses.
+        time: seconds since the start.
+    """
+
+    def __init__(self, scene: Scene, gravity: tuple[float, float, float] = GRAVITY) -> None:
+        """Put all bodies where the scene has them; the figure stands in its first posture.
+
+        Raises:
+            InputError: nothing in the scene has a body, two things overlap of which one moves, or two materials do not
+                know each other.
+        """
+        checks.instance(scene, Scene, "scene", "give a wb.Scene")
+        self.gravity = _bounded(gravity, FASTEST, "gravity")
+        pieces = Pieces(scene)
+        if not pieces.dynamic.any():
+            raise InputError("nothing in the scene moves by itself; add a thing with body=wb.Body(density=700)")
+        compiled_kernel()
+        self._pieces, self.state = pieces, BodiesState(scene, pieces)
+        self.names, self.notes, self.time = pieces.names, pieces.notes, 0.0
+        self._finder, self._old = ContactFinder(pieces), NOTHING
+        self._sleepers = Sleepers(self.state)
+        self._falling = pieces.dynamic.copy()
+        self._near: Contacts
+        self._look(SUBSTEP)
+        self._check_start()
+
+    def _check_start(self) -> None:
+        if len(self._near.distance) and self._near.distance.min() < -DEEPEST_START:
+            worst = int(self._near.distance.argmin())
+            first, second = (self.names[self._pieces.body[piece]] for piece in self._near.pair[worst])
+            raise InputError(
+                f"{first!r} and {second!r} overlap by {-1e3 * self._near.distance[worst]:.3g} mm at the start; "
+                "move one of them away"
+            )
+
+    def placement(self, name: str) -> pin.SE3:
+        """Where a body is.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+        """
+        return self.state.placement(self._number(name))
+
+    def twist(self, name: str) -> Array:
+        """Velocity of a body's centre of mass [m/s] and angular velocity [rad/s], (6,), along the world's axes.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+        """
+        return np.array(self.state.twist[self._number(name)])
+
+    def velocity_at(self, name: str, point: Array) -> Array:
+        """Velocity (3,) of a body's point at a place (3,) in the world, m/s.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+            InputError: the place is not three finite numbers.
+        """
+        number, point = self._number(name), _bounded(point, FARTHEST, "point")
+        lever = point - self.state.position[number]
+        return np.asarray(self.state.velocity[number] + np.cross(self.state.spin[number], lever))
+
+    def mobility(self, name: str, point: Array) -> Array:
+        """Change (3, 3) of the velocity of a body's point (3,) by an impulse there, 1/kg.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+            InputError: the place is not three finite numbers.
+        """
+        number, point = self._number(name), _bounded(point, FARTHEST, "point")
+        lever = pin.skew(point - self.state.position[number])
+        return np.asarray(np.eye(3) / self._pieces.mass[number] - lever @ self._inverse_inertia(number) @ lever)
+
+    def push(self, name: str, impulse: Array, point: Array) -> None:
+        """Give a body that moves by itself an impulse (3,) at a place (3,) in the world, N s; it wakes.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+            InputError: impulse or place are not three finite numbers, or the body does not move by itself.
+        """
+        number, point = self._number(name), _bounded(point, FARTHEST, "point")
+        impulse = _bounded(impulse, STRONGEST, "impulse")
+        if not self._pieces.dynamic[number]:
+            raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
+        lever = point - self.state.position[number]
+        self.state.velocity[number] += impulse / self._pieces.mass[number]
+        self.state.spin[number] += self._inverse_inertia(number) @ np.cross(lever, impulse)
+        self.state.moving[number] = True
+
+    def _inverse_inertia(self, number: int) -> Array:
+        rotation = self.state.rotation[number]
+        return np.asarray(rotation @ self.state.inverse[number] @ rotation.T)
+
+    def energy(self) -> float:
+        """Kinetic and potential energy of the bodies that move by themselves, joules."""
+        return self.state.energy(self.gravity)
+
+    def momentum(self) -> Array:
+        """Momentum [kg m/s] and angular momentum about the world's origin [kg m2/s], (6,), of the same bodies."""
+        return self.state.momentum()
+
+    def _number(self, name: str) -> int:
+        return self._pieces.index[checks.known(name, self._pieces.index, "body")]
+
+    def advance(self, dt: float, kinematic: Mapping[str, tuple[pin.SE3, pin.SE3]] | None = None) -> EngineFrame:
+        """Advance by a frame.
+
+        Args:
+            dt: seconds.
+            kinematic: name of a segment, or of a thing without a body, to its placements at the start and at the end of
+                the frame, between which it moves with constant velocity and angular velocity. What is not named stands.
+
+        Raises:
+            InputError: dt is no time step, or a thing that moves by itself is named.
+            UnknownNameError: there is no such segment or thing.
+        """
+        dt = checks.time_step(dt, "dt")
+        state, given = self.state, {self._number(name): _ways(ways, name) for name, ways in _given(kinematic).items()}
+        for number, (before, after) in given.items():
+            if self._pieces.dynamic[number]:
+                raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
+            state.give(number, before, after, dt)
+        count = int(np.ceil(dt / SUBSTEP - 1e-9))
+        record = FrameRecord(STOPS, np.zeros((len(self.names), 3)))
+        self._look(dt / count)
+        for number in range(count):
+            end = dt * (number + 1) / count
+            while end - record.time > 1e-9 * dt:
+                self._step(end - record.time, record)
+        for number, (_, after) in given.items():
+            state.put(number, after)
+            state.twist[number] = 0.0
+        state.given[:] = False
+        self._sleepers.look(self._near, dt)
+        self.time += dt
+        return record.finished(self.names, self.energy(), self._sleepers.count)
+
+    # ---- a step
+
+    def _step(self, time: float, record: FrameRecord) -> None:
+        """Advance by at most a time: to its end, to the next impact, or to where a shorter step leads."""
+        state = self.state
+        self._sleepers.wake(self._near)
+        program = StepProgram(state, self._finder.points(self._near), self.gravity)
+        events, ended = program.resolve_impacts()
+        self._record(events, program, record)
+        program.look(self._falling)
+        together = record.stops <= 0 or not ended
+        first = float(program.hits.min(initial=np.inf))
+        if not together and first < time:
+            time, record.stops = max(first, SHORTEST), record.stops - 1
+        kept, near, margin, start = state.kept(), self._near, self._margin, self._old
+        for halving in range(HALVINGS + 1):
+            program.solve(time, together, start)
+            impulse, pushed = program.world_impulse(), program.pushed()
+            self._falling = ~pushed
+            self._drift(time, pushed)
+            record.steps += 1
+            least = self._look(SUBSTEP)
+            clear = least >= -INSIDE and self._parted(near, margin, kept[0], time)
+            if clear or halving == HALVINGS:
+                break
+            state.restore(kept)
+            start, time = program.remembered(time), 0.5 * time
+        record.time += time
+        self._old = program.remembered(time)
+        np.add.at(record.impulse, program.points.bodies[:, 1], impulse)
+        np.add.at(record.impulse, program.points.bodies[:, 0], -impulse)
+        record.contacts = int((impulse != 0.0).any(axis=1).sum())
+        record.signorini = max(record.signorini, program.residuals[0])
+        record.coulomb = max(record.coulomb, program.residuals[1])
+        if least < LEAST_GAP:
+            least = self._part(least)
+        record.deepest = max(record.deepest, -least)
+
+    def _record(self, events: Array, program: StepProgram, record: FrameRecord) -> None:
+        points = program.points
+        for row in events:
+            number = int(row[0])
+            first, second = points.bodies[number]
+            record.impulse[second] += row[2:]
+            record.impulse[first] -= row[2:]
+            place = points.point[number], points.normal[number]
+            names = self.names[first], self.names[second]
+            record.events.append(Event(record.time, *names, *place, float(row[1]), row[2:]))
+
+    def _drift(self, time: float, pushed: Mask) -> None:
+        state = self.state
+        motion_kernel.drift(
+            state.position, state.rotation, state.twist, self._pieces.inertia, state.inverse,
+            state.moving, state.given, pushed, self.gravity, time,
+        )  # fmt: skip
+
+    def _look(self, time: float) -> float:
+        """Find the pairs that can meet within a time; the least distance of any."""
+        state = self.state
+        active = state.moving | state.given
+        way = self._ways(time)
+        self._margin = 1.5 * way + MARGIN
+        self._near = self._finder.near(state.position, state.rotation, self._margin, active)
+        return float(self._near.distance.min(initial=np.inf))
+
+    def _ways(self, time: float) -> Array:
+        """Most that a point of each body (n,) moves in a time, metres."""
+        state = self.state
+        speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * self._pieces.levers
+        return np.asarray((speed + np.where(state.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
+
+    def _parted(self, near: Contacts, margin: Array, kept: Array, time: float) -> bool:
+        """Whether no pieces can have been in each other on the way from positions (n, 3) that were kept.
+
+        `near` were the pairs within margins (n,) of both bodies before the step.
+        """
+        pieces, after = self._pieces, self._near
+        if not (self._ways(time) <= margin).all():
+            return False
+        bodies = pieces.body[near.pair]
+        found = np.full(len(pieces.table.pairs), -1, dtype=np.intp)
+        found[after.number] = np.arange(len(after.number))
+        found = found[near.number]
+        listed = found >= 0
+        gap, normal = self._margin[bodies].sum(axis=1), np.zeros((len(listed), 3))
+        gap[listed], normal[listed] = after.distance[found[listed]], after.normal[found[listed]]
+        spin, fall = np.linalg.norm(self.state.spin, axis=1), float(np.linalg.norm(self.gravity))
+        doubtful = passing_kernel.doubtful(
+            near.pair, np.ascontiguousarray(near.distance), np.ascontiguousarray(near.normal), gap, normal,
+            near.placements, after.placements, pieces.body, self.state.position - kept, spin * time, pieces.levers,
+            fall * time**2 / 8.0, PASSING, *pieces.heights,
+        )  # fmt: skip
+        return int(doubtful) == 0
+
+    def _part(self, least: float) -> float:
+        """Part pieces that are nearer than `LEAST_GAP`, by the least displacements; the least distance then."""
+        state = self.state
+        for _ in range(PARTINGS):
+            program = StepProgram(state, self._finder.points(self._near), self.gravity)
+            motion_kernel.displace(state.position, state.rotation, program.parting(0.5 * SKIN), state.moving)
+            least = self._look(SUBSTEP)
+            if least >= LEAST_GAP:
+                break
+        return least
+
+
+def _bounded(value: object, most: float, what: str) -> Array:
+    """Three numbers, none of them beyond `most`."""
+    numbers = np.array(checks.numbers(value, (3,), what))
+    if np.abs(numbers).max() > most:
+        raise InputError(f"{what} is {checks.shown(value)}; give at most {most:g}")
+    return numbers
+
+
+def _given(kinematic: object) -> Mapping[str, object]:
+    if kinematic is None:
+        return {}
+    return checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")  # type: ignore[type-abstract]
+
+
+def _ways(ways: object, name: str) -> tuple[pin.SE3, pin.SE3]:
+    """Two placements; checking each of those that are pin.SE3 already would take a frame longer than its bodies."""
+    if not isinstance(ways, (tuple, list)) or len(ways) != 2:
+        raise InputError(
+            f"kinematic: {checks.shown(name)} has {checks.shown(ways)}; give its placements before and after"
+        )
+    before, after = (
+        way if isinstance(way, pin.SE3) and np.isfinite(way.homogeneous).all() else placement(way, f"kinematic: {name}")
+        for way in ways
+    )
+    return before, after
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> None:
+    """Compile the loops or read them back: not in the middle of a frame."""
+    one, none, mask = np.zeros((1, 3)), np.zeros(0, dtype=np.intp), np.ones(1, dtype=bool)
+    unit, vectors, turned, twist = np.eye(3)[None].copy(), np.zeros((0, 3)), np.zeros((1, 4, 3)), np.zeros((1, 6))
+    some, mass, pairs = np.zeros(0), np.zeros(1), np.zeros((0, 2), dtype=np.intp)
+    motion_kernel.drift(one, unit.copy(), twist, unit, unit, mask, mask, mask, np.zeros(3), 1.0)
+    motion_kernel.displace(one, unit.copy(), twist, mask)
+    motion_kernel.world_inverses(unit, unit, mask, unit.copy())
+    motion_kernel.place_pieces(one, unit, one, np.zeros(1, dtype=np.intp), turned, turned.copy())
+    laid = np.zeros((0, 3, 3)), np.zeros((0, 3, 2, 6)), np.zeros((0, 3, 2, 6)), np.zeros((0, 2))
+    contact_kernel.lay(pairs, vectors, vectors, one, mass, unit, *laid)
+    contact_kernel.solve(none, pairs, *laid[1:], some, some, twist, vectors, 1.0, 1)
+    contact_kernel.residuals(pairs, laid[1], laid[3], some, some, twist, vectors)
+    contact_kernel.rates(pairs, laid[1], twist, vectors)
+    contact_kernel.apply(pairs, laid[2], twist, vectors)
+    contact_kernel.start_from(none, vectors, vectors, none, none, vectors, laid[0], 1.0, vectors)
+    impact_kernel.resolve(none, none, pairs, *laid, some, some, twist, 1.0, 1, vectors, np.zeros((1, 5)))
+    passing_kernel.doubtful(
+        pairs, some, vectors, some, vectors, turned, turned, none, one, mass, mass, 0.0, 1.0, vectors,
+        none, none, some, vectors, np.zeros((0, 4)),
+    )  # fmt: skip
+    passing_kernel.join(none, none, none, none)

@@ -1,0 +1,274 @@
+"""Scenes in which things move by themselves: balls, boxes and dominoes that a hand or an avatar meets.
+
+After the experiments of Schmidl and Lin, "Real-time physically-based interaction between avatars and virtual
+environments" (section 6): a ball flicked off a table by a finger, and rooms with things to push.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.checks import known, number, whole
+from wholebody.figures import load
+from wholebody.figures.figure import Figure
+from wholebody.geometry.shapes import Box, HalfSpace, Sphere
+from wholebody.matter.body import Body
+from wholebody.methods.inputs import SEED
+from wholebody.scene import Scene
+from wholebody.tracking.scenes import FRAMES_OF_A_SCRIPT
+from wholebody.tracking.scripts import FRAME, script
+from wholebody.tracking.tracks import MOST_FRAMES, Track
+
+Place = tuple[float, float, float]
+Keys = list[tuple[float, Array]]
+
+TOP = 0.75  # m: of the table
+TABLE = (0.8, 0.6, 0.04)  # m: sizes of its top; its middle is at x = y = 0
+GAP = 2e-4  # m: that things stand above what bears them at the start, so that they do not begin inside it
+BALL = 0.02  # m: radius of the balls
+DOMINO = (0.008, 0.024, 0.048)  # m
+DOMINOES = 12
+STEP = (0.25, 1.0, 0.17)  # m: tread, width and rise of a stair
+STEPS = 6
+BLUE, RED, OAK = (0.30, 0.42, 0.58, 1.0), (0.72, 0.25, 0.20, 1.0), (0.60, 0.48, 0.36, 1.0)
+
+
+@dataclass(frozen=True)
+class WorldScene:
+    """A scene with a tracker, in which things move by themselves.
+
+    Attributes:
+        name: its name on the command line.
+        about: one sentence.
+        scene: figure and things; those with a `wb.Body` move by themselves.
+        track: the tracked postures.
+        eye: position of the camera, metres.
+        target: the point in the middle of the picture, metres.
+        see_through: things to draw transparent.
+    """
+
+    name: str
+    about: str
+    scene: Scene
+    track: Track
+    eye: Place
+    target: Place
+    see_through: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Plan:
+    about: str
+    figure: str
+    put: Callable[[Scene], object]
+    keys: Callable[[Figure], Keys]
+    eye: Place
+    target: Place
+
+
+def build_world_scene(name: str, *, frames: int | None = None, seed: int = 0, dt: float = FRAME) -> WorldScene:
+    """Build a scene of `WORLD_SCENES`.
+
+    Args:
+        name: of the scene.
+        frames: number of frames; the script is cut, or repeated. By default the whole script once.
+        seed: of the tracked person's tremor.
+        dt: seconds from frame to frame.
+
+    Raises:
+        UnknownNameError: there is no such scene.
+        InputError: fewer than one frame.
+    """
+    known(name, _PLANS, "scene")
+    if frames is not None:
+        whole(frames, "frames", 1, MOST_FRAMES)
+    SEED.check(seed, "seed")
+    dt = number(dt, "dt", *FRAMES_OF_A_SCRIPT, "s")
+    plan = _PLANS[name]
+    figure = load(plan.figure)
+    track = script(figure, plan.keys(figure), dt=dt, seed=seed, name=name)
+    if frames is not None:
+        track = track.repeated(frames)
+    scene = Scene(figure).add(HalfSpace(), name="floor")
+    plan.put(scene)
+    return WorldScene(name, plan.about, scene, track, plan.eye, plan.target)
+
+
+# ---- things
+
+
+def _table(scene: Scene) -> None:
+    scene.add(Box(TABLE), name="table", at=(0.0, 0.0, TOP - 0.5 * TABLE[2]), color=OAK)
+    leg = TOP - TABLE[2]
+    for number_, (x, y) in enumerate(((-0.35, -0.25), (-0.35, 0.25), (0.35, -0.25), (0.35, 0.25))):
+        scene.add(Box((0.05, 0.05, leg)), name=f"leg {number_ + 1}", at=(x, y, 0.5 * leg), color=OAK)
+
+
+def _ball(scene: Scene, x: float, y: float, radius: float = BALL) -> None:
+    scene.add(Sphere(radius), name="ball", at=(x, y, TOP + radius + GAP), color=RED, body=Body(density=700.0))
+
+
+def _ball_to_flick(scene: Scene) -> None:
+    _table(scene)
+    _ball(scene, 0.30, 0.0)
+
+
+def _ball_to_push(scene: Scene) -> None:
+    _table(scene)
+    _ball(scene, -0.05, 0.0, 0.03)
+
+
+def _box_to_push(scene: Scene) -> None:
+    _table(scene)
+    scene.add(
+        Box((0.10, 0.14, 0.08)), name="box", at=(0.0, 0.0, TOP + 0.04 + GAP), color=BLUE, body=Body(density=300.0)
+    )
+
+
+def _dominoes(scene: Scene) -> None:
+    _table(scene)
+    for number_ in range(DOMINOES):
+        at = (-0.05 + 0.028 * number_, 0.0, TOP + 0.5 * DOMINO[2] + GAP)
+        scene.add(Box(DOMINO), name=f"domino {number_ + 1}", at=at, color=BLUE, body=Body(density=700.0))
+
+
+def _stairs(scene: Scene) -> None:
+    tread, width, rise = STEP
+    for number_ in range(STEPS):
+        height = rise * (STEPS - number_)
+        scene.add(Box((tread, width, height)), name=f"stair {number_ + 1}", at=(tread * number_, 0.0, 0.5 * height))
+    body = Body(density=700.0, velocity=(0.6, 0.0, 0.0))
+    scene.add(Sphere(0.06), name="ball", at=(0.0, 0.0, rise * STEPS + 0.06 + GAP), color=RED, body=body)
+
+
+def _things_to_walk_into(scene: Scene) -> None:
+    scene.add(Box((0.30, 0.40, 0.50)), name="carton", at=(0.75, -0.1, 0.25 + GAP), color=OAK, body=Body(density=60.0))
+    scene.add(
+        Box((0.25, 0.30, 0.40)), name="parcel", at=(0.75, -0.1, 0.70 + 2 * GAP), color=BLUE, body=Body(density=60.0)
+    )
+    scene.add(Sphere(0.12), name="ball", at=(1.15, 0.35, 0.12 + GAP), color=RED, body=Body(density=60.0))
+
+
+# ---- the hand: position of the wrist, and the glove
+
+
+def _hand(figure: Figure, at: Place, glove: str, curl: float = 0.0) -> Array:
+    """The hand with its fingers forward (x), its palm down; the index bent by `curl` radians more at each joint."""
+    q = figure.posture(glove)
+    turn = pin.Quaternion(q[3:7]).toRotationMatrix()
+    q[:3], q[3:7] = at, pin.Quaternion(turn).coeffs()
+    if curl:
+        bent = {
+            name: value + curl
+            for name, value in figure.joint_values(q).items()
+            if "index" in name and "flexion" in name
+        }
+        q = figure.clamp(figure.with_joints(q, bent))
+    return q
+
+
+def _flick(figure: Figure) -> Keys:
+    high = TOP + 0.055
+
+    def at(x: float, z: float, curl: float) -> Array:
+        return _hand(figure, (x, 0.03, z), "pointing", curl)
+
+    return [
+        (0.0, at(0.02, high + 0.12, 0.0)),
+        (0.8, at(0.09, high, 0.9)),
+        (0.4, at(0.09, high, 0.9)),
+        (0.12, at(0.115, high, -0.1)),
+        (0.5, at(0.115, high, -0.1)),
+        (1.2, at(0.02, high + 0.12, 0.0)),
+    ]
+
+
+def _push(figure: Figure) -> Keys:
+    def at(x: float, z: float) -> Array:
+        return _hand(figure, (x, 0.0, z), "grip")
+
+    low = TOP + 0.06
+    return [
+        (0.0, at(-0.45, low + 0.15)),
+        (0.8, at(-0.35, low)),
+        (1.6, at(0.02, low)),
+        (0.5, at(0.02, low)),
+        (0.8, at(-0.30, low + 0.1)),
+        (0.8, at(-0.45, low + 0.15)),
+    ]
+
+
+def _tap(figure: Figure) -> Keys:
+    def at(x: float, z: float) -> Array:
+        return _hand(figure, (x, 0.02, z), "pointing")
+
+    low = TOP + 0.075
+    return [
+        (0.0, at(-0.40, low + 0.12)),
+        (0.8, at(-0.30, low)),
+        (0.6, at(-0.21, low)),
+        (0.4, at(-0.25, low)),
+        (1.6, at(-0.40, low + 0.12)),
+    ]
+
+
+def _aside(figure: Figure) -> Keys:
+    q = _hand(figure, (-0.6, -0.9, 1.4), "relaxed")
+    return [(0.0, q), (4.0, q)]
+
+
+# ---- the avatar
+
+
+def _walk_into(figure: Figure) -> Keys:
+    def at(x: float, degrees: Mapping[str, float]) -> Array:
+        values = {}
+        for name, angle in degrees.items():
+            for joint in (name, f"left_{name}", f"right_{name}"):
+                if joint in figure.joints:
+                    values[joint] = math.radians(angle)
+        q = figure.with_joints(figure.posture("standing"), values)
+        q[0] = x
+        return figure.clamp(q)
+
+    hanging = {"shoulder_flexion": 5.0, "elbow_flexion": 15.0}
+    ahead = {"shoulder_flexion": 45.0, "elbow_flexion": 50.0, "shoulder_abduction": 8.0}
+    return [
+        (0.0, at(-0.4, hanging)),
+        (0.8, at(-0.2, ahead)),
+        (2.0, at(0.7, ahead)),
+        (0.8, at(0.7, ahead)),
+        (1.5, at(-0.2, hanging)),
+        (0.8, at(-0.4, hanging)),
+    ]
+
+
+_PLANS: dict[str, _Plan] = {
+    "flick": _Plan(
+        "a finger flicks a ball off a table", "hand", _ball_to_flick, _flick, (0.9, -0.9, 1.25), (0.3, 0.0, 0.65)
+    ),
+    "push_ball": _Plan(
+        "a fist pushes a ball along a table", "hand", _ball_to_push, _push, (0.6, -1.0, 1.35), (0.0, 0.0, 0.72)
+    ),
+    "push_box": _Plan(
+        "a fist pushes a box along a table", "hand", _box_to_push, _push, (0.6, -1.0, 1.35), (0.0, 0.0, 0.72)
+    ),
+    "dominoes": _Plan(
+        "a finger pushes the first of a row of dominoes", "hand", _dominoes, _tap, (0.5, -0.7, 1.15), (0.05, 0.0, 0.76)
+    ),
+    "stairs": _Plan(
+        "a ball rolls down stairs; the hand stays aside", "hand", _stairs, _aside, (3.2, -2.6, 1.9), (1.0, 0.0, 0.5)
+    ),
+    "avatar_and_cartons": _Plan(
+        "an avatar walks with its hands ahead into two cartons, one on the other, and a ball",
+        "avatar", _things_to_walk_into, _walk_into, (2.6, -2.6, 1.9), (0.5, 0.0, 0.7),
+    ),
+}  # fmt: skip
+
+WORLD_SCENES: Mapping[str, str] = {name: plan.about for name, plan in _PLANS.items()}
+"""Descriptions of the scenes, by name."""

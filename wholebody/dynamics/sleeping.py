@@ -1,0 +1,63 @@
+"""Bodies that lie still sleep: they cost nothing until something touches them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.dynamics import passing_kernel
+from wholebody.dynamics.bodies_state import BodiesState
+from wholebody.geometry.proximity import Contacts
+
+STILL = 5e-3  # m/s of every point of a body: slower bodies may sleep
+PATIENCE = 0.5  # s that all bodies of an island are so slow before they sleep
+TOUCHING = 1e-3  # m: nearer bodies wake each other
+
+
+class Sleepers:
+    """Which bodies sleep. A body sleeps and wakes together with all that touch each other."""
+
+    def __init__(self, state: BodiesState) -> None:
+        """Let all be awake."""
+        self._state = state
+        self._slow_for = np.zeros(len(state.position))
+        self._island = np.arange(len(state.position))
+
+    @property
+    def count(self) -> int:
+        """How many bodies sleep."""
+        return int((self._state.pieces.dynamic & ~self._state.moving).sum())
+
+    def look(self, near: Contacts, dt: float) -> None:
+        """Let islands sleep that have been slow for long; `near` are the pairs at the end of a frame of `dt` s."""
+        state = self._state
+        speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * state.pieces.levers
+        slow = speed < STILL
+        self._slow_for = np.where(slow, self._slow_for + dt, 0.0)
+        if not (self._slow_for[state.moving] >= PATIENCE).any():
+            return
+        body = state.pieces.body[near.pair[near.distance < TOUCHING]]
+        island = np.arange(len(state.position))
+        passing_kernel.join(body[:, 0].copy(), body[:, 1].copy(), state.pieces.dynamic.astype(np.intp), island)
+        least = np.full(len(island), np.inf)
+        waiting = np.where(state.pieces.dynamic, np.where(state.moving, self._slow_for, np.inf), np.inf)
+        np.minimum.at(least, island, waiting)
+        tired = state.moving & (least[island] >= PATIENCE)
+        state.moving &= ~tired
+        state.velocity[tired] = state.spin[tired] = 0.0
+        self._island[tired] = island[tired]
+
+    def wake(self, near: Contacts) -> None:
+        """Wake what is touched by a body that moves."""
+        state = self._state
+        asleep = state.pieces.dynamic & ~state.moving
+        if not asleep.any():
+            return
+        body = state.pieces.body[near.pair[near.distance < TOUCHING]]
+        speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * state.pieces.levers
+        pushing = (speed > STILL) & (state.moving | state.given)
+        for one, other in ((0, 1), (1, 0)):
+            touched = body[pushing[body[:, one]] & asleep[body[:, other]], other]
+            if len(touched):
+                woken = asleep & np.isin(self._island, self._island[touched])
+                state.moving |= woken
+                self._slow_for[woken] = 0.0

@@ -1,0 +1,202 @@
+"""A scene in time: a driven figure among fixed things, and things that move by themselves.
+
+After figure 3 of Schmidl and Lin. In every frame the spring between tracker and figure says where the figure wants to
+be; its overlap with everything is removed; what it then still pushes gets its impulse; at last the things that move by
+themselves go on, while the figure moves from the posture before to the one that is shown.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from wholebody.arrays import Array
+from wholebody.checks import array, instance, time_step
+from wholebody.dynamics.coupling import Coupling, Spring
+from wholebody.dynamics.driven_impulses import TOUCH, PushedContacts
+from wholebody.dynamics.frame import EngineFrame
+from wholebody.dynamics.overlaps import Overlap, overlaps
+from wholebody.dynamics.pieces import HUMAN, segment_placements
+from wholebody.dynamics.rigid_bodies import RigidBodies
+from wholebody.errors import InputError
+from wholebody.geometry.continuous.passing_through import INSIDE
+from wholebody.matter.materials import Surface, surface
+from wholebody.moving_things import Collision
+from wholebody.scene import Scene
+from wholebody.tracking.loop import FrameLoop, unreadable
+
+FRAME = 1.0 / 60.0  # s: frame time of a screen
+
+
+class WorldFrame(NamedTuple):
+    """One frame of a world.
+
+    Attributes:
+        time: seconds since the start, at the end of the frame.
+        q: (nq,) the posture that is shown.
+        wanted: (nq,) where the spring would have brought the figure.
+        placements: thing that moves by itself to where it is.
+        impulses: thing to the impulse (3,) that the figure gave it, N s.
+        engine: what the things did; None if none moves by itself.
+        collisions: what could not be avoided, such as a thing that the user moved too fast; empty if nothing.
+        overlaps: objects that overlap at the end by more than 0.1 mm, with what would part them; empty if nothing.
+        deepest: greatest depth of any pair at the end, metres; 0 if there is none.
+        seconds: wall time, without drawing.
+        note: "" or a report of unusual events.
+    """
+
+    time: float
+    q: Array
+    wanted: Array
+    placements: Mapping[str, pin.SE3]
+    impulses: Mapping[str, Array]
+    engine: EngineFrame | None
+    collisions: tuple[Collision, ...]
+    overlaps: tuple[Overlap, ...]
+    deepest: float
+    seconds: float
+    note: str
+
+
+class World:
+    """A figure that follows a tracker among things, some of which move by themselves.
+
+    Things without a `wb.Body` are fixed; the user may move them between frames (`Scene.move` with `over=world.dt`). The
+    scene always has the present placements of all things.
+
+    Attributes:
+        scene: figure and things.
+        dt: seconds a frame.
+        q: (nq,) the posture that is shown.
+        time: seconds since the start.
+        engine: the things that move by themselves; None if there are none.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        start: ArrayLike | None = None,
+        *,
+        dt: float = FRAME,
+        overlap: str = "qp",
+        seed: int = 0,
+        spring: Spring | None = None,
+    ) -> None:
+        """Begin.
+
+        Args:
+            scene: figure and things.
+            start: (nq,) first posture; the figure's first one by default.
+            dt: seconds a frame.
+            overlap: how the figure's overlap is removed, "qp" or "ccd"; see `FrameLoop`.
+            seed: of all random orders; the same seed gives the same motion.
+            spring: between tracker and figure, K 1000, R 40 and 0.4 kg by default.
+
+        Raises:
+            InputError: no posture near the start is free, or two things overlap of which one moves by itself.
+            UnknownNameError: another overlap.
+        """
+        self.scene, self.dt = (
+            instance(scene, Scene, "World: scene", "make one with wb.Scene(figure)"),
+            time_step(dt, "dt"),
+        )
+        instance(spring, (Spring, type(None)), "World: spring", "give wb.Spring(mass=0.4), or leave it out")
+        self._bodies = tuple(name for name, thing in scene.objects.items() if thing.body is not None)
+        first = scene.figure.posture(scene.figure.postures[0]) if start is None else start
+        self._loop = FrameLoop(scene, first, overlap=overlap, dt=self.dt, seed=seed, touching=self._bodies)
+        self.engine = RigidBodies(scene) if self._bodies else None
+        self._coupling = Coupling(scene.model, self._loop.shown, spring)
+        self._tracked: Array = self._loop.shown
+        self._workspace, self.time = scene.workspace(), 0.0
+        self._revision = scene.revision
+        self._before = segment_placements(scene, self._loop.shown)
+        self._placed = {name: thing.placement for name, thing in scene.objects.items() if thing.segment is None}
+        owners = self._workspace.owners
+        self._owner_of = {piece: name for piece, name in enumerate(owners) if name in self._bodies}
+        self._surfaces = {
+            (piece, name): self._surface(owner, name) for piece, owner in enumerate(owners) for name in self._bodies
+        }
+
+    @property
+    def q(self) -> Array:
+        """(nq,) the posture that is shown."""
+        return self._loop.shown
+
+    def step(self, tracked: ArrayLike | None = None) -> WorldFrame:
+        """Make one frame.
+
+        If the tracked posture is invalid (a sensor that failed), the one before counts, and the note says so.
+
+        Args:
+            tracked: (nq,) where the tracker is at the end of the frame; None for where it was.
+
+        Raises:
+            InputError: objects were added to or removed from the scene.
+        """
+        self._check_fresh()
+        began, note = time.perf_counter(), ""
+        if tracked is not None:
+            goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
+            note = unreadable(self.scene, goal)
+            self._tracked = self._tracked if note else np.array(pin.normalize(self.scene.model, goal))
+        wanted = self._coupling.toward(self._tracked, self.dt)
+        moved = self._user_moves()
+        frame = self._loop.frame(wanted)
+        impulses: dict[str, Array] = {}
+        engine = None
+        if self.engine is not None:
+            impulses = self._push(frame.q)
+            after = segment_placements(self.scene, frame.q)
+            given = {name: (self._before[name], place) for name, place in after.items()}
+            engine = self.engine.advance(self.dt, {**given, **moved})
+            self._before = after
+            for name in self._bodies:
+                self.scene.move(name, at=self.engine.placement(name))
+        self._coupling.stopped(frame.q, wanted, self.dt)
+        self.time += self.dt
+        for name in self._placed:
+            self._placed[name] = self.scene.objects[name].placement
+        deepest = self._deepest(frame.q)
+        found = overlaps(self.scene, frame.q) if deepest > INSIDE else ()
+        note = "; ".join(part for part in (note and f"{note}; the one before counts", frame.note) if part)
+        return WorldFrame(
+            self.time, frame.q, wanted, {name: self._placed[name] for name in self._bodies}, impulses, engine,
+            frame.collisions, found, deepest, time.perf_counter() - began, note,
+        )  # fmt: skip
+
+    def _push(self, q: Array) -> dict[str, Array]:
+        """Give things the impulses of the figure that was stopped at the posture q (nq,)."""
+        assert self.engine is not None
+        self._workspace.refresh()
+        near = self._workspace.near(q, TOUCH)
+        contacts = PushedContacts(self.engine, self._workspace.state, self._workspace.table, near, self._owner_of)
+        return contacts.push(self._coupling.velocity, self._surfaces)
+
+    def _surface(self, owner: str, body: str) -> Surface:
+        """What happens where a segment or thing touches a thing that moves by itself."""
+        objects = self.scene.objects
+        own = objects[owner].material if owner in objects else HUMAN
+        return surface(own, objects[body].material)
+
+    def _user_moves(self) -> dict[str, tuple[pin.SE3, pin.SE3]]:
+        """Things without a body that the user moved since the last frame, with both placements."""
+        objects = self.scene.objects
+        moved = {}
+        for name, before in self._placed.items():
+            thing = objects[name]
+            if thing.body is None and thing.placement != before:
+                moved[name] = (thing.placement if thing.motion is None else before, thing.placement)
+        return moved
+
+    def _deepest(self, q: Array) -> float:
+        self._workspace.refresh()
+        return max(0.0, -float(self._workspace.near(q, 0.0).distance.min(initial=0.0)))
+
+    def _check_fresh(self) -> None:
+        if self.scene.revision != self._revision:
+            raise InputError("objects came to or left the scene after the world was made; make the world anew")

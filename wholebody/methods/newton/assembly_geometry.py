@@ -1,0 +1,181 @@
+"""The bodies of an assembly as one figure, so that scenes, sweeps and the viewer take them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
+
+import pinocchio as pin
+
+from wholebody import checks
+from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
+from wholebody.geometry.large_models import geometry_model
+from wholebody.geometry.placement import PlacementLike, placement
+from wholebody.geometry.shapes import Shape
+from wholebody.geometry.swept_points import swept_points
+from wholebody.scene import Scene
+from wholebody.scene_geometry import SceneObject, assemble
+
+Solid = tuple[Shape, Any]
+"""A shape, and its placement (pin.SE3) in its body."""
+
+ShapeLike = Shape | Iterable[Shape | tuple[Shape, PlacementLike]]
+
+
+class Owner(NamedTuple):
+    """What has pieces: a body with its solids, or a segment of a figure with the figure's pieces.
+
+    Attributes:
+        name: of the body, or "<figure>/<segment>".
+        body: index of the body.
+        figure: name of the figure; empty for other bodies.
+        pieces: name, placement in the body and geometry of each piece.
+    """
+
+    name: str
+    body: int
+    figure: str
+    pieces: list[tuple[str, Any, Any]]
+
+
+def solids(shape: ShapeLike | None, where: str) -> tuple[Solid, ...]:
+    """The shapes of a body, each with its placement in the body.
+
+    Raises:
+        InputError: something else, a placement that cannot be read, or a half-space.
+    """
+    if shape is None:
+        return ()
+    listed = [shape] if isinstance(shape, Shape) else checks.listed(shape, f"{where}: shape", "[wb.Box((1, 1, 1))]")
+    found: list[Solid] = []
+    for entry in listed:
+        given, at = entry if isinstance(entry, tuple) and len(entry) == 2 else (entry, (0.0, 0.0, 0.0))
+        mend = "give wb.Box, wb.Sphere or another, or (shape, placement)"
+        one: Shape = checks.instance(given, Shape, f"{where}: shape", mend)
+        found.append((one, placement(at, f"{where}: shape")))
+        if _reach(found[-1:]) == float("inf"):
+            raise InputError(f"{where}: a body cannot be a half-space; add it as a thing, or give a wb.Box")
+    return tuple(found)
+
+
+def rim(of: Iterable[Solid], otherwise: float) -> float:
+    """Distance from a body's origin to its farthest point, metres."""
+    return max(_reach(of), 0.0) or otherwise
+
+
+def _reach(of: Iterable[Solid]) -> float:
+    far = 0.0
+    for shape, at in of:
+        for piece in shape.pieces():
+            center = (at * piece.placement).translation
+            far = max(far, float((center @ center) ** 0.5) + swept_points(piece.geometry).reach)
+    return far
+
+
+def body_owner(name: str, body: int, of: Iterable[Solid]) -> Owner:
+    """The pieces of a body."""
+    pieces: list[tuple[str, Any, Any]] = []
+    for shape, at in of:
+        for piece in shape.pieces():
+            pieces.append((f"{name}:{len(pieces)}", at * piece.placement, piece.geometry))
+    return Owner(name, body, "", pieces)
+
+
+def figure_owners(name: str, figure: Figure, first: int) -> list[Owner]:
+    """The pieces of a figure by segments; its root's body has the index `first`."""
+    found: dict[str, Owner] = {}
+    for piece in figure.geometry.geometryObjects:
+        segment = f"{name}/{figure.model.frames[piece.parentFrame].name}"
+        owner = found.setdefault(segment, Owner(segment, first + int(piece.parentJoint) - 1, name, []))
+        owner.pieces.append((f"{name}/{piece.name}", piece.placement, piece.geometry))
+    return list(found.values())
+
+
+def figure_pairs(name: str, figure: Figure) -> list[tuple[str, str]]:
+    """Names of the pieces of a figure that it tests against each other."""
+    pieces = [f"{name}/{piece.name}" for piece in figure.geometry.geometryObjects]
+    return [(pieces[pair.first], pieces[pair.second]) for pair in figure.geometry.collisionPairs]
+
+
+class LooseBodies:
+    """What a `wholebody.Scene` asks of its figure: a free joint a body, the figures' own joints, all pieces and pairs.
+
+    Figures keep their joints, because Pinocchio's data of a model grow with the cube of its degrees of freedom: by
+    0.2 GB for 30 free bodies, by 7 GB for 100.
+
+    Attributes:
+        model: joint k + 1 is body k; a posture has seven numbers for a body, and the posture of each figure.
+        geometry: the pieces and the pairs.
+        segments: names of the bodies and segments with pieces.
+    """
+
+    root = "free"
+    detail = "own"
+    postures = ()
+    visual = None
+    name = "assembly"
+
+    def __init__(
+        self,
+        parts: Iterable[str | tuple[str, Figure]],
+        owners: Iterable[Owner],
+        tested: Callable[[Owner, Owner], bool],
+        pairs: Iterable[tuple[str, str]],
+    ) -> None:
+        """Build the model.
+
+        Args:
+            parts: names of bodies, and names and figures, in the order of their bodies.
+            owners: of all pieces.
+            tested: whether the pieces of two different owners can touch.
+            pairs: more pairs of pieces that can touch, by name.
+        """
+        self.model = pin.Model()
+        for part in parts:
+            if isinstance(part, str):
+                self.model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), part)
+            else:
+                self._append(*part)
+        pieces, owner_of = [], []
+        self.segments: tuple[str, ...] = ()
+        for owner in owners:
+            frame = pin.Frame(owner.name, owner.body + 1, 0, pin.SE3.Identity(), pin.FrameType.BODY)
+            index = self.model.addFrame(frame)
+            self.segments += (owner.name,)
+            for name, at, shape in owner.pieces:
+                pieces.append(pin.GeometryObject(name, owner.body + 1, index, at, shape))
+                owner_of.append(owner)
+        self.geometry = geometry_model(pieces)
+        for second, one in enumerate(owner_of):
+            for first, other in enumerate(owner_of[:second]):
+                if other.body != one.body and tested(other, one):
+                    self.geometry.addCollisionPair(pin.CollisionPair(first, second))
+        index_of = {piece.name: index for index, piece in enumerate(pieces)}
+        for pair in pairs:
+            self.geometry.addCollisionPair(pin.CollisionPair(*sorted(index_of[name] for name in pair)))
+
+    def _append(self, name: str, figure: Figure) -> None:
+        """Add the joints of a figure."""
+        own, before = figure.model, self.model.njoints - 1
+        for joint in range(1, own.njoints):
+            parent = int(own.parents[joint])
+            carrier = before + parent if parent else 0
+            self.model.addJoint(carrier, own.joints[joint], own.jointPlacements[joint], f"{name}/{own.names[joint]}")
+
+    def frame_id(self, name: str) -> int:
+        """Index of the frame of a body or segment with pieces.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+        """
+        return int(self.model.getFrameId(checks.known(name, self.segments, "body with a shape")))
+
+
+def scene_of(
+    bodies: LooseBodies, things: Mapping[str, SceneObject], apart: Iterable[tuple[str, str]]
+) -> Scene:  # fmt: skip
+    """The bodies among things; pairs (body, thing) of `apart` are not tested."""
+    excluded = dict.fromkeys(apart, "said to touch, or standing still")
+    figure: Any = bodies  # a scene asks of its figure what LooseBodies has
+    return Scene.of_parts(figure, things.values(), assemble(figure, things.values(), excluded))

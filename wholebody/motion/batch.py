@@ -1,0 +1,346 @@
+"""`wb.avoid_many`: clips freed of collisions, each with each equipment by each method, many at a time."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from wholebody import checks
+from wholebody.arrays import Array
+from wholebody.batches import run_batch
+from wholebody.errors import InputError, WholebodyError
+from wholebody.figures.figure import Figure
+from wholebody.files import is_file, read_bytes
+from wholebody.motion.avoidance import Avoided, as_avoider, avoid
+from wholebody.motion.avoider import Avoider
+from wholebody.motion.batch_table import AvoidedCase, BatchTable, first_twice
+from wholebody.motion.clip import Clip
+from wholebody.motion.frame_terms import Given, frame_terms
+from wholebody.motion.measures import deviation, foot_sliding, jerk_ratio
+from wholebody.motion.reading import read_clip
+from wholebody.motion.ready_equipment import NOTHING, Worn, dressed, label
+from wholebody.runner import Job
+from wholebody.tracking.tracks import check_figure
+from wholebody.version import __version__
+
+MOST_JOBS = 4096
+ENDLESS = 0.0  # s: no deadline
+DT = 1.0 / 30.0  # s: of the frame with which constraints are tried
+
+Source = Clip | str | os.PathLike[str]
+
+
+class BatchProgress(NamedTuple):
+    """Told when a case is done.
+
+    Attributes:
+        done: cases, those of an earlier run included.
+        total: how many there are in all.
+        case: the one that was done last; None before the first.
+    """
+
+    done: int
+    total: int
+    case: AvoidedCase | None
+
+
+class _Asked(NamedTuple):
+    """A case before it is done; its clip is read when it begins."""
+
+    row: AvoidedCase
+    worn: Worn
+    method: Avoider
+
+
+class _Held(NamedTuple):
+    """What holds in every frame of each case."""
+
+    constraints: tuple[Given, ...]
+    feet: bool
+
+
+def avoid_many(
+    clips: Iterable[Source],
+    folder: str | os.PathLike[str],
+    *,
+    figure: Figure | None = None,
+    equipment: Iterable[Worn] = (NOTHING,),
+    methods: Iterable[str | Avoider] = ("trajectory",),
+    constraints: Iterable[Given] = (),
+    hold_feet: bool = True,
+    jobs: int = 1,
+    cluster: str | None = None,
+    progress: Callable[[BatchProgress], Any] | None = None,
+) -> tuple[AvoidedCase, ...]:
+    """Free clips of collisions: each clip, with each equipment, by each method.
+
+    The folder gets a clip for each case, the clips as they were (`originals`), and a table of all cases as `cases.json`
+    and `cases.csv`. What it holds already, of the same clip, figure, equipment, method and constraints, is not done
+    again: a run that was ended goes on. Files are written whole. Each case runs in a process of its own, so that one
+    that fails ends no other.
+
+    Args:
+        clips: clips, or files of motion, which are read or retargeted for `figure` as `read_clip` does.
+        folder: is made if it does not exist.
+        figure: of the files; a clip has its own.
+        equipment: what is worn in turn: "nothing", names of `wb.equipment` such as "pack", joined by "+" where they are
+            worn together, paths of meshes, which are put on the back, `wb.Equipment`, or tuples of these.
+        methods: names or settings, see `avoid`.
+        constraints: what holds in every frame of each case, see `avoid`.
+        hold_feet: keep the feet where they stand, see `avoid`.
+        jobs: cases at a time.
+        cluster: address of a dask scheduler that runs them; None for this machine.
+        progress: called with a `BatchProgress` after each case.
+
+    Returns:
+        The rows of the table, in the order in which they were asked.
+
+    Raises:
+        InputError: something else than a clip or a file, no figure for a file, two clips of one name.
+        UnknownNameError: there is no such method or equipment.
+        FileFormatError: the folder holds another table.
+        MissingPackageError: dask is not installed.
+        WholebodyError: the cluster does not answer.
+    """
+    what = "avoid_many"
+    sources = _sources(checks.listed(clips, f"{what}: clips", "['walk.bvh']"), figure, what)
+    given = checks.listed(constraints, f"{what}: constraints", "[wb.StanceFeet()]")
+    pieces = checks.listed(equipment, f"{what}: equipment", "['nothing', 'pack']")
+    twice = first_twice(label(one) for one in pieces)
+    if twice is not None:
+        raise InputError(f"{what}: two pieces of equipment are named {checks.shown(twice)}; give each another name")
+    worn: dict[str, Worn] = {label(one): one for one in pieces}
+    ways = _ways([as_avoider(one) for one in checks.listed(methods, f"{what}: methods", "['trajectory']")])
+    checks.flag(hold_feet, f"{what}: hold_feet")
+    jobs = checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS)
+    if cluster is not None:
+        checks.text(cluster, f"{what}: cluster")
+    checks.function(progress, f"{what}: progress")
+    owners = [source.figure if isinstance(source, Clip) else figure for source in sources.values()]
+    for owner in {id(owner): owner for owner in owners if owner is not None}.values():
+        for one in pieces:  # what does not fit is said before anything is computed
+            frame_terms(dressed(owner, one), owner.neutral[None], DT, tuple(given))
+    table = BatchTable(checks.path(folder, f"{what}: folder"))
+    marks, faults = _originals(sources, figure, table, jobs, cluster)
+    held = _Held(tuple(given), hold_feet)
+    asked = [
+        _Asked(AvoidedCase(name, wears, way, asked=_fingerprint(marks[name], one, method, held)), one, method)
+        for name in sources
+        for wears, one in worn.items()
+        for way, method in ways.items()
+    ]
+    return _freed(asked, sources, faults, table, held, figure, jobs, cluster, progress)
+
+
+def _freed(
+    asked: Sequence[_Asked], sources: Mapping[str, Clip | Path], faults: Mapping[str, str], table: BatchTable,
+    held: _Held, figure: Figure | None, jobs: int, cluster: str | None,
+    progress: Callable[[BatchProgress], Any] | None,
+) -> tuple[AvoidedCase, ...]:  # fmt: skip
+    rows = {each.row.stem: row for each in asked if (row := table.done(each.row.asked)) is not None}
+
+    def keep(row: AvoidedCase, clip: Clip | None) -> None:
+        rows[row.stem] = table.add(row, clip)
+        if progress is not None:
+            progress(BatchProgress(len(rows), len(asked), row))
+
+    if progress is not None:
+        progress(BatchProgress(len(rows), len(asked), None))
+    missing = [each for each in asked if each.row.stem not in rows]
+    for each in missing:
+        if each.row.clip in faults:
+            keep(replace(each.row, outcome="refused", message=faults[each.row.clip]), None)
+    waiting = [each for each in missing if each.row.clip not in faults]
+
+    def clip_of(name: str) -> Clip:
+        source = sources[name]
+        if isinstance(source, Clip):
+            return source
+        assert figure is not None
+        return read_clip(table.original(name), figure)
+
+    def work() -> Iterator[Job]:
+        for each in waiting:
+            yield Job(each, _case, (clip_of(each.row.clip), each.worn, each.method, held), ENDLESS)
+
+    for outcome in run_batch(work(), jobs, cluster) if waiting else ():
+        each = outcome.job.name
+        if outcome.error is not None:
+            keep(replace(each.row, message=str(outcome.error)), None)
+            continue
+        found, q, dt = outcome.answer
+        clip = outcome.job.arguments[0]
+        keep(replace(each.row, **found), None if q is None else Clip(clip.figure, q, dt, clip.name))
+    return tuple(rows[each.row.stem] for each in asked)
+
+
+def _case(clip: Clip, worn: Worn, method: Avoider, held: _Held) -> tuple[dict[str, Any], Array | None, float]:
+    """Free a clip, in a process of its own: the fields of its row, and its postures with their time step."""
+    try:
+        avoided = avoid(
+            clip, dressed(clip.figure, worn), method=method, constraints=held.constraints, hold_feet=held.feet
+        )
+    except WholebodyError as error:
+        return {"outcome": "refused", "message": str(error)}, None, clip.dt
+    return _measured(clip, avoided), avoided.clip.q, avoided.clip.dt
+
+
+def _measured(before: Clip, avoided: Avoided) -> dict[str, Any]:
+    report, after = avoided.report, avoided.clip
+    found: dict[str, Any] = {
+        "outcome": "free" if report.solved else "left",
+        "message": report.message,
+        "frames": len(after),
+        "duration": before.duration,
+        "seconds": report.seconds,
+        "colliding_before": report.before.colliding,
+        "colliding": report.after.colliding,
+        "dips": report.after.dips,
+        "deepest_before": report.before.deepest,
+        "deepest": report.after.deepest,
+        "deepest_between": report.after.deepest_between,
+        "missed": report.missed,
+        "frames_changed": report.frames_changed,
+        "posture_solves": report.posture_solves,
+        "programs": report.programs,
+    }
+    if len(before) == len(after):  # and not retimed
+        after = Clip(after.figure, after.q, before.dt, after.name)
+        apart, jerk = deviation(before, after), jerk_ratio(before, after)
+        found |= {"angle": apart.angle, "distance": apart.distance, "jerk": jerk if math.isfinite(jerk) else None}
+        found["sliding"] = foot_sliding(before, after)
+    return found
+
+
+def read_many(
+    files: Iterable[str | os.PathLike[str]],
+    folder: str | os.PathLike[str],
+    figure: Figure,
+    *,
+    jobs: int = 1,
+    cluster: str | None = None,
+    progress: Callable[[int, str], Any] | None = None,
+) -> dict[str, Path | str]:
+    """Read or retarget files of motion, many at a time, and write their clips into the folder `originals` of a folder.
+
+    What was made before, of the same file and figure, is not made again.
+
+    Args:
+        files: as for `read_clip`.
+        folder: is made if it does not exist.
+        figure: of the clips.
+        jobs: files at a time.
+        cluster: address of a dask scheduler that reads them; None for this machine.
+        progress: called with how many are done, and the name of the last one.
+
+    Returns:
+        Name of each clip, to its file, or to the sentence with which it was refused.
+
+    Raises:
+        InputError: two files of one name, or no figure.
+        WholebodyError: as for `avoid_many`.
+    """
+    what = "read_many"
+    check_figure(figure, what)
+    sources = _sources(checks.listed(files, f"{what}: files", "['walk.bvh']"), figure, what)
+    table = BatchTable(checks.path(folder, f"{what}: folder"))
+    jobs = checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS)
+    checks.function(progress, f"{what}: progress")
+    if cluster is not None:
+        checks.text(cluster, f"{what}: cluster")
+    faults = _originals(sources, figure, table, jobs, cluster, progress)[1]
+    return {name: faults.get(name) or table.original(name) for name in sources}
+
+
+def _originals(
+    sources: Mapping[str, Clip | Path], figure: Figure | None, table: BatchTable, jobs: int, cluster: str | None,
+    progress: Callable[[int, str], Any] | None = None,
+) -> tuple[dict[str, str], dict[str, str]]:  # fmt: skip
+    """Make the clips of files; fingerprints of all clips, and the sentences with which files were refused."""
+    marks = {name: _mark(source, figure) for name, source in sources.items()}
+    waiting = [
+        (name, source)
+        for name, source in sources.items()
+        if isinstance(source, Path) and not table.has_original(name, marks[name])
+    ]
+    faults, done = {}, len(sources) - len(waiting)
+    work = (Job(name, _read, (str(source.absolute()), figure), ENDLESS) for name, source in waiting)
+    for outcome in run_batch(work, jobs, cluster) if waiting else ():
+        name, done = outcome.job.name, done + 1
+        if progress is not None:
+            progress(done, name)
+        if outcome.error is not None or isinstance(outcome.answer, str):
+            faults[name] = outcome.answer or str(outcome.error)
+            continue
+        assert figure is not None
+        q, dt = outcome.answer
+        table.add_original(name, Clip(figure, q, dt, name), marks[name])
+    return marks, faults
+
+
+def _read(path: str, figure: Figure) -> tuple[Array, float] | str:
+    """Postures and time step of a file, or the sentence with which it is refused; in a process of its own."""
+    try:
+        clip = read_clip(path, figure)
+    except WholebodyError as error:
+        return str(error)
+    return clip.q, clip.dt
+
+
+def _sources(given: Sequence[Any], figure: Figure | None, what: str) -> dict[str, Clip | Path]:
+    """The clips and files by name."""
+    found: list[tuple[str, Clip | Path]] = []
+    for source in given:
+        if isinstance(source, Clip):
+            found.append((source.name, source))
+            continue
+        path = checks.path(source, f"{what}: a clip")
+        if figure is None:
+            raise InputError(
+                f"{what}: {checks.shown(path.name)} is a file; say of which figure: figure=wb.load('human')"
+            )
+        check_figure(figure, what)
+        found.append((path.stem, path))
+    twice = first_twice(name for name, _ in found)
+    if twice is not None:
+        raise InputError(f"{what}: two clips are named {checks.shown(twice)}; give each another name")
+    return dict(found)
+
+
+def _ways(methods: Sequence[Avoider]) -> dict[str, Avoider]:
+    """The methods by name; further settings of one name have a number."""
+    found: dict[str, Avoider] = {}
+    for method in methods:
+        name, number = str(method.name), 2
+        while name in found:
+            name, number = f"{method.name} {number}", number + 1
+        found[name] = method
+    return found
+
+
+def _mark(source: Clip | Path, figure: Figure | None) -> str:
+    """Fingerprint of a clip and its figure; a file that cannot be read is refused later, with its sentence."""
+    if isinstance(source, Clip):
+        return _hash(source.q, source.dt, source.figure)
+    try:
+        return _hash(read_bytes(source, "motion"), figure)
+    except WholebodyError as error:
+        return _hash(str(error))
+
+
+def _fingerprint(mark: str, worn: Worn, method: Avoider, held: _Held) -> str:
+    bytes_of_mesh = read_bytes(worn, "mesh") if isinstance(worn, str) and is_file(worn) else None
+    return _hash(mark, worn, bytes_of_mesh, method, held, __version__)
+
+
+def _hash(*values: Any) -> str:
+    import joblib
+
+    try:
+        return str(joblib.hash(values))
+    except Exception as error:  # whatever an object of the user's own raises
+        raise InputError(f"avoid_many: what is given cannot be sent to another process ({error})") from None

@@ -1,0 +1,84 @@
+"""Dragging a goal of an assembly from frame to frame."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.methods.newton.assembly import Assembly
+from wholebody.methods.newton.assembly_solution import AssemblySolution
+from wholebody.moving_things import Collision
+
+GOAL_MOVES = (np.inf, 0.01, 0.002)  # m, rad: moves of the goal in a frame, tried until the motion is free
+
+
+class DragFrame(NamedTuple):
+    """Answer of one frame of a drag.
+
+    Attributes:
+        q: (nq,) the posture, of an assembly that of its `scene`.
+        error: largest remaining goal error, metres or radians.
+        iterations: iterations of the method.
+        seconds: wall time.
+        collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
+    """
+
+    q: Array
+    error: float
+    iterations: int
+    seconds: float
+    collisions: tuple[Collision, ...] = ()
+
+
+class AssemblyDrag:
+    """Follows a goal of an assembly that is moved from frame to frame; it moves the assembly's bodies.
+
+    If joints or contacts do not hold after a frame's few Newton steps, or its motion passes through something, the
+    bodies go back to where they were and the goal moves by a shorter distance, or not in that frame.
+    """
+
+    def __init__(self, assembly: Assembly, goal: int) -> None:
+        """Begin a drag at the assembly's present placements.
+
+        Raises:
+            InputError: there is no such goal.
+        """
+        self._goal = assembly.goal_index(goal)
+        self.assembly = assembly.prepare()
+
+    @property
+    def q(self) -> Array:
+        """(nq,) the placements of the bodies as a posture of the assembly's `scene`."""
+        return self.assembly.q
+
+    def to(self, target: Any) -> DragFrame:
+        """Move the goal to a position, or a placement, and make one frame towards it.
+
+        Raises:
+            InputError: the target is not one.
+        """
+        began, spent, collisions = time.perf_counter(), 0, tuple[Collision, ...]()
+        made, goal = self.assembly, self._goal
+        made.retarget(goal, target)
+        error = made.goal_error(goal)
+        try:
+            for move in GOAL_MOVES:
+                if move < error:
+                    made.aim_between(goal, move / error, target)
+                elif np.isfinite(move):
+                    continue  # the goal is nearer than that, and was tried already
+                step = made.step()
+                spent, collisions = spent + step.iterations, collisions or step.collisions
+                if step.taken:
+                    break
+        finally:
+            made.retarget(goal, target)
+        left = max(made.goal_error(number) for number in range(len(made.goals)))
+        return DragFrame(made.q, left, spent, time.perf_counter() - began, collisions)
+
+    def finish(self) -> AssemblySolution:
+        """Meet the present goals with full accuracy."""
+        return self.assembly.solve()
