@@ -7,14 +7,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from wholebody.bench.motion.cases import dressed, recorded, synthetic
+from wholebody.bench.motion.cases import recorded, synthetic
 from wholebody.bench.report import render
 from wholebody.figures import load
 from wholebody.motion.avoidance import avoid
+from wholebody.motion.checking import ClipCheck
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import frame_terms
 from wholebody.motion.load_change import PLACE, LoadChange, load_change
 from wholebody.motion.measures import deviation, foot_sliding
+from wholebody.motion.ready_equipment import dressed
 from wholebody.motion.soles import standing_feet, usual_feet
 from wholebody.motion.stance import StanceFeet
 from wholebody.motion.strength import Strength
@@ -87,18 +89,15 @@ def rows(clips: Mapping[str, Path | None], equipment: Sequence[str], longest: fl
                 report = freed.report
                 change = load_change(old, Clip(scene.figure, freed.clip.q, clip.dt), None, stands, strength, terms)
                 if not dynamics:
-                    same = load_change(old, old, None, stands, strength, terms)
+                    same = LoadChange(change.before, change.before, change.times)
                     yield _row(name, worn, WAYS[0], clip, clip, same, report.before, False, 0.0)
                 yield _row(name, worn, way, clip, freed.clip, change, report.after, report.solved, spent)
 
 
 def _row(
-    name: str, worn: str, way: str, before: Clip, after: Clip, change: LoadChange, found: object, solved: bool,
+    name: str, worn: str, way: str, before: Clip, after: Clip, change: LoadChange, found: ClipCheck, solved: bool,
     seconds: float,
 ) -> LoadRow:  # fmt: skip
-    from wholebody.motion.checking import ClipCheck
-
-    assert isinstance(found, ClipCheck)
     now, farther = change.after, change.farther
     standing = int(now.supported.sum())
     return LoadRow(
