@@ -304,7 +304,7 @@ def _bounded(value: object, most: float, what: str) -> Array:
 def _given(kinematic: object) -> Mapping[str, object]:
     if kinematic is None:
         return {}
-    return checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")  # type: ignore[type-abstract]
+    return checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")
 
 
 def _ways(ways: object, name: str) -> tuple[pin.SE3, pin.SE3]:
