@@ -190,6 +190,18 @@ def falling(path: Path, body: wb.Body) -> wb.Scene:
 
 def fall(path: Path, body: wb.Body) -> None:
     RigidBodies(falling(path, body)).advance(0.001)
+class Level(wb.AssemblyConstraint):
+    """A body at the height of another."""
+
+    bodies = ("crank", "rod")
+
+    def residual(self, x: Any) -> Any:
+        return x[1:, 2] - x[:1, 2] - 0.08
+
+    def jacobian(self, x: Any) -> Any:
+        result = np.zeros((1, 2, 7))
+        result[0, 0, 2], result[0, 1, 2] = -1.0, 1.0
+        return result
 
 
 def assembly() -> wb.Assembly:
@@ -249,7 +261,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "Scene.move",
         Call(
             lambda **given: scene(path).move(**given),
-            {"name": "ball", "at": (1.0, 1.0, 1.0)},
+            {"name": "ball", "at": (1.0, 1.0, 1.0), "over": 0.1},
             lambda made: made.contacts(q),
         ),
     )
@@ -260,7 +272,36 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Scene.workspace", Call(there.workspace, {})
     yield "Scene.remove", Call(lambda **given: scene(path).remove(**given), {"name": "ball"})
     yield "Scene.state", Call(there.state, {"q": q})
-    yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4})
+    moves = {"ball": ((1.0, 1.0, 1.0), (1.0, 0.9, 1.0))}
+    yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4, "moves": moves})
+    world = {"scene": there, "start": q, "dt": 0.1, "overlap": "qp", "seed": 0, "spring": wb.Spring()}
+    yield "World", Call(wb.World, world, lambda made: made.step(q))
+    yield "World.step", Call(wb.World(there, q).step, {"tracked": q})
+    body = {"mass": 0.5, "material": "wood", "velocity": (0.1, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.1)}
+
+    def loose(body: Any) -> Any:
+        return wb.Scene(arm).add(wb.Sphere(0.1), name="ball", at=(1.0, 1.0, 1.0), body=body)
+
+    yield "Body", Call(wb.Body, body, lambda made: RigidBodies(loose(made)).advance(0.1))
+    yield "Body(density)", Call(wb.Body, {"density": 500.0}, lambda made: RigidBodies(loose(made)).advance(0.1))
+    material = {"name": "glass", "against": {"wood": (0.5, 0.1)}, "others": (0.5, 0.1)}
+    yield "Material", Call(wb.Material, material, lambda made: RigidBodies(loose(wb.Body(material=made))))
+    engine = RigidBodies(loose(wb.Body()))
+    yield "RigidBodies", Call(RigidBodies, {"scene": loose(wb.Body()), "gravity": (0.0, 0.0, -9.8)})
+    still = {"link1": (np.eye(4), np.eye(4))}
+    yield "RigidBodies.advance", Call(engine.advance, {"dt": 0.1, "kinematic": None})
+    yield "RigidBodies.advance(kinematic)", Call(engine.advance, {"dt": 0.1, "kinematic": still})
+    for name in ("placement", "twist"):
+        yield f"RigidBodies.{name}", Call(getattr(engine, name), {"name": "ball"})
+    for name in ("energy", "momentum"):
+        yield f"RigidBodies.{name}", Call(getattr(engine, name), {})
+    point = {"name": "ball", "point": (1.0, 1.0, 1.0)}
+    for name in ("velocity_at", "mobility"):
+        yield f"RigidBodies.{name}", Call(getattr(engine, name), point)
+    yield "RigidBodies.push", Call(engine.push, {**point, "impulse": (0.0, 0.1, 0.0)}, lambda _: engine.energy())
+    spring = {"stiffness": 1000.0, "damping": 40.0, "mass": 0.4}
+    yield "Spring", Call(wb.Spring, spring, lambda made: made.transition(0.1))
+    yield "Spring.transition", Call(wb.Spring().transition, {"time": 0.1})
 
     def put(shape: Any) -> Any:
         return wb.Scene(arm).add(shape, name="it").contacts(q)
@@ -421,8 +462,26 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     def solve_parts(made: Any) -> Any:
         return made.solve(iterations=3)
 
-    yield "Assembly", Call(wb.Assembly, {})
-    yield "Assembly.body", Call(assembly().body, {"name": "third", "at": at, "size": 0.1}, solve_parts)
+    yield "Assembly", Call(wb.Assembly, {"clearance": 0.01})
+    third = {"name": "third", "at": at, "shape": wb.Sphere(0.1), "size": 0.1, "color": (1.0, 0.0, 0.0)}
+    yield "Assembly.body", Call(assembly().body, third, solve_parts)
+    person = {"name": "arm", "figure": arm, "start": q, "constraints": [], "color": (1.0, 0.0, 0.0)}
+    yield "Assembly.figure", Call(assembly().figure, person, solve_parts)
+    yield "Assembly.posture", Call(assembly().figure("arm", arm).posture, {"name": "arm"})
+    yield "Assembly.add", Call(assembly().add, {"shape": wb.Sphere(0.1), "name": "ball", "at": at}, solve_parts)
+    yield "Assembly.add_things", Call(assembly().add_things, {"scene": there}, solve_parts)
+    solid = wb.Assembly().body("rod", shape=wb.Sphere(0.1)).add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 0.0))
+    yield "Assembly.move", Call(solid.move, {"name": "ball", "at": at, "over": 0.1})
+    yield "Assembly.ignore", Call(solid.ignore, {"first": "rod", "second": "ball"})
+    surface = {"body": "pin", "place": at, "of": "ball"}
+    yield "Assembly.on_surface", Call(solid.body("pin").on_surface, surface)
+    yield "Assembly.constrain", Call(assembly().constrain, {"term": Level()}, solve_parts)
+    goals = assembly().point_goal("rod", (0.1, 0.0, 0.1))
+    yield "Assembly.retarget", Call(goals.retarget, {"goal": 0, "target": at}, solve_parts)
+    yield "Assembly.goal_index", Call(goals.goal_index, {"goal": 0})
+    yield "Assembly.goal_error", Call(goals.goal_error, {"goal": 0})
+    yield "Assembly.aim_between", Call(goals.aim_between, {"goal": 0, "share": 0.5, "target": at}, solve_parts)
+    yield "Assembly.step", Call(goals.step, {"tolerance": 1e-4})
     placed = assembly()
     yield "Assembly.place", Call(placed.place, {"variables": placed.variables()}, solve_parts)
     yield "Assembly.drop_goals", Call(assembly().drop_goals, {})
@@ -441,7 +500,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Assembly.spherical", Call(assembly().spherical, ball, solve_parts)
     solving = {"tolerance": 1e-4, "iterations": 5, "algebra": "auto", "inequalities": "slack", "nearest": False}
     yield "Assembly.solve", Call(assembly().solve, solving)
-    for method in ("system", "variables"):
+    for method in ("system", "variables", "prepare"):
         yield f"Assembly.{method}", Call(getattr(assembly(), method), {})
 
     looked = {"scene": there, "contact_distance": 0.01, "see_through": ["ball"], "names": True, "title": "x"}
@@ -464,9 +523,17 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Parts.posture(at)", Call(lambda at: one.posture({"one": at}), {"at": at})
     yield "Parts.contacts", Call(one.contacts, {"q": one.posture({"one": at}), "within": 0.1})
 
-    followed = {"scene": there, "track": track, "overlap": "qp", "seed": 0, "rigid": False, "progress": print}
+    followed = {
+        "scene": there,
+        "track": track,
+        "overlap": "qp",
+        "seed": 0,
+        "rigid": False,
+        "progress": print,
+        "moves": None,
+    }
     yield "follow", Call(tracking.follow, followed)
-    loop = {"scene": there, "start": q, "overlap": "qp", "dt": 0.1, "seed": 0, "rigid": False}
+    loop = {"scene": there, "start": q, "overlap": "qp", "dt": 0.1, "seed": 0, "rigid": False, "touching": ["ball"]}
     yield "FrameLoop", Call(tracking.FrameLoop, loop, lambda made: made.frame(q))
     yield "FrameLoop.frame", Call(tracking.FrameLoop(there, q).frame, {"tracked": q})
     recording = tracking.follow(there, track)
@@ -625,10 +692,12 @@ ANSWERS = (
     "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "TraceEntry", "Assessment",
     "Task", "Step", "QPStep", "Simplified", "LeftOut",
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
+    "Scene.of_parts", "ClipCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
+    "Torques", "SphereFilling", "AssemblySolution", "AssemblyStep",
     "Scene.of_parts", "ClipCheck", "DerivativeCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding",
     "Deviation",
     "Torques", "SphereFilling",
-    "Torques", "SphereFilling", "AvoidedCase", "BatchProgress",
+    "Torques", "SphereFilling", "AvoidedCase", "BatchProgress", "WorldFrame", "Overlap", "EngineFrame", "Event",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 
@@ -651,7 +720,7 @@ DERIVATIVES = (
 )
 """What problems and methods, not people, ask of terms and states; at every posture, which is too often for checks."""
 
-ABSTRACT = ("Shape", "Goal", "Constraint", "Bound", "Measure", "Method", "Tracker", "Figure")
+ABSTRACT = ("Shape", "Goal", "Constraint", "AssemblyConstraint", "Bound", "Measure", "Method", "Tracker", "Figure")
 """Classes to derive from, protocols, and the figure, which `load` builds."""
 
 BROWSER = ["open", "wait", "wait_until_closed", "sync", "picture", "movie", "close"]

@@ -25,6 +25,7 @@ from wholebody.dynamics.pieces import Pieces
 from wholebody.dynamics.sleeping import Sleepers
 from wholebody.dynamics.step_program import NOTHING, SKIN, StepProgram
 from wholebody.errors import InputError
+from wholebody.geometry.placement import FARTHEST, placement
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene import Scene
 
@@ -38,6 +39,8 @@ HALVINGS = 6  # of a step, at most
 MARGIN = 2e-3  # m: pairs are looked at from this much farther than bodies come in a step
 STOPS = 12  # early ends of steps in a frame, at most
 DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
+FASTEST = 1e3  # m/s2: of gravity
+STRONGEST = 1e6  # N s
 PARTINGS = 4  # rounds of parting pieces after a step
 
 
@@ -59,7 +62,7 @@ class RigidBodies:
                 know each other.
         """
         checks.instance(scene, Scene, "scene", "give a wb.Scene")
-        self.gravity = np.array(checks.numbers(gravity, (3,), "gravity"))
+        self.gravity = _bounded(gravity, FASTEST, "gravity")
         pieces = Pieces(scene)
         if not pieces.dynamic.any():
             raise InputError("nothing in the scene moves by itself; add a thing with body=wb.Body(density=700)")
@@ -103,8 +106,9 @@ class RigidBodies:
 
         Raises:
             UnknownNameError: there is none of that name.
+            InputError: the place is not three finite numbers.
         """
-        number = self._number(name)
+        number, point = self._number(name), _bounded(point, FARTHEST, "point")
         lever = point - self.state.position[number]
         return np.asarray(self.state.velocity[number] + np.cross(self.state.spin[number], lever))
 
@@ -113,8 +117,9 @@ class RigidBodies:
 
         Raises:
             UnknownNameError: there is none of that name.
+            InputError: the place is not three finite numbers.
         """
-        number = self._number(name)
+        number, point = self._number(name), _bounded(point, FARTHEST, "point")
         lever = pin.skew(point - self.state.position[number])
         return np.asarray(np.eye(3) / self._pieces.mass[number] - lever @ self._inverse_inertia(number) @ lever)
 
@@ -123,8 +128,12 @@ class RigidBodies:
 
         Raises:
             UnknownNameError: there is none of that name.
+            InputError: impulse or place are not three finite numbers, or the body does not move by itself.
         """
-        number = self._number(name)
+        number, point = self._number(name), _bounded(point, FARTHEST, "point")
+        impulse = _bounded(impulse, STRONGEST, "impulse")
+        if not self._pieces.dynamic[number]:
+            raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
         lever = point - self.state.position[number]
         self.state.velocity[number] += impulse / self._pieces.mass[number]
         self.state.spin[number] += self._inverse_inertia(number) @ np.cross(lever, impulse)
@@ -158,7 +167,7 @@ class RigidBodies:
             UnknownNameError: there is no such segment or thing.
         """
         dt = checks.time_step(dt, "dt")
-        state, given = self.state, {self._number(name): ways for name, ways in (kinematic or {}).items()}
+        state, given = self.state, {self._number(name): _ways(ways, name) for name, ways in _given(kinematic).items()}
         for number, (before, after) in given.items():
             if self._pieces.dynamic[number]:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
@@ -282,6 +291,33 @@ class RigidBodies:
             if least >= LEAST_GAP:
                 break
         return least
+
+
+def _bounded(value: object, most: float, what: str) -> Array:
+    """Three numbers, none of them beyond `most`."""
+    numbers = np.array(checks.numbers(value, (3,), what))
+    if np.abs(numbers).max() > most:
+        raise InputError(f"{what} is {checks.shown(value)}; give at most {most:g}")
+    return numbers
+
+
+def _given(kinematic: object) -> Mapping[str, object]:
+    if kinematic is None:
+        return {}
+    return checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")
+
+
+def _ways(ways: object, name: str) -> tuple[pin.SE3, pin.SE3]:
+    """Two placements; checking each of those that are pin.SE3 already would take a frame longer than its bodies."""
+    if not isinstance(ways, (tuple, list)) or len(ways) != 2:
+        raise InputError(
+            f"kinematic: {checks.shown(name)} has {checks.shown(ways)}; give its placements before and after"
+        )
+    before, after = (
+        way if isinstance(way, pin.SE3) and np.isfinite(way.homogeneous).all() else placement(way, f"kinematic: {name}")
+        for way in ways
+    )
+    return before, after
 
 
 @lru_cache(maxsize=1)

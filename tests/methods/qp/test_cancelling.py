@@ -21,7 +21,7 @@ PRONG = '<collision><origin xyz="0.2 {0} 0"/><geometry><box size="0.2 0.06 0.4"/
 def test_a_fork_is_pulled_off_a_plate_the_short_way() -> None:
     """Its prongs reach 12 cm over the plate, and overlap it by 1.5 cm each from both sides."""
     problem = cancelling().problem
-    with problem.lend() as workspace:
+    with problem.borrow() as workspace:
         q = parted(problem, workspace, problem.start)
     assert q is not None
     assert q == pytest.approx([-0.12, 0.0, 0.5], abs=2e-3)
@@ -29,7 +29,7 @@ def test_a_fork_is_pulled_off_a_plate_the_short_way() -> None:
 
 def test_one_prong_alone_does_not_cancel() -> None:
     problem = cancelling().problem
-    with problem.lend() as workspace:
+    with problem.borrow() as workspace:
         assert parted(problem, workspace, problem.start + [0.0, 0.0, 0.06]) is None
 
 
@@ -45,7 +45,7 @@ def test_the_last_link_of_an_arm_is_pulled_off(tmp_path: Path) -> None:
     scene.add(wb.Box((1.0, 0.09, 0.4)), name="plate", at=(wrist + 0.2 + 0.5, 0.0, 0.0))
     problem = wb.Problem(scene, start, goals=[wb.Point("d", (wrist, 0.0, 0.0))])
     assert wb.assess(problem, start).penetration == pytest.approx(0.015, abs=1e-5)
-    with problem.lend() as workspace:
+    with problem.borrow() as workspace:
         q = parted(problem, workspace, start)
         assert q is not None
         place = workspace.state.update(q).frame(scene.figure.frame_id("d"))
