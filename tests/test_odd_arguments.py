@@ -190,6 +190,8 @@ def falling(path: Path, body: wb.Body) -> wb.Scene:
 
 def fall(path: Path, body: wb.Body) -> None:
     RigidBodies(falling(path, body)).advance(0.001)
+
+
 class Level(wb.AssemblyConstraint):
     """A body at the height of another."""
 
