@@ -13,12 +13,12 @@ from presenting import CARDBOARD, DARK, command_line
 import wholebody as wb
 from wholebody.view.filmstrip import write_filmstrip
 
-APART = 1.15  # m: between the two people, who face each other
-BOX = (0.40, 0.30, 0.22)  # m
-SIDEWAYS, LOW, HIGH = 0.25, 1.00, 1.20  # m: the box's middle goes from one side to the other, over the post
+APART = 1.20  # m: between the two people, who face each other
+BOX = (0.46, 0.30, 0.22)  # m
+SIDEWAYS, LOW, HIGH = 0.28, 1.00, 1.20  # m: the box's middle goes from one side to the other, over the post
 POST = 0.98  # m: its top, above the box's underside on either side
-GRIP = 0.10  # m: of the hands from the box's middle, along the line between the people
-AWAY = 0.006  # m: of the palms from the box's sides when they take hold
+GRIP = 0.15  # m: of the hands from the box's middle, along the line between the people
+AWAY = 0.022  # m: of the palms from the box's sides; forearms are 20 mm thicker than hands there
 FRAMES = 12  # of a drag from one corner of the path to the next
 PEOPLE = {"ann": ("female", 1.68, 0.0), "ben": ("male", 1.78, np.pi)}  # sex, stature [m], turned about z
 COLORS = {"ann": (0.80, 0.62, 0.52, 1.0), "ben": (0.52, 0.66, 0.80, 1.0)}

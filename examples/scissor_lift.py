@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -28,22 +27,19 @@ FLAT = (0.0, 0.5**0.5, 0.0, 0.5**0.5)  # a capsule's z along a bar's x
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
 class CylinderLimit(wb.AssemblyConstraint):
     """The horizontal cylinder at the foot of a scissor lift is strong enough for the load.
 
     With n stages of bars at the angle a, the load W rises by n L sin a while the cylinder moves by L cos a. So, by
     virtual work, its force is n W cos a / sin a, and at most F if sin a - (n W / F) cos a >= 0. The bar's axis
     (cos a, 0, sin a) is R(e) x, which is a polynomial of the quaternion.
-
-    Attributes:
-        bodies: name of the bar.
-        ratio: n W / F.
     """
 
-    bodies: tuple[str, ...]
-    ratio: float
-    one_sided: bool = True
+    one_sided = True
+
+    def __init__(self, bar: str, ratio: float) -> None:
+        """Take the name of the bar, and n W / F."""
+        self.bodies, self.ratio = (bar,), ratio
 
     def residual(self, x: Array) -> Array:
         """(1,) sin a - (n W / F) cos a."""
@@ -101,7 +97,7 @@ def build(load: float) -> wb.Assembly:
     made.on_plane(f"rising {STAGES}", ends, normal=(0.0, 0.0, 1.0), through=(0.0, 0.0, 0.0), of="platform")
     made.ignore(f"rising {STAGES}", "platform")  # the bars' round ends reach into the plate, where their rollers run
     made.fixed("platform", "crate")
-    made.constrain(CylinderLimit(bodies=("rising 1",), ratio=ratio(load)))
+    made.constrain(CylinderLimit("rising 1", ratio(load)))
     return made.point_goal("platform", (0.0, 0.0, top))
 
 

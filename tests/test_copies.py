@@ -124,7 +124,7 @@ def test_a_problem_with_every_kind_of_term(scene: wb.Scene, way: Callable[[wb.Pr
     assert (made.scene is scene) == (way is copy.copy)
     for q in (problem.start, scene.figure.posture("sitting")):
         assert wb.assess(made, q) == wb.assess(problem, q)
-    with problem.lend() as workspace, made.lend() as other:
+    with problem.borrow() as workspace, made.borrow() as other:
         ours, theirs = (
             one.lineariser(room, 0.01).at(problem.start, 0.1) for one, room in ((problem, workspace), (made, other))
         )

@@ -182,6 +182,20 @@ def solvable(path: Path, term: Any) -> None:
     wb.solve(problem(path, **{key: [term]}), wb.QP(budget=0, restarts=0))
 
 
+class Level(wb.AssemblyConstraint):
+    """A body at the height of another."""
+
+    bodies = ("crank", "rod")
+
+    def residual(self, x: Any) -> Any:
+        return x[1:, 2] - x[:1, 2] - 0.08
+
+    def jacobian(self, x: Any) -> Any:
+        result = np.zeros((1, 2, 7))
+        result[0, 0, 2], result[0, 1, 2] = -1.0, 1.0
+        return result
+
+
 def assembly() -> wb.Assembly:
     made = wb.Assembly()
     made.body("crank", size=0.1).body("rod", (0.06, 0.0, 0.08), size=0.3)
@@ -246,7 +260,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     near = there.contacts(q, within=1.0)
     yield "Contacts.nearest_first", Call(near.nearest_first, {})
     yield "Scene.penetration", Call(there.penetration, {"q": q})
-    yield "Scene.lend", Call(there.lend, {})
+    yield "Scene.borrow", Call(there.borrow, {})
     yield "Scene.workspace", Call(there.workspace, {})
     yield "Scene.remove", Call(lambda **given: scene(path).remove(**given), {"name": "ball"})
     yield "Scene.state", Call(there.state, {"q": q})
@@ -345,9 +359,9 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Problem(touching)", Call(lambda pair: wb.Problem(there, touching=[pair]), {"pair": ("link4", "ball")})
     yield "Problem.with_start", Call(ask.with_start, {"q": q}, wb.solve)
     yield "Problem.check_fresh", Call(ask.check_fresh, {})
-    lent = ask.workspace()
-    yield "Problem.lineariser", Call(lambda dt: ask.lineariser(lent, dt), {"dt": 0.1})
-    yield "Problem.lend", Call(ask.lend, {})
+    workspace = ask.workspace()
+    yield "Problem.lineariser", Call(lambda dt: ask.lineariser(workspace, dt), {"dt": 0.1})
+    yield "Problem.borrow", Call(ask.borrow, {})
     yield "Problem.workspace", Call(ask.workspace, {})
     yield "Problem.retarget", Call(retarget, {"goals": [wb.Point("link4", at)]})
     yield "solve", Call(wb.solve, {"problem": ask, "method": "qp", "progress": print})
@@ -394,7 +408,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "SolvingTracker": wb.DampedLeastSquares().tracker(ask, 0.1),
     }.items():
         yield f"{name}.frame", Call(made.frame, {"q": q, "tolerance": 1e-4})
-        for method in ("solve", "nearest", "ways_out"):
+        for method in ("solve", "nearest", "overlap_resolutions"):
             if (name, method) != ("NewtonTracker", "solve"):
                 yield f"{name}.{method}", Call(getattr(made, method), {"q": q})
         if name == "SolvingTracker":
@@ -427,8 +441,26 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     def solve_parts(made: Any) -> Any:
         return made.solve(iterations=3)
 
-    yield "Assembly", Call(wb.Assembly, {})
-    yield "Assembly.body", Call(assembly().body, {"name": "third", "at": at, "size": 0.1}, solve_parts)
+    yield "Assembly", Call(wb.Assembly, {"clearance": 0.01})
+    third = {"name": "third", "at": at, "shape": wb.Sphere(0.1), "size": 0.1, "color": (1.0, 0.0, 0.0)}
+    yield "Assembly.body", Call(assembly().body, third, solve_parts)
+    person = {"name": "arm", "figure": arm, "start": q, "constraints": [], "color": (1.0, 0.0, 0.0)}
+    yield "Assembly.figure", Call(assembly().figure, person, solve_parts)
+    yield "Assembly.posture", Call(assembly().figure("arm", arm).posture, {"name": "arm"})
+    yield "Assembly.add", Call(assembly().add, {"shape": wb.Sphere(0.1), "name": "ball", "at": at}, solve_parts)
+    yield "Assembly.add_things", Call(assembly().add_things, {"scene": there}, solve_parts)
+    solid = wb.Assembly().body("rod", shape=wb.Sphere(0.1)).add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 0.0))
+    yield "Assembly.move", Call(solid.move, {"name": "ball", "at": at, "over": 0.1})
+    yield "Assembly.ignore", Call(solid.ignore, {"first": "rod", "second": "ball"})
+    surface = {"body": "pin", "place": at, "of": "ball"}
+    yield "Assembly.on_surface", Call(solid.body("pin").on_surface, surface)
+    yield "Assembly.constrain", Call(assembly().constrain, {"term": Level()}, solve_parts)
+    goals = assembly().point_goal("rod", (0.1, 0.0, 0.1))
+    yield "Assembly.retarget", Call(goals.retarget, {"goal": 0, "target": at}, solve_parts)
+    yield "Assembly.goal_index", Call(goals.goal_index, {"goal": 0})
+    yield "Assembly.goal_error", Call(goals.goal_error, {"goal": 0})
+    yield "Assembly.aim_between", Call(goals.aim_between, {"goal": 0, "share": 0.5, "target": at}, solve_parts)
+    yield "Assembly.step", Call(goals.step, {"tolerance": 1e-4})
     placed = assembly()
     yield "Assembly.place", Call(placed.place, {"variables": placed.variables()}, solve_parts)
     yield "Assembly.drop_goals", Call(assembly().drop_goals, {})
@@ -447,7 +479,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Assembly.spherical", Call(assembly().spherical, ball, solve_parts)
     solving = {"tolerance": 1e-4, "iterations": 5, "algebra": "auto", "inequalities": "slack", "nearest": False}
     yield "Assembly.solve", Call(assembly().solve, solving)
-    for method in ("system", "variables"):
+    for method in ("system", "variables", "prepare"):
         yield f"Assembly.{method}", Call(getattr(assembly(), method), {})
 
     looked = {"scene": there, "contact_distance": 0.01, "see_through": ["ball"], "names": True, "title": "x"}
@@ -639,6 +671,8 @@ ANSWERS = (
     "SceneObject", "Contacts", "ObjectPenetration", "FirstContact", "Piece", "Solution", "TraceEntry", "Assessment",
     "Task", "Step", "QPStep", "Simplified", "LeftOut",
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
+    "Scene.of_parts", "ClipCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
+    "Torques", "SphereFilling", "AssemblySolution", "AssemblyStep",
     "Scene.of_parts", "ClipCheck", "DerivativeCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding",
     "Deviation",
     "Torques", "SphereFilling",
@@ -665,7 +699,7 @@ DERIVATIVES = (
 )
 """What problems and methods, not people, ask of terms and states; at every posture, which is too often for checks."""
 
-ABSTRACT = ("Shape", "Goal", "Constraint", "Bound", "Measure", "Method", "Tracker", "Figure")
+ABSTRACT = ("Shape", "Goal", "Constraint", "AssemblyConstraint", "Bound", "Measure", "Method", "Tracker", "Figure")
 """Classes to derive from, protocols, and the figure, which `load` builds."""
 
 BROWSER = ["open", "wait", "wait_until_closed", "sync", "picture", "movie", "close"]

@@ -152,5 +152,5 @@ def test_forgotten_guesses_are_those_of_a_new_run(monkeypatch: pytest.MonkeyPatc
             pin.forwardKinematics(model, data, scene.figure.posture(posture))
             distances(used)
         pin.forwardKinematics(model, data, q)
-        guesses.forget()
+        guesses.reset()
         assert distances(used) == expected

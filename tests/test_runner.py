@@ -74,6 +74,28 @@ def test_jobs_run_beside_each_other_with_notes_and_a_deadline_that_moves() -> No
     assert error.overtime
 
 
+def work(seconds: float) -> str:
+    allow(60.0, 0.3)
+    began = time.process_time()
+    while time.process_time() - began < seconds:
+        pass
+    return "done"
+
+
+def wait_long() -> str:
+    allow(60.0, 0.3)
+    time.sleep(1.0)
+    return "done"
+
+
+def test_a_deadline_may_be_of_the_processors_time(child: Child) -> None:
+    assert child.call(wait_long, seconds=60.0) == "done"
+    with pytest.raises(EndedError, match="it took too long") as caught:
+        child.call(work, 30.0, seconds=60.0)
+    assert caught.value.overtime
+    assert child.call(work, 0.01, seconds=60.0) == "done"
+
+
 def test_outside_of_a_job_there_is_nobody_to_tell() -> None:
     alarm, _ = signal.getitimer(signal.ITIMER_REAL)  # of the tests themselves, if any
     tell("nothing")

@@ -239,13 +239,13 @@ def test_a_pool_lends_nothing_twice_and_forgets_what_broke() -> None:
         return made[-1]
 
     pool = Pool(make)
-    with pool.lend() as one, pool.lend() as other:
+    with pool.borrow() as one, pool.borrow() as other:
         assert one is not other
-    with pool.lend() as again:
+    with pool.borrow() as again:
         assert again in (one, other)
-    with pytest.raises(ZeroDivisionError), pool.lend() as broken:
+    with pytest.raises(ZeroDivisionError), pool.borrow() as broken:
         _ = 1 / 0
-    with pool.lend() as first, pool.lend() as second:
+    with pool.borrow() as first, pool.borrow() as second:
         assert broken not in (first, second)
     assert len(made) == 3
 

@@ -25,7 +25,7 @@ Label = tuple[Literal["contact", "limit", "bound", "constraint"], tuple[str, ...
 
 
 class AllPairs:
-    """All pairs of a scene, at one posture after the other; on data of its own, lent to one judgement at a time.
+    """All pairs of a scene, at one posture after the other; on data of its own, borrowed by one judgement at a time.
 
     Attributes:
         state: the kinematic state of the last posture.
@@ -52,7 +52,7 @@ class AllPairs:
         self.state.update(q)
         with built.lock:  # not while a thing is moved, one piece after the other
             pin.updateGeometryPlacements(built.model, self.state.data, built.geometry, results)
-        self._guesses.forget()  # the judgement of a posture does not depend on the one before
+        self._guesses.reset()  # the judgement of a posture does not depend on the one before
         pin.computeDistances(built.geometry, results)
         if self._views is None:
             self._views = distance_view(results.distanceResults), placement_view(results.oMg)

@@ -112,7 +112,7 @@ def assess(problem: Problem, q: Array) -> Assessment:
     q = posture(q, problem.scene.model.nq)
     built = problem.scene.built
     problem.check_fresh()
-    with built.pool(AllPairs, lambda: AllPairs(built)).lend() as pairs:
+    with built.pool(AllPairs, lambda: AllPairs(built)).borrow() as pairs:
         return _judged(problem, pairs, q, began)
 
 

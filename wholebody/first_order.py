@@ -114,7 +114,7 @@ class FirstOrder:
     @contextmanager
     def _lent(self) -> Iterator[State]:
         """A state at the posture."""
-        with self._built.pool(AllPairs, lambda: AllPairs(self._built)).lend() as pairs:
+        with self._built.pool(AllPairs, lambda: AllPairs(self._built)).borrow() as pairs:
             yield pairs.state.update(self._q)
 
 

@@ -79,7 +79,7 @@ def pairs_along(scene: Scene, q: Array, moves: Mapping[str, Sequence[pin.SE3]] |
     """
     scene = copy.copy(scene) if moves else scene
     built = scene.built
-    with built.pool(AllPairs, lambda: AllPairs(built)).lend() as pairs:
+    with built.pool(AllPairs, lambda: AllPairs(built)).borrow() as pairs:
         for frame, posture in enumerate(q):
             for name, places in (moves or {}).items():
                 scene.move(name, at=places[frame])

@@ -25,7 +25,7 @@ class Pool(Generic[T]):
         self._free: list[T] = []
 
     @contextmanager
-    def lend(self) -> Iterator[T]:
+    def borrow(self) -> Iterator[T]:
         """Borrow an object while the context lasts. After an exception in the context, the object is discarded."""
         try:
             item = self._free.pop()  # this and append are atomic

@@ -91,7 +91,7 @@ class Problem:
         self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
         pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
         self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
-        with self.lend() as workspace:
+        with self.borrow() as workspace:
             state = workspace.state.update(self.start)
             self._check_frozen(state)
             _check_goals(self.goals, state)
@@ -121,7 +121,7 @@ class Problem:
         resolved = tuple(goal.resolve(self.scene, self.start) for goal in listed)
         doubtful = {number: goal for number, goal in enumerate(resolved) if type(goal) not in built_in_goals()}
         if doubtful:
-            with self.lend() as workspace:
+            with self.borrow() as workspace:
                 _check_goals(doubtful, workspace.state.update(self.start))
         self.goals = resolved
 
@@ -139,13 +139,13 @@ class Problem:
         return result
 
     @contextmanager
-    def lend(self) -> Iterator[Workspace]:
-        """Borrow a workspace on this problem's scene for one run; see `Scene.lend`.
+    def borrow(self) -> Iterator[Workspace]:
+        """Borrow a workspace on this problem's scene for one run; see `Scene.borrow`.
 
         Raises:
             InputError: objects were added to or removed from the scene after the problem was made.
         """
-        with self.scene.lend() as workspace:
+        with self.scene.borrow() as workspace:
             self.check_fresh()  # after borrowing: later changes of the scene do not change the workspace
             yield workspace
 
@@ -163,7 +163,7 @@ class Problem:
         """A lineariser of this problem, with its present terms and clearances.
 
         Args:
-            workspace: from this problem's `lend` or `workspace`.
+            workspace: from this problem's `borrow` or `workspace`.
             dt: time step in seconds, for bounds that need one.
         """
         return Lineariser(

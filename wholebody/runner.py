@@ -52,7 +52,7 @@ class EndedError(WholebodyError):
 
     def __init__(self, code: int, said: str = "") -> None:
         """Build the message from the exit code and the last line."""
-        self.overtime, self.code, self.said = code == -signal.SIGALRM, code, said
+        self.overtime, self.code, self.said = -code in (signal.SIGALRM, signal.SIGPROF), code, said
         message = "it took too long" if self.overtime else f"the process ended with {self.how}"
         super().__init__(message + (f": {said}" if said and not self.overtime else ""))
 
@@ -242,10 +242,16 @@ def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> I
             child.close()
 
 
-def allow(seconds: float) -> None:
-    """Move the deadline of the running job to so many seconds from now; does nothing outside a job."""
+def allow(seconds: float, processor: float = 0.0) -> None:
+    """Move the deadline of the running job to so many seconds from now; does nothing outside a job.
+
+    Args:
+        seconds: by the clock; 0 for no deadline.
+        processor: of the processor's time, which passes slowly where others use it too; 0 for no such deadline.
+    """
     if _parent is not None:
         signal.setitimer(signal.ITIMER_REAL, seconds)
+        signal.setitimer(signal.ITIMER_PROF, processor)
 
 
 def tell(note: Any) -> None:
@@ -272,7 +278,7 @@ def serve(descriptor: int) -> None:
     """
     global _parent
     _parent = Connection(descriptor)
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    _end_at_alarms()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
     try:
@@ -292,10 +298,15 @@ def _serve_one(parent: Connection, job: Job, environment: Mapping[str, str]) -> 
     global _parent
     _parent = parent
     os.environ.update(environment)
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    _end_at_alarms()
     allow(job.seconds)
     parent.send((True, job.function(*job.arguments)))
     os._exit(0)  # the process must not close resources of the parent
+
+
+def _end_at_alarms() -> None:
+    for alarm in (signal.SIGALRM, signal.SIGPROF):
+        signal.signal(alarm, signal.SIG_DFL)
 
 
 def _wait_for(process: subprocess.Popen[bytes] | BaseProcess) -> int:

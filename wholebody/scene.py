@@ -24,7 +24,7 @@ from wholebody.matter.inertia import mass_properties
 from wholebody.matter.materials import DEFAULT, Material
 from wholebody.matter.materials import material as to_material
 from wholebody.scene_geometry import Motion, SceneGeometry, SceneObject, assemble
-from wholebody.workspace import Workspace, lent
+from wholebody.workspace import Workspace, borrowed
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
@@ -120,9 +120,9 @@ class Scene:
         """The geometry model of the present things, with its indices."""
         return self._build()
 
-    def lend(self) -> AbstractContextManager[Workspace]:
-        """Borrow a workspace for one run: ``with scene.lend() as workspace``. Do not use it after the context ends."""
-        return lent(self._build())
+    def borrow(self) -> AbstractContextManager[Workspace]:
+        """Borrow a workspace for one run: ``with scene.borrow() as workspace``. Do not use it after the context."""
+        return borrowed(self._build())
 
     def workspace(self) -> Workspace:
         """A new workspace for a long-lived object, such as a tracker, which alone uses it."""
@@ -307,7 +307,7 @@ class Scene:
             InputError: q has the wrong shape or is not finite, or `within` is not a finite number.
         """
         within = checks.number(within, "within", -FARTHEST, FARTHEST, "m")
-        with self.lend() as workspace:
+        with self.borrow() as workspace:
             return workspace.near(q, within).nearest_first()
 
     def penetration(self, q: Array) -> list[ObjectPenetration]:
@@ -317,7 +317,7 @@ class Scene:
         """
         from wholebody.geometry.penetration import object_penetrations
 
-        with self.lend() as workspace:
+        with self.borrow() as workspace:
             near = workspace.near(q, 0.0).nearest_first()
             return object_penetrations(workspace.geometry, near.placements, workspace.owners, near.pair)
 
@@ -344,7 +344,7 @@ class Scene:
         nq = self.model.nq
         begin, end = checks.posture(q0, nq, "q0"), checks.posture(q1, nq, "q1")
         tolerance = checks.number(tolerance, "tolerance", 1e-5, FARTHEST, "m")
-        with self.lend() as workspace:
+        with self.borrow() as workspace:
             if moves is None:
                 return workspace.sweep.first_contact(begin, end, tolerance=tolerance)
             checks.instance(moves, Mapping, "sweep: moves", "give {name: (placement at the start, at the end)}")

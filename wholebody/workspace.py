@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Workspace:
-    """Room for one run on a scene; lent by `Scene.lend`, or made by `Scene.workspace` for what lives on.
+    """Room for one run on a scene; borrowed by `Scene.borrow`, or made by `Scene.workspace` for what lives on.
 
     A run sees things where they were at its last `begin` or `refresh`, whoever moves them meanwhile. After `begin` the
     same questions have the same answers, whatever was asked before.
@@ -55,7 +55,7 @@ class Workspace:
 
     def begin(self) -> None:
         """Forget what was asked before, and see things where they are now."""
-        self.proximity.forget()
+        self.proximity.reset()
         self.refresh()
         self.moved.clear()
         self._stuck = ()
@@ -132,8 +132,8 @@ class Workspace:
 
 
 @contextmanager
-def lent(built: SceneGeometry) -> Iterator[Workspace]:
+def borrowed(built: SceneGeometry) -> Iterator[Workspace]:
     """A workspace of a scene for one run; it is used again when the context ends."""
-    with built.pool(Workspace, lambda: Workspace(built)).lend() as workspace:
+    with built.pool(Workspace, lambda: Workspace(built)).borrow() as workspace:
         workspace.begin()
         yield workspace

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+import wholebody as wb
 from wholebody.bench import ablation
 from wholebody.bench.ablation import Constant, Row, report
 from wholebody.bench.problem_sets.registry import SETS
@@ -19,7 +20,21 @@ def test_constants_are_those_of_the_method_and_of_what_methods_share() -> None:
     found, _ = ablation.constants("qp")
     by_name = {(each.module, each.name): each.value for each in found}
     assert by_name["wholebody.methods.starts", "SPREADS"] == starts.SPREADS
+    assert "wholebody.methods.qp.solvers.osqp_solver" in {each.module for each in found}  # folders within too
     assert all(not each.module.startswith("wholebody.methods.newton") for each in found)
+
+
+def test_constants_that_loops_were_compiled_with_are_left_out() -> None:
+    found, compiled = ablation.constants("ccd")
+    assert "wholebody.methods.ccd.limbs_kernel" in compiled
+    assert all(each.module not in compiled for each in found)
+
+
+def test_only_problems_that_the_method_takes_are_asked() -> None:
+    solver = wb.CCD()
+    asked = ablation.problems(1, "ccd")
+    assert len(ablation.problems(1, "qp")) > len(asked) > 0
+    assert all(solver.accepts(problem) is None for problem in asked)
 
 
 def test_whole_numbers_stay_whole_and_at_least_one() -> None:

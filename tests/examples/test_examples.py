@@ -25,6 +25,7 @@ SINGLE = ("shelf", "carry_box_past_table", "behind_the_back", "look_and_touch_ov
 OTHERS = (
     *("chair", "console_two_people", "hand_on_table", "avatar_two_arms"),
     *("sit_on_chair", "four_bar", "assemble_shelf", "free_a_clip"),
+    *("four_bar_among_obstacles", "scissor_lift", "carry_together"),
 )
 REST_ON = {("pelvis", "pouch"), ("lower_lumbar", "pouch")}  # what the figure wears lies on it
 
@@ -269,15 +270,62 @@ def test_a_four_bar_linkage_turns_as_its_closed_form_says(example: Example, tmp_
 
 def test_a_shelf_is_assembled_part_by_part(example: Example, tmp_path: Path) -> None:
     module = example("assemble_shelf")
-    stages = module.main(out=tmp_path, pictures=False)
-    for name, before, after in zip((*module.LEVELS, "right side"), stages[:-1], stages[1:], strict=True):
-        for other in set(module.LOOSE) - {name}:
-            assert before[other].isApprox(after[other], 1e-8)
+    stages, motion = module.main(out=tmp_path, pictures=False)
+    order = (*module.LEVELS, "right side")
+    for number, (before, after) in enumerate(itertools.pairwise(stages)):
+        for other in ("left side", *order[:number]):  # what is in place stays
+            assert before[other].isApprox(after[other], 1e-6)
     for name, level in module.LEVELS.items():
         expected = pin.SE3(np.eye(3), np.array((0.0, 0.0, level + 0.5 * module.THICK)))
-        assert stages[-1][name].isApprox(expected, 1e-7)
+        assert stages[-1][name].isApprox(expected, 1e-5)
     y = -0.5 * (module.WIDTH - module.THICK)
-    assert stages[-1]["right side"].isApprox(pin.SE3(np.eye(3), np.array((0.0, y, 0.5 * module.HEIGHT))), 1e-7)
+    assert stages[-1]["right side"].isApprox(pin.SE3(np.eye(3), np.array((0.0, y, 0.5 * module.HEIGHT))), 1e-5)
+    names, boxes = list(module.LOOSE), {name: coal.Box(*module.BOARD) for name in module.LEVELS}
+    boxes |= {name: coal.Box(*module.SIDE) for name in ("left side", "right side")}
+    for q in motion[::5]:  # no two boards are in each other, by coal alone
+        places = [pin.XYZQUATToSE3(place) for place in q.reshape(-1, 7)]
+        for (a, first), (b, second) in itertools.combinations(zip(names, places, strict=True), 2):
+            ends = (coal.Transform3s(place.rotation, place.translation) for place in (first, second))
+            one, other = ends
+            found = coal.distance(boxes[a], one, boxes[b], other, coal.DistanceRequest(), coal.DistanceResult())
+            assert found > -1e-4, f"{a} and {b}"
+
+
+def test_a_four_bar_among_obstacles_stops_where_geometry_says(example: Example, tmp_path: Path, capsys: Any) -> None:
+    module = example("four_bar_among_obstacles")
+    made, _ = module.main(out=tmp_path, pictures=False)
+    face = made.placement("slider").translation[0] - 0.5 * module.SLIDER[0]
+    assert face == pytest.approx(module.slider_end(), abs=5e-4)
+    rocker = made.placement("rocker")
+    assert module.angle_of(rocker) == pytest.approx(module.rocker_at_post(), abs=1e-4)
+    axis = rocker.act(np.array((module.ROCKER, 0, 0))) - rocker.translation  # the rod's distance from the post's axis
+    away = np.array((module.POST[0] - module.GROUND, 0.0, module.POST[1]))
+    distance = np.linalg.norm(np.cross(away, axis)) / np.linalg.norm(axis)
+    assert distance == pytest.approx(module.RADIUS + module.POST_RADIUS, abs=1e-5)
+    assert capsys.readouterr().out.count("passes through anything: True") == 2
+
+
+def test_a_scissor_lift_stops_at_its_load_limit_and_at_a_beam(example: Example, tmp_path: Path) -> None:
+    module = example("scissor_lift")
+    for load, (low, high) in module.main(out=tmp_path, pictures=False).items():
+        angle = np.arcsin(low / (module.STAGES * module.BAR))
+        assert module.STAGES * load * module.GRAVITY / np.tan(angle) == pytest.approx(module.STRONGEST, rel=1e-3)
+        assert high == pytest.approx(module.BEAM - module.CRATE[2] - module.THICK, abs=2e-4)
+
+
+def test_two_people_carry_a_box_over_a_post(example: Example, tmp_path: Path) -> None:
+    module = example("carry_together")
+    made, states, left = module.main(out=tmp_path, pictures=False)
+    assert left < 1e-3
+    box = made.placement("box")
+    np.testing.assert_allclose(box.translation, (0.5 * module.APART, module.SIDEWAYS, module.LOW), atol=1e-3)
+    for name in module.PEOPLE:
+        for side in ("left", "right"):  # palms where they took hold, soles on the floor
+            palm = box.actInv(made.placement(f"{name}/{side}_palm").translation)
+            assert abs(abs(palm[1]) - 0.5 * module.BOX[1] - module.AWAY) < 1e-3
+            assert abs(made.placement(f"{name}/{side}_sole").translation[2]) < 1e-3
+    heights = [made.scene.contacts(q, 0.0).distance.min(initial=0.0) for q in states]
+    assert min(heights) > -1e-4
 
 
 def test_every_example_is_tested_and_listed(root: Path) -> None:

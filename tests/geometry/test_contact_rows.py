@@ -59,7 +59,7 @@ def placed_at(scene, q):
 
 def rows_of(scene, q, within=0.1):
     """Contacts, rows and their Jacobian at a posture."""
-    with scene.lend() as workspace:
+    with scene.borrow() as workspace:
         contacts = workspace.near(q, within)
     rows = scene.built.rows.rows(contacts)
     return contacts, rows, scene.state(q).rows(rows.wrench, rows.second, rows.first)
@@ -311,7 +311,7 @@ def test_normals_that_coal_leaves_open_are_those_of_the_face(free_bodies):
     q = scene.figure.neutral
     q[3:7] = pin.Quaternion(pin.exp3(np.array([0.0, np.pi / 2, 0.0]))).coeffs()
     q[:3] = 0.05, 0.0, 0.025 + 0.04 + 0.02
-    with scene.lend() as workspace:
+    with scene.borrow() as workspace:
         contacts = workspace.near(q, 0.1)
     up = np.sign(contacts.normal[0, 2])
     contacts.normal[:] = pin.exp3(np.array([0.0, 6e-3, 0.0])) @ (0.0, 0.0, up)
@@ -428,7 +428,7 @@ def test_compiled_rows_are_those_of_array_code_entry_by_entry(free_bodies):
         for k in range(0, scene.model.nq, 7):
             q[k : k + 3] = *rng.uniform(-0.4, 0.4, 2), rng.uniform(0.0, 0.2)
             q[k + 3 : k + 7] = pin.Quaternion(pin.exp3(rng.normal(size=3) * rng.choice([1e-3, 0.02, 1.0]))).coeffs()
-        with scene.lend() as workspace:
+        with scene.borrow() as workspace:
             contacts = workspace.near(q, 0.1)
         twin = contacts._replace(normal=contacts.normal.copy())
         found = contacts.normal.copy()

@@ -244,7 +244,7 @@ def test_official_getters_stand_in_for_views(monkeypatch, lost):
     slow = Proximity(scene.pair_table)
     for (q, within), wanted in zip(queries, expected, strict=True):
         found = slow.query(scene.state(q), within)
-        slow.forget()
+        slow.reset()
         for part, want in zip(found.nearest_first(), wanted, strict=True):
             assert np.array_equal(part, want)
 

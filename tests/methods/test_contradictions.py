@@ -15,7 +15,7 @@ METHODS = {"qp": wb.QP, "ccd": wb.CCD, "newton": wb.Newton, "placo": wb.Placo, "
 
 
 def found(problem):
-    with problem.lend() as workspace:
+    with problem.borrow() as workspace:
         return contradictions(problem, workspace)
 
 

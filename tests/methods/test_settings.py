@@ -47,14 +47,16 @@ def test_names_are_texts(wrong: Any) -> None:
 
 def test_assemblies_are_told_where_they_are_taken() -> None:
     assembly = wb.Assembly().body("rod")
-    for call in (
-        lambda: wb.follow_path(assembly, [(0, 0, 0)]),  # type: ignore[arg-type]
-        lambda: wb.Drag(assembly),  # type: ignore[arg-type]
-    ):
-        with pytest.raises(InputError, match=r"takes a Problem, not an Assembly; .*point_goal"):
+    for call in (lambda: wb.follow_path(assembly, [(0, 0, 0)]), lambda: wb.Drag(assembly)):
+        with pytest.raises(InputError, match=r"the assembly has no goals; .*point_goal"):
             call()
-    with pytest.raises(InputError, match=r"scene is an Assembly, not a Scene; .*view\.parts\.Parts"):
-        wb.Viewer(assembly)  # type: ignore[arg-type]
+    assembly.frame_goal("rod", (0, 0, 0))
+    with pytest.raises(InputError, match="that of a frame; use Drag"):
+        wb.follow_path(assembly, [(0, 0, 0)])
+    with pytest.raises(InputError, match="not by 'ccd'; leave method out"):
+        wb.Drag(assembly, "ccd")  # type: ignore[call-overload]
+    with pytest.raises(InputError, match=r"scene is an Assembly, not a Scene; .*shape=.*view\.parts\.Parts"):
+        wb.Viewer(assembly)
     with pytest.raises(InputError, match="problem is an Assembly, not a Problem"):
         wb.solve(assembly)  # type: ignore[arg-type]
 

@@ -71,7 +71,7 @@ def angles(problem: wb.Problem, starts: Iterable[np.ndarray]) -> np.ndarray:
 
 
 def test_each_part_of_a_joints_range_is_seen_once(problem: wb.Problem) -> None:
-    with problem.lend() as workspace:
+    with problem.borrow() as workspace:
         found = angles(problem, throughout(problem, workspace.state, problem.start, np.random.default_rng(0), 12))
     parts = np.floor(12 * (found[:, :2] - [-1.0, -np.pi]) / [3.0, 2.0 * np.pi])
     assert np.array_equal(np.sort(parts, axis=0), np.tile(np.arange(12.0)[:, None], 2))
@@ -79,7 +79,7 @@ def test_each_part_of_a_joints_range_is_seen_once(problem: wb.Problem) -> None:
 
 
 def test_a_joint_without_limits_starts_anywhere(problem: wb.Problem) -> None:
-    with problem.lend() as workspace:
+    with problem.borrow() as workspace:
         found = angles(problem, restarts(problem, workspace.state, problem.start, np.random.default_rng(0), 40, [1.0]))
     assert found[:, 1].min() < -2.5
     assert found[:, 1].max() > 2.5

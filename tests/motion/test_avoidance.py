@@ -113,6 +113,28 @@ def test_a_thin_thing_between_two_frames_is_not_passed(planar_arm: Callable[...,
     assert found.report.solved, found.report.message
 
 
+@pytest.mark.parametrize(
+    ("method", "beyond"),
+    [("trajectory", [0.2]), *((method, far) for method in ("frames", "bisection") for far in ([0.2], [0.2, 0.5, 0.2]))],
+)
+def test_a_thin_thing_passed_wholly_between_two_frames_is_not_passed(
+    planar_arm: Callable[..., Figure], method: str, beyond: list[float]
+) -> None:
+    """No frame touches the plate; the arm goes through it between two frames, and comes back through it later."""
+    figure = planar_arm((LINK, LINK), radius=0.01)
+    scene = wb.Scene(figure)
+    scene.add(wb.Box((0.3, 0.002, 0.3)), name="plate", at=(0.75, 0.0, 0.0))
+    near = np.linspace(-0.8, -0.2, 10)
+    angle = np.concatenate([near, beyond, near[::-1]])
+    clip = wb.Clip(figure, np.stack([angle, np.full(len(angle), 0.3)], axis=1), DT)
+    found = wb.avoid(clip, scene, method=method)
+    assert (found.report.before.colliding, found.report.before.dips) == (0, 2)
+    assert found.report.solved, found.report.message
+    first, second = found.clip.q[:, 0], found.clip.q.sum(axis=1)
+    height = LINK * np.sin(first) + (0.75 - LINK * np.cos(first)) * np.tan(second)  # of the forearm at the plate
+    assert (height < -0.01).all()
+
+
 def test_what_cannot_be_freed_is_said(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 30)
     for method in ("trajectory", "frames", "fade"):
@@ -222,6 +244,11 @@ def test_the_command_frees_a_file(tmp_path: Path, human: Figure, capsys: pytest.
     free = wb.read_clip(tmp_path / "arm-free.npz", human)
     assert wb.check(free).free
     assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "none"]) == 2
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "fade", "--stretch", "2"]) == 2
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "fade", "--dynamics"]) == 2
+    told = capsys.readouterr()
+    assert "does not slow" in told.err + told.out
+    assert "does not take dynamics" in told.err + told.out
 
 
 def test_an_answer_is_told_in_three_lines() -> None:

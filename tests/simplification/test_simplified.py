@@ -136,7 +136,7 @@ def test_the_smaller_figure_stands_where_the_whole_one_does(human: Figure) -> No
 
 
 def _piece_places(scene: wb.Scene, q: np.ndarray) -> np.ndarray:
-    with scene.lend() as workspace:
+    with scene.borrow() as workspace:
         return workspace.near(q, 0.0).placements
 
 

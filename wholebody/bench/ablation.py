@@ -92,7 +92,7 @@ def constants(method: str) -> tuple[list[Constant], list[str]]:
     Modules whose constants are compiled in and cannot be changed are the second part.
     """
     package = import_module(f"wholebody.methods.{method}")
-    names = [f"{package.__name__}.{found.name}" for found in pkgutil.walk_packages(package.__path__)]
+    names = [found.name for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")]
     names = [name for name in names if not name.endswith(".tracking")]  # no step is asked for here
     found: list[Constant] = []
     compiled: list[str] = []
@@ -100,18 +100,19 @@ def constants(method: str) -> tuple[list[Constant], list[str]]:
         module = import_module(name)
         mine = [Constant(name, each, getattr(module, each)) for each in _assigned(module)]
         mine = [each for each in mine if _is_number(each.value)]
-        if mine and any(type(value).__name__ == "CPUDispatcher" for value in vars(module).values()):
+        if mine and any(hasattr(value, "signatures") for value in vars(module).values()):  # loops of numba
             compiled.append(name)
         else:
             found += mine
     return found, compiled
 
 
-def problems(count: int) -> list[Problem]:
-    """The first problems of every still set, and the hard cases that are solved once."""
+def problems(count: int, method: str) -> list[Problem]:
+    """The first problems of every still set, and the hard cases that are solved once: those that the method takes."""
     made = [SETS[name].make(number, SEED).problem for name in SETS if not SETS[name].moving for number in range(count)]
     posed = [given.problem for given in (case.question() for case in cases()) if isinstance(given, Posed)]
-    return made + posed
+    solver = method_named(method)
+    return [problem for problem in made + posed if solver.accepts(problem) is None]
 
 
 def outcome(method: str, given: Sequence[Problem]) -> Outcome:

@@ -11,7 +11,7 @@ from wholebody.methods.newton.assembly import Assembly
 
 LINK = 0.2  # m
 ALONG_Y = (0.0, 1.0, 0.0)
-PULL = (0.03, -0.03, 0.02)  # m: of the end of a chain, as far as takes three systems at the paper's size
+DISPLACEMENT = (0.03, -0.03, 0.02)  # m: of the end of a chain, as far as takes three systems at the paper's size
 
 
 def chain(count: int, bend: float = 0.1) -> Assembly:
@@ -32,9 +32,9 @@ def chain(count: int, bend: float = 0.1) -> Assembly:
 
 
 def pulled_chain(count: int) -> Assembly:
-    """A chain whose end is to move by `PULL`."""
+    """A chain whose end is to move by `DISPLACEMENT`."""
     made, last, tip = chain(count), f"b{count - 1}", np.array((LINK, 0.0, 0.0))
-    made.point_goal(last, made.placement(last).act(tip) + np.array(PULL), place=tip)
+    made.point_goal(last, made.placement(last).act(tip) + np.array(DISPLACEMENT), place=tip)
     return made
 
 

@@ -32,12 +32,12 @@ from wholebody.scene import Scene
 GRAVITY = (0.0, 0.0, -9.81)  # m/s2
 SUBSTEP = 1.0 / 240.0  # s: longest step; smaller is more accurate and slower
 SHORTEST = 1e-6  # s: of a step that ends with an impact
-INSIDE = 5e-5  # m: a step that leaves pieces deeper in each other is made again with half the time
-LEAST_GAP = 1e-5  # m: pieces nearer than this are parted before the next step
+INSIDE = 1e-4  # m: a step that leaves pieces deeper in each other is made again with half the time
+LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
 PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
 HALVINGS = 6  # of a step, at most
 MARGIN = 2e-3  # m: pairs are looked at from this much farther than bodies come in a step
-STOPS = 8  # early ends of steps in a frame, and two for each step of it
+STOPS = 12  # early ends of steps in a frame, at most
 DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
 FASTEST = 1e3  # m/s2: of gravity
 STRONGEST = 1e6  # N s
@@ -99,8 +99,7 @@ class RigidBodies:
         Raises:
             UnknownNameError: there is none of that name.
         """
-        number = self._number(name)
-        return np.concatenate([self.state.velocity[number], self.state.spin[number]])
+        return np.array(self.state.twist[self._number(name)])
 
     def velocity_at(self, name: str, point: Array) -> Array:
         """Velocity (3,) of a body's point at a place (3,) in the world, m/s.
@@ -174,7 +173,7 @@ class RigidBodies:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
             state.give(number, before, after, dt)
         count = int(np.ceil(dt / SUBSTEP - 1e-9))
-        record = FrameRecord(STOPS + 2 * count, np.zeros((len(self.names), 3)))
+        record = FrameRecord(STOPS, np.zeros((len(self.names), 3)))
         self._look(dt / count)
         for number in range(count):
             end = dt * (number + 1) / count
@@ -182,7 +181,7 @@ class RigidBodies:
                 self._step(end - record.time, record)
         for number, (_, after) in given.items():
             state.put(number, after)
-            state.velocity[number] = state.spin[number] = 0.0
+            state.twist[number] = 0.0
         state.given[:] = False
         self._sleepers.look(self._near, dt)
         self.time += dt
@@ -202,9 +201,9 @@ class RigidBodies:
         first = float(program.hits.min(initial=np.inf))
         if not together and first < time:
             time, record.stops = max(first, SHORTEST), record.stops - 1
-        kept, near, margin = state.kept(), self._near, self._margin
+        kept, near, margin, start = state.kept(), self._near, self._margin, self._old
         for halving in range(HALVINGS + 1):
-            program.solve(time, together, self._old)
+            program.solve(time, together, start)
             impulse, pushed = program.world_impulse(), program.pushed()
             self._falling = ~pushed
             self._drift(time, pushed)
@@ -214,11 +213,11 @@ class RigidBodies:
             if clear or halving == HALVINGS:
                 break
             state.restore(kept)
-            time *= 0.5
+            start, time = program.remembered(time), 0.5 * time
         record.time += time
         self._old = program.remembered(time)
-        np.add.at(record.impulse, program.points.second, impulse)
-        np.add.at(record.impulse, program.points.first, -impulse)
+        np.add.at(record.impulse, program.points.bodies[:, 1], impulse)
+        np.add.at(record.impulse, program.points.bodies[:, 0], -impulse)
         record.contacts = int((impulse != 0.0).any(axis=1).sum())
         record.signorini = max(record.signorini, program.residuals[0])
         record.coulomb = max(record.coulomb, program.residuals[1])
@@ -230,7 +229,7 @@ class RigidBodies:
         points = program.points
         for row in events:
             number = int(row[0])
-            first, second = points.first[number], points.second[number]
+            first, second = points.bodies[number]
             record.impulse[second] += row[2:]
             record.impulse[first] -= row[2:]
             place = points.point[number], points.normal[number]
@@ -240,7 +239,7 @@ class RigidBodies:
     def _drift(self, time: float, pushed: Mask) -> None:
         state = self.state
         motion_kernel.drift(
-            state.position, state.rotation, state.velocity, state.spin, self._pieces.inertia, state.inverse,
+            state.position, state.rotation, state.twist, self._pieces.inertia, state.inverse,
             state.moving, state.given, pushed, self.gravity, time,
         )  # fmt: skip
 
@@ -274,11 +273,11 @@ class RigidBodies:
         listed = found >= 0
         gap, normal = self._margin[bodies].sum(axis=1), np.zeros((len(listed), 3))
         gap[listed], normal[listed] = after.distance[found[listed]], after.normal[found[listed]]
+        spin, fall = np.linalg.norm(self.state.spin, axis=1), float(np.linalg.norm(self.gravity))
         doubtful = passing_kernel.doubtful(
             near.pair, np.ascontiguousarray(near.distance), np.ascontiguousarray(near.normal), gap, normal,
-            near.placements, after.placements, pieces.body,
-            self.state.position - kept, np.linalg.norm(self.state.spin, axis=1) * time, pieces.levers,
-            float(np.linalg.norm(self.gravity)) * time**2 / 8.0, PASSING, *pieces.heights,
+            near.placements, after.placements, pieces.body, self.state.position - kept, spin * time, pieces.levers,
+            fall * time**2 / 8.0, PASSING, *pieces.heights,
         )  # fmt: skip
         return int(doubtful) == 0
 
@@ -287,8 +286,7 @@ class RigidBodies:
         state = self.state
         for _ in range(PARTINGS):
             program = StepProgram(state, self._finder.points(self._near), self.gravity)
-            shift, turn = program.parting(0.5 * SKIN)
-            motion_kernel.displace(state.position, state.rotation, shift, turn, state.moving)
+            motion_kernel.displace(state.position, state.rotation, program.parting(0.5 * SKIN), state.moving)
             least = self._look(SUBSTEP)
             if least >= LEAST_GAP:
                 break
@@ -306,7 +304,7 @@ def _bounded(value: object, most: float, what: str) -> Array:
 def _given(kinematic: object) -> Mapping[str, object]:
     if kinematic is None:
         return {}
-    return checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")  # type: ignore[type-abstract]
+    return checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")
 
 
 def _ways(ways: object, name: str) -> tuple[pin.SE3, pin.SE3]:
@@ -326,28 +324,20 @@ def _ways(ways: object, name: str) -> tuple[pin.SE3, pin.SE3]:
 def compiled_kernel() -> None:
     """Compile the loops or read them back: not in the middle of a frame."""
     one, none, mask = np.zeros((1, 3)), np.zeros(0, dtype=np.intp), np.ones(1, dtype=bool)
-    unit, vectors, turned = np.eye(3)[None].copy(), np.zeros((0, 3)), np.zeros((1, 4, 3))
-    motion_kernel.drift(one, unit.copy(), one.copy(), one.copy(), unit, unit, mask, mask, mask, np.zeros(3), 1.0)
-    motion_kernel.displace(one, unit.copy(), one, one, mask)
+    unit, vectors, turned, twist = np.eye(3)[None].copy(), np.zeros((0, 3)), np.zeros((1, 4, 3)), np.zeros((1, 6))
+    some, mass, pairs = np.zeros(0), np.zeros(1), np.zeros((0, 2), dtype=np.intp)
+    motion_kernel.drift(one, unit.copy(), twist, unit, unit, mask, mask, mask, np.zeros(3), 1.0)
+    motion_kernel.displace(one, unit.copy(), twist, mask)
     motion_kernel.world_inverses(unit, unit, mask, unit.copy())
     motion_kernel.place_pieces(one, unit, one, np.zeros(1, dtype=np.intp), turned, turned.copy())
-    axes, levers, answers, mobility = (
-        np.zeros((0, 3, 3)),
-        np.zeros((0, 2, 3, 3)),
-        np.zeros((0, 2, 3, 3)),
-        np.zeros((0, 2)),
-    )
-    some, mass = np.zeros(0), np.zeros(1)
-    contact_kernel.frames(none, none, vectors, vectors, one, mass, unit, axes, levers, answers, mobility)
-    contact_kernel.solve(none, none, none, axes, levers, answers, mobility, some, some, mass, one, one, vectors, 1.0, 1)
-    contact_kernel.residuals(none, none, axes, levers, mobility, some, some, one, one, vectors)
-    contact_kernel.apply(none, none, axes, answers, mass, one, one, vectors)
-    contact_kernel.start_from(none, vectors, vectors, none, none, vectors, axes, 1.0, vectors)
-    impact_kernel.resolve(
-        none, none, none, none, axes, levers, answers, mobility, some, some, mass, one, one, 1.0, 1, vectors,
-        np.zeros((1, 5)),
-    )  # fmt: skip
-    pairs = np.zeros((0, 2), dtype=np.intp)
+    laid = np.zeros((0, 3, 3)), np.zeros((0, 3, 2, 6)), np.zeros((0, 3, 2, 6)), np.zeros((0, 2))
+    contact_kernel.lay(pairs, vectors, vectors, one, mass, unit, *laid)
+    contact_kernel.solve(none, pairs, *laid[1:], some, some, twist, vectors, 1.0, 1)
+    contact_kernel.residuals(pairs, laid[1], laid[3], some, some, twist, vectors)
+    contact_kernel.rates(pairs, laid[1], twist, vectors)
+    contact_kernel.apply(pairs, laid[2], twist, vectors)
+    contact_kernel.start_from(none, vectors, vectors, none, none, vectors, laid[0], 1.0, vectors)
+    impact_kernel.resolve(none, none, pairs, *laid, some, some, twist, 1.0, 1, vectors, np.zeros((1, 5)))
     passing_kernel.doubtful(
         pairs, some, vectors, some, vectors, turned, turned, none, one, mass, mass, 0.0, 1.0, vectors,
         none, none, some, vectors, np.zeros((0, 4)),

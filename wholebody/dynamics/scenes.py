@@ -10,8 +10,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-import pinocchio as pin
-
 from wholebody.arrays import Array
 from wholebody.checks import known, number, whole
 from wholebody.figures import load
@@ -35,6 +33,8 @@ DOMINO = (0.008, 0.024, 0.048)  # m
 DOMINOES = 12
 STEP = (0.25, 1.0, 0.17)  # m: tread, width and rise of a stair
 STEPS = 6
+WRIST = 0.105  # m: of the wrist above the table, so that bent fingers just clear it
+INDEX = 0.018  # m: of the index to the left of the wrist
 BLUE, RED, OAK = (0.30, 0.42, 0.58, 1.0), (0.72, 0.25, 0.20, 1.0), (0.60, 0.48, 0.36, 1.0)
 
 
@@ -147,9 +147,7 @@ def _stairs(scene: Scene) -> None:
 
 
 def _things_to_walk_into(scene: Scene) -> None:
-    scene.add(
-        Box((0.30, 0.40, 0.50)), name="carton", at=(0.75, -0.1, 0.25 + GAP), color=OAK, body=Body(density=60.0)
-    )
+    scene.add(Box((0.30, 0.40, 0.50)), name="carton", at=(0.75, -0.1, 0.25 + GAP), color=OAK, body=Body(density=60.0))
     scene.add(
         Box((0.25, 0.30, 0.40)), name="parcel", at=(0.75, -0.1, 0.70 + 2 * GAP), color=BLUE, body=Body(density=60.0)
     )
@@ -160,29 +158,29 @@ def _things_to_walk_into(scene: Scene) -> None:
 
 
 def _hand(figure: Figure, at: Place, glove: str, curl: float = 0.0) -> Array:
-    """The hand with its fingers forward (x), its palm down; the index bent by `curl` radians more at each joint."""
+    """The hand with its fingers forward (x) and its palm down; the index is bent by `curl` radians at each joint more.
+
+    The wrist is at a place relative to the middle of the table's top.
+    """
     q = figure.posture(glove)
-    turn = pin.Quaternion(q[3:7]).toRotationMatrix()
-    q[:3], q[3:7] = at, pin.Quaternion(turn).coeffs()
-    if curl:
-        bent = {name: value + curl for name, value in figure.joint_values(q).items() if "index" in name and "flexion" in name}
-        q = figure.clamp(figure.with_joints(q, bent))
-    return q
+    q[:3] = at[0], at[1], TOP + at[2]
+    bent = {
+        name: value + curl for name, value in figure.joint_values(q).items() if "index" in name and "flexion" in name
+    }
+    return figure.clamp(figure.with_joints(q, bent))
 
 
 def _flick(figure: Figure) -> Keys:
-    high = TOP + 0.055
-
     def at(x: float, z: float, curl: float) -> Array:
-        return _hand(figure, (x, 0.03, z), "pointing", curl)
+        return _hand(figure, (x, -INDEX, z), "pointing", curl)
 
     return [
-        (0.0, at(0.02, high + 0.12, 0.0)),
-        (0.8, at(0.09, high, 0.9)),
-        (0.4, at(0.09, high, 0.9)),
-        (0.12, at(0.115, high, -0.1)),
-        (0.5, at(0.115, high, -0.1)),
-        (1.2, at(0.02, high + 0.12, 0.0)),
+        (0.0, at(0.02, WRIST + 0.12, 0.9)),
+        (0.8, at(0.163, WRIST, 0.9)),
+        (0.3, at(0.163, WRIST, 0.9)),
+        (0.12, at(0.163, WRIST, -0.1)),
+        (0.5, at(0.163, WRIST, -0.1)),
+        (1.2, at(0.02, WRIST + 0.12, 0.0)),
     ]
 
 
@@ -190,33 +188,31 @@ def _push(figure: Figure) -> Keys:
     def at(x: float, z: float) -> Array:
         return _hand(figure, (x, 0.0, z), "grip")
 
-    low = TOP + 0.06
     return [
-        (0.0, at(-0.45, low + 0.15)),
-        (0.8, at(-0.35, low)),
-        (1.6, at(0.02, low)),
-        (0.5, at(0.02, low)),
-        (0.8, at(-0.30, low + 0.1)),
-        (0.8, at(-0.45, low + 0.15)),
+        (0.0, at(-0.45, WRIST + 0.12)),
+        (0.8, at(-0.35, WRIST)),
+        (1.6, at(0.02, WRIST)),
+        (0.5, at(0.02, WRIST)),
+        (0.8, at(-0.30, WRIST + 0.05)),
+        (0.8, at(-0.45, WRIST + 0.12)),
     ]
 
 
 def _tap(figure: Figure) -> Keys:
     def at(x: float, z: float) -> Array:
-        return _hand(figure, (x, 0.02, z), "pointing")
+        return _hand(figure, (x, -INDEX, z), "pointing", 0.5)
 
-    low = TOP + 0.075
     return [
-        (0.0, at(-0.40, low + 0.12)),
-        (0.8, at(-0.30, low)),
-        (0.6, at(-0.21, low)),
-        (0.4, at(-0.25, low)),
-        (1.6, at(-0.40, low + 0.12)),
+        (0.0, at(-0.40, WRIST + 0.12)),
+        (0.8, at(-0.26, WRIST)),
+        (0.8, at(-0.18, WRIST)),
+        (0.4, at(-0.22, WRIST)),
+        (1.6, at(-0.40, WRIST + 0.12)),
     ]
 
 
 def _aside(figure: Figure) -> Keys:
-    q = _hand(figure, (-0.6, -0.9, 1.4), "relaxed")
+    q = _hand(figure, (-0.6, -0.9, 0.6), "relaxed")
     return [(0.0, q), (4.0, q)]
 
 
@@ -248,10 +244,10 @@ def _walk_into(figure: Figure) -> Keys:
 
 _PLANS: dict[str, _Plan] = {
     "flick": _Plan(
-        "a finger flicks a ball off a table", "hand", _ball_to_flick, _flick, (0.9, -0.9, 1.25), (0.3, 0.0, 0.65)
+        "a finger flicks a ball off a table", "hand", _ball_to_flick, _flick, (1.9, -1.5, 1.5), (0.45, 0.0, 0.5)
     ),
     "push_ball": _Plan(
-        "a fist pushes a ball along a table", "hand", _ball_to_push, _push, (0.6, -1.0, 1.35), (0.0, 0.0, 0.72)
+        "a fist pushes a ball along a table", "hand", _ball_to_push, _push, (1.6, -1.6, 1.6), (0.3, 0.0, 0.5)
     ),
     "push_box": _Plan(
         "a fist pushes a box along a table", "hand", _box_to_push, _push, (0.6, -1.0, 1.35), (0.0, 0.0, 0.72)
@@ -260,11 +256,11 @@ _PLANS: dict[str, _Plan] = {
         "a finger pushes the first of a row of dominoes", "hand", _dominoes, _tap, (0.5, -0.7, 1.15), (0.05, 0.0, 0.76)
     ),
     "stairs": _Plan(
-        "a ball rolls down stairs; the hand stays aside", "hand", _stairs, _aside, (3.2, -2.6, 1.9), (1.0, 0.0, 0.5)
+        "a ball rolls down stairs; the hand stays aside", "hand", _stairs, _aside, (3.6, -3.4, 1.9), (1.1, 0.0, 0.45)
     ),
     "avatar_and_cartons": _Plan(
         "an avatar walks with its hands ahead into two cartons, one on the other, and a ball",
-        "avatar", _things_to_walk_into, _walk_into, (2.6, -2.6, 1.9), (0.5, 0.0, 0.7),
+        "avatar", _things_to_walk_into, _walk_into, (3.4, -3.4, 1.9), (0.5, 0.0, 0.85),
     ),
 }  # fmt: skip
 

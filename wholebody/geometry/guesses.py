@@ -30,7 +30,7 @@ class Guesses:
         self._requests = results.distanceRequests
         self._views = _views(self._requests)
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Reset the guess of every pair to coal's initial guess."""
         if self._views is not None:
             directions, vertices = self._views

@@ -148,9 +148,9 @@ class Proximity:
         self._last, self._extent = np.zeros((count, 4, 3)), np.zeros((count, 3))
         self._lay_views()
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Forget how near each pair was and where coal ended for it: the same queries give the same answers again."""
-        self._guesses.forget()
+        self._guesses.reset()
         self._travelled[:] = 0.0
         self._bound[:] = -np.inf
 
@@ -165,7 +165,7 @@ class Proximity:
         self._distances = result_view(self.results.distanceResults)
         self._placements = placement_view(self.results.oMg)
         self.results.deactivateAllCollisionPairs()
-        self.forget()
+        self.reset()
 
     def placements(self, state: Kinematics) -> Array:
         """Placements (n, 4, 3) of the pieces with the joints as in `state`; see `Contacts.placements`."""

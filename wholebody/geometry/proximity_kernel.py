@@ -40,6 +40,30 @@ def travel(placement: Array, last: Array, reach: Array, travelled: Array) -> Non
 
 
 @compiled()
+def bound_by_boxes(placement: Array, half: Array, extent: Array) -> None:
+    """Write half the sizes (n, 3) of boxes along the world's axes about boxes along the pieces' own into `extent`."""
+    for i in range(len(half)):
+        for k in range(3):
+            total = 0.0
+            for j in range(3):
+                total += abs(placement[i, j, k]) * half[i, j]
+            extent[i, k] = total
+
+
+@compiled()
+def outer_gap(placement: Array, reach: Array, extent: Array, a: int, b: int) -> float:
+    """A lower bound of the signed distance of two pieces: the gap between the spheres or the boxes about them."""
+    square = 0.0
+    boxes = -np.inf
+    for k in range(3):
+        apart = abs(placement[a, 3, k] - placement[b, 3, k])
+        square += apart * apart
+        boxes = max(boxes, apart - extent[a, k] - extent[b, k])
+    gap: float = max(boxes, np.sqrt(square) - reach[a] - reach[b])
+    return gap
+
+
+@compiled()
 def cull(
     placement: Array,
     pairs: Indices,
@@ -74,12 +98,7 @@ def cull(
     Returns:
         How many there are.
     """
-    for i in range(len(reach)):
-        for k in range(3):
-            total = 0.0
-            for j in range(3):
-                total += abs(placement[i, j, k]) * half[i, j]
-            extent[i, k] = total
+    bound_by_boxes(placement, half, extent)
     count = 0
     for p in range(len(pairs)):
         a, b = pairs[p, 0], pairs[p, 1]
@@ -87,13 +106,7 @@ def cull(
         near = min(within, most[p])
         if bound[p] - way >= near:
             continue
-        square = 0.0
-        boxes = -np.inf
-        for k in range(3):
-            apart = abs(placement[a, 3, k] - placement[b, 3, k])
-            square += apart * apart
-            boxes = max(boxes, apart - extent[a, k] - extent[b, k])
-        gap = max(boxes, np.sqrt(square) - reach[a] - reach[b])
+        gap = outer_gap(placement, reach, extent, a, b)
         if gap >= near:
             bound[p] = gap + way
             continue

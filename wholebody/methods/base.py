@@ -73,7 +73,7 @@ class Tracker(Protocol):
     def nearest(self, q: Array) -> Solution:
         """The same with measures relative to q, which gives the nearest answer."""
 
-    def ways_out(self, q: Array) -> Sequence[Array]:
+    def overlap_resolutions(self, q: Array) -> Sequence[Array]:
         """Postures (nq,) that lead out of a thing in the figure at q, if no step does; there may be none."""
 
 
@@ -214,7 +214,7 @@ class SolvingTracker:
         """The same with measures relative to q."""
         return self._method.solve(nearest_to(self.problem, q))
 
-    def ways_out(self, q: Array) -> Sequence[Array]:
+    def overlap_resolutions(self, q: Array) -> Sequence[Array]:
         """No postures."""
         posture(q, self.workspace.model.nq)
         return ()

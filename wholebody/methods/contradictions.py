@@ -267,5 +267,5 @@ def explanation(problem: Problem) -> str:
     Raises:
         InputError: objects were added to or removed from the scene after the problem was made.
     """
-    with problem.lend() as workspace:
+    with problem.borrow() as workspace:
         return in_words(contradictions(problem, workspace))

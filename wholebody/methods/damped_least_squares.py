@@ -89,7 +89,7 @@ class DampedLeastSquares:
         """
         check_problem(problem, "DampedLeastSquares.solve: problem")
         began = time.perf_counter()
-        with problem.lend() as workspace, Control(self.time_limit, progress) as control:
+        with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
             descent = _Descent(problem, self, workspace.state, control)
             rested = descent.run()
         ending = Ending(

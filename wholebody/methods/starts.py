@@ -111,7 +111,7 @@ def _ranges(problem: Problem, start: Array) -> tuple[Array, Array]:
     """The least and the largest move (nv,) of each degree of freedom from a posture (nq,), all of them finite."""
     lower, upper = problem.scene.figure.tangent_bounds(start)
     spread = np.full(len(lower), ROOT_SPREAD)
-    for joint in problem.scene.model.joints:
+    for joint in list(problem.scene.model.joints)[1:]:  # the first is the world
         if joint.shortname().startswith("JointModelR"):
             spread[joint.idx_v] = TURN
     limited = np.isfinite(upper - lower)

@@ -195,7 +195,7 @@ def check(
     depth = number(depth, "check: depth", SMALLEST, LARGEST, "m")
     tell: Progress | None = function(progress, "check: progress") if progress is not None else None
     table = ContactTable(scene, len(clip))
-    with scene.lend() as workspace:
+    with scene.borrow() as workspace:
         swept = SweptDepth(workspace.table, workspace.geometry, depth)
         table.add(0, swept.start(clip.q[0]), between=False)
         for frame in range(1, len(clip)):

@@ -63,7 +63,7 @@ class Fade:
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
         q, fade, solves, programs = np.array(clip.q), max(1, round(self.fade / clip.dt)), 0, 0
         total = np.inf
-        with scene.lend() as workspace:
+        with scene.borrow() as workspace:
             for number in range(self.rounds):
                 depths, wrong, gaps = faults(workspace, terms, q, self.clearance)
                 wrong[[frame + end for frame in gaps for end in (0, 1)]] = True

@@ -21,6 +21,7 @@ from wholebody.figures.state import State
 from wholebody.motion.stance import StanceFeet, held_feet, standing
 from wholebody.motion.stance_places import shifts
 from wholebody.scene import Scene
+from wholebody.tasks import Hold
 from wholebody.tasks.base import Bound, Constraint, Goal
 from wholebody.tasks.checks import check_rows
 
@@ -53,16 +54,26 @@ class FrameTerms:
         """Constraints and goals of a frame, resolved at its original posture."""
         if frame not in self._held:
             terms: list[HeldTerm] = [term for term in self.given if not isinstance(term, Bound)]
-            resolved = [term.resolve(self.scene, self.q[frame]) for term in terms]
-            for foot in held_feet(self.scene.figure, self.stands[frame]):
-                held = foot.resolve(self.scene, self.q[frame])
-                shift = self.shifts[frame][self.stands[frame].index(foot.frame)]
-                if shift.any():
-                    at = pin.SE3(held.kept_at.rotation, held.kept_at.translation + shift)
-                    held = replace(foot, at=at).resolve(self.scene, self.q[frame])
-                resolved.append(held)
+            resolved = [term.resolve(self.scene, self.q[frame]) for term in (*terms, *self.feet(frame))]
             self._held[frame] = tuple(resolved)
         return self._held[frame]
+
+    def feet(self, frame: int) -> tuple[Hold, ...]:
+        """What holds the feet that stand in a frame, where each of them is held."""
+        found = []
+        for foot in held_feet(self.scene.figure, self.stands[frame]):
+            at = foot.resolve(self.scene, self.q[frame]).kept_at
+            shift = self.shifts[frame][self.stands[frame].index(foot.frame)]
+            found.append(replace(foot, at=pin.SE3(at.rotation, at.translation + shift)))
+        return tuple(found)
+
+    def shift(self, frame: int, joint: int) -> Array:
+        """(3,) by how much what stands on a joint, or on those after it, is held beside where it was, metres."""
+        model = self.scene.model
+        for name, shift in zip(self.stands[frame], self.shifts[frame], strict=True):
+            if joint in model.supports[model.frames[self.scene.figure.frame_id(name)].parentJoint]:
+                return shift
+        return np.zeros(3)
 
     def bounds(self, frame: int, state: State) -> tuple[Array, Array, Array, Array]:
         """Bounds of a frame.

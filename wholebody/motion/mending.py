@@ -8,7 +8,7 @@ found, with rows of contact in every frame and at the places between frames that
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +16,9 @@ import pinocchio as pin
 
 from wholebody.arrays import Array, Mask
 from wholebody.motion.avoider import Watch
-from wholebody.motion.dips import dips
+from wholebody.motion.dips import dipping, dips
 from wholebody.motion.faults import faults
+from wholebody.motion.following import Follower, keep_back
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.chart import Chart
@@ -36,6 +37,7 @@ RADIUS = 0.05  # rad, m: first trust region; postures are nearly free
 NEAR = 0.03  # m: pairs nearer than this have rows
 ROOM = 3e-4  # m: clearance that a motion that dips is first asked for beyond the others; it doubles
 MOST_ROOM = 5e-3  # m
+LONGEST = 2.0  # s that frames may be kept on one side of what the original motion passes
 SPREAD = 0.06  # s: how far a push at one frame spreads to its neighbours
 NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 
@@ -75,48 +77,54 @@ class _Looking(Looking):
 
 
 class Mender:
-    """Puts right what is left in the postures of one clip.
+    """Puts right what is left in the postures of one clip."""
 
-    Attributes:
-        programs: how many quadratic programs were solved.
-    """
-
-    def __init__(
-        self, terms: FrameTerms, workspace: Workspace, clearance: float = 0.0, frozen: Iterable[int] = ()
-    ) -> None:
-        """Take what is needed.
+    def __init__(self, terms: FrameTerms, workspace: Workspace, clearance: float = 0.0) -> None:
+        """Take what is needed; nothing is computed yet.
 
         Args:
             terms: original postures, and what is held.
             workspace: of this run alone.
             clearance: least distance of every pair, metres.
-            frozen: degrees of freedom that stay as they are.
         """
         self._terms, self._workspace, self._clearance = terms, workspace, clearance
-        self._frozen, self.programs = list(frozen), 0
+        self._follower: Follower | None = None
+        self._programs = 0
+
+    @property
+    def programs(self) -> int:
+        """How many quadratic programs were solved."""
+        return self._programs + (0 if self._follower is None else self._follower.programs)
 
     def mend(self, q: Array, watch: Watch) -> Array:
         """Postures (n, nq) with less that is wrong; those in which nothing is wrong nearby are the given ones."""
         q = np.array(q)
         margin = max(2, round(MARGIN / self._terms.dt))
         for number in range(ROUNDS):
-            wrong = self.wrong(q)
-            if not wrong.any():
-                break
-            changed = False
+            wrong, gaps = self._faults(q)
+            changed = [self._kept_back(q, gap) for gap in gaps] if number else []  # what rows did not free
+            if any(changed):
+                wrong, gaps = self._faults(q)
+            wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
             for window in windows(wrong, margin << number):
                 if watch.tell(1.0, f"frames {window.first} to {window.end - 1} are mended"):
                     return q
-                changed |= self._window(window, q)
-            if not changed and number:
+                changed.append(self._window(window, q))
+            if not any(changed) and number:
                 break
         return q
 
-    def wrong(self, q: Array) -> Mask:
-        """(n,) frames of postures (n, nq) in which something is wrong, or beside which a motion dips."""
-        _, wrong, gaps = faults(self._workspace, self._terms, q, self._clearance)
-        wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
-        return wrong
+    def _faults(self, q: Array) -> tuple[Mask, list[int]]:
+        """(n,) frames of postures (n, nq) in which something is wrong, and gaps between others that dip."""
+        return faults(self._workspace, self._terms, q, self._clearance)[1:]
+
+    def _kept_back(self, q: Array, gap: int) -> bool:
+        """Keep frames beside a gap on one side of what it passes, in place; whether that succeeded."""
+        if not dipping(self._workspace, q, (gap,)):
+            return False  # an earlier one changed these frames
+        if self._follower is None:
+            self._follower = Follower(self._terms, self._clearance)
+        return keep_back(self._follower, self._workspace, q, gap, max(2, round(LONGEST / self._terms.dt)))
 
     def _window(self, window: Window, q: Array) -> bool:
         """Mend one window of q (n, nq) in place; whether it is better than before."""
@@ -132,18 +140,18 @@ class Mender:
         x = np.zeros((len(window), workspace.model.nv))
         found = chart.original.copy()
         before = best = left = self._left(found, window)
-        for _ in range(ADDED):
+        for number in range(ADDED):
             program.add([Node(gap, float(np.clip(at, NEAREST, 1.0 - NEAREST))) for gap, at in left.dipping.items()])
             for gap in left.dipping:
                 looking.ask(gap)
             answer = program.run(x, lambda count, worst: False, RADIUS)
-            self.programs += answer.programs
+            self._programs += answer.programs
             x, postures, moved = answer.x, chart.original.copy(), (answer.x != 0.0).any(axis=1)
             postures[moved] = chart.postures(x)[moved]
             left = self._left(postures, window)
             if left.wrong < best.wrong:
                 best, found = left, postures
-            if not left.dipping:
+            if not left.dipping or (number and not answer.met):
                 break
         q[window.first : window.end] = found
         return best.wrong < before.wrong
@@ -168,7 +176,6 @@ class Mender:
             upper[place] = np.minimum(upper[place], np.where(np.isfinite(most), most - away, np.inf))
             still = least == most
             lower[place, still] = upper[place, still] = 0.0
-        lower[:, self._frozen] = upper[:, self._frozen] = 0.0
         for seam, place in zip(seams, (0, -1), strict=True):
             if seam:
                 lower[place] = upper[place] = 0.0

@@ -15,83 +15,20 @@ import pinocchio as pin
 
 from wholebody import checks
 from wholebody.arrays import Array
-from wholebody.figures.state import State
-from wholebody.methods.qp.method import QP
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
 from wholebody.motion.dips import dipping
 from wholebody.motion.faults import DEPTH, depth, faults
+from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.mending import Mender
 from wholebody.motion.windows import Window, windows
-from wholebody.problem import Problem
 from wholebody.scene import Scene
-from wholebody.tasks import Posture
-from wholebody.tasks.base import Bound, Constraint, Goal
 from wholebody.workspace import Workspace
 
 MARGIN = 0.3  # s, before and after a collision: in which the pass begins and ends at the original posture
-BACK = 1e-4  # rad, m: a posture this near to the original one is the original one
-MOST = 3  # steps of one frame; more = nearer to the original where much is in the way, dearer frames
 ROOM = 5e-4  # m: more room that the frames beside a dip are first asked for; it doubles from round to round
 LIFTS = 3  # rounds of asking for more
-STEP = 1e-3  # rad, m: a step no longer than this ends a frame
-
-
-class Follower:
-    """Follows the original motion frame by frame.
-
-    Attributes:
-        programs: how many quadratic programs were solved.
-    """
-
-    def __init__(self, terms: FrameTerms, clearance: float) -> None:
-        """Set up on a scene.
-
-        Args:
-            terms: original postures, and what is held.
-            clearance: least distance of every pair, metres.
-        """
-        self._terms, self._clearance, self.programs = terms, clearance, 0
-        q = terms.scene.figure.clamp(terms.q[0])
-        self._problem = Problem(terms.scene, q, goals=[Posture(terms.q[0])], measures=(), clearance=0.0)
-        bounds = [term.resolve(terms.scene, q) for term in terms.given if isinstance(term, Bound)]
-        still = [bound for bound in bounds if np.isfinite(bound.bounds(State(terms.scene.model), None)).any()]
-        self._problem.bounds = tuple(still)
-        self._tracker = QP(restarts=0).tracker(self._problem, terms.dt)
-        self._state = State(terms.scene.model)
-
-    def _still(self, number: int) -> tuple[Array, Array]:
-        """Least and greatest deviation (nv,) of a frame."""
-        low, high, _, _ = self._terms.bounds(number, self._state)
-        return low, high
-
-    def frame(self, number: int, q: Array, more: float = 0.0) -> Array:
-        """The posture of a frame, begun at a posture (nq,): steps until they are short.
-
-        Args:
-            number: of the frame.
-            q: (nq,) where the steps begin.
-            more: metres that are asked of every pair beyond the clearance.
-        """
-        terms, problem = self._terms, self._problem
-        problem.clearances = np.full_like(problem.clearances, self._clearance + more)
-        low, high = self._still(number)
-        if (low > -np.inf).any() or (high < np.inf).any():  # what is frozen keeps to the original motion
-            model = terms.scene.model
-            away = np.asarray(pin.difference(model, terms.q[number], q))
-            q = np.asarray(pin.integrate(model, terms.q[number], np.clip(away, low, high)))
-        goal = Posture(terms.q[number]).resolve(terms.scene, problem.start)
-        held = terms.held(number)
-        problem.goals = (goal, *(term for term in held if isinstance(term, Goal)))
-        problem.constraints = tuple(term for term in held if isinstance(term, Constraint))
-        for _ in range(MOST):
-            step = self._tracker.step(q)
-            self.programs += 1
-            q = step.q
-            if np.abs(step.displacement).max(initial=0.0) <= STEP:
-                break
-        return q
 
 
 @dataclass(frozen=True)
@@ -124,7 +61,7 @@ class PerFrame:
         check_input(clip, scene, progress)
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
         q = np.array(clip.q)
-        with scene.lend() as workspace:
+        with scene.borrow() as workspace:
             _, wrong, gaps = faults(workspace, terms, q, self.clearance)
             wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
             found = windows(wrong, max(2, round(MARGIN / clip.dt)))

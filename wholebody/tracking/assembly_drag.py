@@ -46,7 +46,8 @@ class AssemblyDrag:
         Raises:
             InputError: there is no such goal.
         """
-        self.assembly, self._goal = assembly, assembly.goal_index(goal)
+        self._goal = assembly.goal_index(goal)
+        self.assembly = assembly.prepare()
 
     @property
     def q(self) -> Array:
@@ -59,7 +60,7 @@ class AssemblyDrag:
         Raises:
             InputError: the target is not one.
         """
-        began, spent = time.perf_counter(), 0
+        began, spent, collisions = time.perf_counter(), 0, tuple[Collision, ...]()
         made, goal = self.assembly, self._goal
         made.retarget(goal, target)
         error = made.goal_error(goal)
@@ -70,13 +71,13 @@ class AssemblyDrag:
                 elif np.isfinite(move):
                     continue  # the goal is nearer than that, and was tried already
                 step = made.step()
-                spent += step.iterations
+                spent, collisions = spent + step.iterations, collisions or step.collisions
                 if step.taken:
                     break
         finally:
             made.retarget(goal, target)
         left = max(made.goal_error(number) for number in range(len(made.goals)))
-        return DragFrame(made.q, left, spent, time.perf_counter() - began)
+        return DragFrame(made.q, left, spent, time.perf_counter() - began, collisions)
 
     def finish(self) -> AssemblySolution:
         """Meet the present goals with full accuracy."""

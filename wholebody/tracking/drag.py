@@ -150,7 +150,7 @@ class ProblemDrag:
         The candidates are the tracker's ways out and the postures (nq,) that were tried. A free motion is better than
         one that gets deeper first; among these the shallower end is better.
         """
-        ends = [*(self._bounded(q) for q in self.tracker.ways_out(self.q)), *tried]
+        ends = [*(self._bounded(q) for q in self.tracker.overlap_resolutions(self.q)), *tried]
         depths = [_depth(self._workspace, q) for q in ends]
         out = [
             (not self._is_free(q, 0.0), depth, number)

@@ -233,7 +233,7 @@ def frame_placements(
     """
     if moves is None:
         return {}
-    instance(moves, Mapping, what, "give {name: a placement for each frame}")  # type: ignore[type-abstract]
+    instance(moves, Mapping, what, "give {name: a placement for each frame}")
     found = {}
     for name, given in moves.items():
         known(name, scene.objects, "object", what)

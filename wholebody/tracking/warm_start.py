@@ -42,6 +42,6 @@ def warm_started(problem: Problem, tracker: Tracker, q: Array) -> Solution:
 
 def _passes_through(problem: Problem, before: Array, after: Array) -> bool:
     """Whether the motion between two postures (nq,) passes through something."""
-    with problem.lend() as workspace:
+    with problem.borrow() as workspace:
         first, last = (Placed(workspace.near(q, WITHIN), WITHIN) for q in (before, after))
         return passes_through(workspace, first, last, before, after)

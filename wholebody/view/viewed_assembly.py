@@ -20,8 +20,7 @@ class _Colored:
 class ViewedAssembly:
     """The bodies and things that an assembly has now.
 
-    A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn. Things
-    that are moved are shown where they are.
+    A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn.
     """
 
     figure = None

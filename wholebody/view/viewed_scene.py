@@ -26,10 +26,10 @@ def checked_scene(scene: Any) -> Any:
         return ViewedAssembly(scene)
     if isinstance(getattr(scene, "model", None), pin.Model) and callable(getattr(scene, "contacts", None)):
         return scene
-    if hasattr(scene, "scene"):  # a problem
-        mend = f"give the scene of the {type(scene).__name__}"
-    elif isinstance(scene, Assembly):
+    if isinstance(scene, Assembly):
         mend = "none of its bodies has a shape; give some with body(name, shape=...), or use wholebody.view.parts.Parts"
+    elif hasattr(scene, "scene"):  # a problem
+        mend = f"give the scene of the {type(scene).__name__}"
     else:
         mend = "make one with wb.Scene(figure)"
     raise InputError(f"Viewer: scene is {a(type(scene))}, not a Scene; {mend}")

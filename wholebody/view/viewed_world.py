@@ -34,8 +34,7 @@ class ViewedWorld:
         self.model, self.geometry = self._moving.model, self._moving.geometry
         self.piece_owner = self._moving.owners
         self.configuration = self._moving.configuration
-        places: dict[str, list[tuple[int, object]]] = {}
-        self._workspace = Workspace(SceneGeometry(self.model, self.geometry, tuple(self.piece_owner), places))  # type: ignore[arg-type]
+        self._workspace = Workspace(SceneGeometry(self.model, self.geometry, tuple(self.piece_owner), {}))
 
     def contacts(self, q: Array, within: float = 0.05) -> Contacts:
         """Pairs nearer than `within` metres in a configuration (nq,), nearest first."""

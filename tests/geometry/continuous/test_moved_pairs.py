@@ -22,7 +22,7 @@ def scene() -> wb.Scene:
 
 
 def placed(scene, q):
-    with scene.lend() as workspace:
+    with scene.borrow() as workspace:
         return Placed(workspace.near(q, WITHIN), WITHIN)
 
 

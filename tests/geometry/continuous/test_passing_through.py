@@ -14,7 +14,7 @@ WITHIN = 0.05
 
 
 def placed(scene, q):
-    with scene.lend() as workspace:
+    with scene.borrow() as workspace:
         return Placed(workspace.near(q, WITHIN), WITHIN)
 
 
@@ -24,13 +24,13 @@ def doubted(scene, q0, q1):
 
 def jumped(scene, q0, q1):
     before, after = placed(scene, q0), placed(scene, q1)
-    with scene.lend() as workspace:
+    with scene.borrow() as workspace:
         return passes_through(workspace, before, after, q0, q1)
 
 
 def passed_first(scene, q0, q1, overlap=2e-4):
     before, after = placed(scene, q0), placed(scene, q1)
-    with scene.lend() as workspace:
+    with scene.borrow() as workspace:
         return first_passed(workspace, before, after, q0, q1, overlap)
 
 

@@ -45,7 +45,7 @@ def test_no_proposal_before_something_is_known_or_after_forgetting():
             assert memory.propose(np.array([scale, 0.0])) is None
             memory.went(np.array([scale, 0.0]))
         assert memory.propose(np.array([0.25, 0.0])) == pytest.approx([0.5, 0.0])  # 1/4 + 1/8 + ...
-        memory.forget()
+        memory.reset()
 
 
 def test_a_proposal_is_bounded():

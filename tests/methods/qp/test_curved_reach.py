@@ -49,7 +49,7 @@ def test_a_start_whose_holds_are_far_off_comes_back_to_them(standing, seed):
     lower, upper = figure.tangent_bounds(problem.start)
     way = rng.uniform(-0.5, 0.5, len(lower)) * np.where(np.isfinite(upper - lower), upper - lower, 0.2)
     start = figure.clamp(pin.integrate(figure.model, problem.start, np.clip(way, lower, upper)))
-    with problem.lend() as workspace, Control(np.inf) as control:
+    with problem.borrow() as workspace, Control(np.inf) as control:
         reach = CurvedReach(problem, problem.lineariser(workspace), make_solver("osqp"), control)
         local = reach.through_everything(start, 1e-4, 60)
     assert local.converged
@@ -69,7 +69,7 @@ def test_the_nearest_posture_holds_what_must_hold(standing, honest):
     """A descent by second-order steps ends within the tolerance of what is held, not at a share of the goal's error."""
     goals = [wb.Point("right_index_tip", (1.6, -0.3, 1.2)), wb.Point("left_index_tip", (-0.6, 0.9, 0.5))]
     problem = wb.Problem(standing, goals=goals, constraints=FEET)
-    with problem.lend() as workspace, Control(np.inf) as control:
+    with problem.borrow() as workspace, Control(np.inf) as control:
         reach = CurvedReach(problem, problem.lineariser(workspace), make_solver("osqp"), control)
         local = reach.among_things(problem.start, 1e-5, 100)
     assert local.converged

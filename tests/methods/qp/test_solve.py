@@ -299,4 +299,4 @@ def test_a_start_whose_contacts_cancel_ends_outside(honest):
     solution = honest(problem, wb.solve(problem))
     assert solution.status == "unreachable"
     assert solution.assessment.penetration < 1e-5
-    assert solution.assessment.goal_error < 0.15  # 0.12 is the nearest place
+    assert solution.assessment.goal_error < 0.1201  # pulled back by 12 cm, and no more

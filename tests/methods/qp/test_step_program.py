@@ -22,7 +22,7 @@ from wholebody.methods.qp.step_program import (
     WORSE,
     StepProgram,
 )
-from wholebody.methods.qp.subproblem import PULL, Subproblem
+from wholebody.methods.qp.subproblem import ERROR_CLAMP, Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
 
 DT = 0.01
@@ -65,7 +65,7 @@ class Plain:
             damping = DAMPING * min(1.0, self.before[2] / error)
         for _ in range(2):
             program = self.subproblem.program(
-                at, rows, RADIUS, PULL * RADIUS, damping, shift, True, DT / SETTLING if goals else 1.0
+                at, rows, RADIUS, ERROR_CLAMP * RADIUS, damping, shift, True, DT / SETTLING if goals else 1.0
             )
             answer = self.working_set.solve(program, rows.key)
             left = float(np.linalg.norm((rows.soft @ answer.x - program.target)[:goals]))

@@ -100,7 +100,7 @@ class Loop(ABC):
         self.prepare(problem)
         assert self._built is not None
         stepper, settings = self._built[1], Settings(self.tolerance, self.iterations, STEP, DECAY)
-        with problem.lend() as workspace, Control(None, progress) as control:
+        with problem.borrow() as workspace, Control(None, progress) as control:
             stepper.begin()
             run = Iteration(problem, workspace, stepper, settings, control)
             run.go()

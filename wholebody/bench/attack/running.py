@@ -18,7 +18,8 @@ from wholebody.errors import UnknownNameError, WholebodyError
 from wholebody.files import Scratch
 from wholebody.runner import ONE_THREAD, Child, EndedError, Job, allow, run_jobs, tell
 
-DEADLINE = 60.0  # s: a case that takes longer, twice, hangs
+DEADLINE = 60.0  # s of the processor: a case that takes longer, twice, hangs
+SHARED = 10.0  # times that by the clock, where others use the processor too
 WRITING = 300.0  # s: to write a case
 WARMING = 1800.0  # s: to compile everything on a machine that has other things to do
 MEMORY = 4 << 30  # bytes: a file that asks for more is no reason to bring the machine down
@@ -43,7 +44,8 @@ def attack(cases: Iterator[Case], jobs: int, going: Callable[[], bool], deadline
     """Run cases, `jobs` at a time, and return them as they end; no more are begun once `going` says no.
 
     The libraries of a process have one thread, whose CPU time is what a call takes on an idle machine. A case that
-    takes longer than the deadline, seconds, is run once more before it counts as one that hangs.
+    takes longer than the deadline, seconds of the processor, or ten times that by the clock, is run once more before it
+    counts as one that hangs.
     """
     again: deque[Case] = deque()
     repeated: set[Case] = set()
@@ -68,7 +70,7 @@ def attack(cases: Iterator[Case], jobs: int, going: Callable[[], bool], deadline
 def _died(error: EndedError, written: Written | None, deadline: float) -> Verdict:
     when = "the case" if written else "the writing of the case"
     if error.overtime:
-        return Verdict("wrong", f"hangs: {when} had not ended after {deadline:g} s", deadline)
+        return Verdict("wrong", f"hangs: {when} had not ended after {deadline:g} s of the processor", deadline)
     return Verdict("wrong", f"the process died over {when}: {error.how}")
 
 
@@ -83,7 +85,7 @@ def _attacked(case: Case, deadline: float) -> Verdict:
     except Exception as error:
         return Verdict("wrong", f"while it was written: {_said(error)}")
     tell(prepared)
-    allow(deadline)
+    allow(SHARED * deadline, deadline)
     return run(prepared)
 
 

@@ -107,7 +107,7 @@ def ready(family: ProblemSet, number: int, seed: int) -> Ready:
     """Build a case; what is built at first use by whoever asks first is built here, in nobody's time."""
     compile_all()  # seconds at the first time on a machine, more than the quick comparison gives a solve
     case = family.make(number, seed)
-    with case.problem.lend():  # room that the solves below use again
+    with case.problem.borrow():  # room that the solves below use again
         pass
     assess(case.problem, case.problem.start)
     return Ready(case, assess(case.problem, case.witness).measure)

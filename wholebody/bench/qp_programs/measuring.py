@@ -15,8 +15,8 @@ from wholebody.arrays import Array
 from wholebody.bench.qp_programs.recording import Recorded
 from wholebody.bench.report import render
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.active_set_solver import ActiveSetSolver
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
+from wholebody.methods.qp.solvers.osqp_solver import ActiveSetSolver
 from wholebody.methods.qp.solvers.registry import make_solver
 
 RESAMPLES = 1000  # bootstrap: medians of as many draws with replacement

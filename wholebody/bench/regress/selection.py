@@ -108,7 +108,7 @@ def _solves(what: str, problem: Problem) -> Iterator[tuple[str, Callable[[], Cou
 
 def _solve(method: Method, problem: Problem) -> Counted:
     wb.assess(problem, problem.start)
-    with problem.lend():
+    with problem.borrow():
         pass  # the room for a judgement and for a run is there, so that making it is not counted
     with counting() as counts:
         solution = method.solve(problem)

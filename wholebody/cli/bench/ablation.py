@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     count = 1 if arguments.quick else arguments.count
     check_count(count, "--count")
-    given = ablation.problems(count)
+    given = ablation.problems(count, arguments.method)
     named = ablation.mechanisms(arguments.method)
     whole, rows = ablation.ablation(arguments.method, given, named, print)
     write_rows(arguments.out / f"ablation-{arguments.method}.csv", machine(), rows)

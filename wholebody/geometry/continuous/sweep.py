@@ -115,7 +115,7 @@ class Sweep:
         index = np.arange(len(self._pairs)) if pairs is None else self._indices(pairs)
         if not len(index):
             return None
-        self._guesses.forget()  # the same motion has the same answer, whatever was swept before
+        self._guesses.reset()  # the same motion has the same answer, whatever was swept before
         velocity = np.asarray(pin.difference(self.model, q0, q1))
         self._place(q0, velocity)
         centers = np.array([place.translation for place in self._results.oMg])

@@ -74,7 +74,7 @@ class SweptDepth:
     def start(self, q: Array) -> Depths:
         """Look at the first posture (nq,) of a sequence; what was looked at before is forgotten."""
         for place in (self._before, self._now, self._middle):
-            place.guesses.forget()
+            place.guesses.reset()
         self._now.move(q)
         self._q = q
         return self._look(np.full(len(self._table.pairs), -np.inf), np.zeros(len(self._table.pairs)))[0]

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array, Indices
 from wholebody.compiled import compiled
+from wholebody.geometry.proximity_kernel import bound_by_boxes, outer_gap
 
 
 @compiled()
@@ -30,23 +31,12 @@ def screen(
     Returns:
         How many pairs there are.
     """
-    for i in range(len(reach)):
-        for k in range(3):
-            total = 0.0
-            for j in range(3):
-                total += abs(place[i, j, k]) * half[i, j]
-            extent[i, k] = total
+    bound_by_boxes(place, half, extent)
     count = 0
     for p in range(len(pairs)):
         least = before[p] - speed[p]
         if before[p] + least - speed[p] < 0.0:
-            a, b = pairs[p, 0], pairs[p, 1]
-            square, boxes = 0.0, -np.inf
-            for k in range(3):
-                apart = abs(place[a, 3, k] - place[b, 3, k])
-                square += apart * apart
-                boxes = max(boxes, apart - extent[a, k] - extent[b, k])
-            least = max(least, max(boxes, np.sqrt(square) - reach[a] - reach[b]))
+            least = max(least, outer_gap(place, reach, extent, pairs[p, 0], pairs[p, 1]))
             if before[p] + least - speed[p] < 0.0:
                 index[count] = p
                 count += 1

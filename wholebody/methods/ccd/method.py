@@ -114,7 +114,7 @@ class CCD:
         """
         check_problem(problem, "CCD.solve: problem")
         began = time.perf_counter()
-        with problem.lend() as workspace, Control(self.time_limit, progress) as control:
+        with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
             search = _Search(self, problem, workspace, control)
             best = search.run()
         turns = len(search.trace)
@@ -148,7 +148,7 @@ class CCD:
         """
         check_problem(problem, "CCD.pushed_out: problem")
         q = posture(q, problem.scene.model.nq)
-        with problem.lend() as workspace:
+        with problem.borrow() as workspace:
             return _Search(self, problem, workspace, Control(np.inf)).pushed_out(q)
 
 
@@ -159,7 +159,7 @@ class _CCDTracker(SolvingTracker):
         super().__init__(method, problem, dt, rough)
         self._ccd = method
 
-    def ways_out(self, q: Array) -> Sequence[Array]:
+    def overlap_resolutions(self, q: Array) -> Sequence[Array]:
         """The result of overlap resolution at the posture q (nq,)."""
         return (self._ccd.pushed_out(self.problem, q),)
 

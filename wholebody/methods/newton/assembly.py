@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.arrays import Array
-from wholebody.checks import choice, flag, known, number, whole
+from wholebody.checks import choice, flag, known, number, shown, whole
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.geometry.placement import PlacementLike
@@ -21,6 +21,7 @@ from wholebody.methods.newton.assembly_joints import AssemblyJoints
 from wholebody.methods.newton.assembly_solution import AssemblySolution, solved
 from wholebody.methods.newton.assembly_system import AssemblySystem
 from wholebody.methods.newton.batches import Batch, Key
+from wholebody.methods.newton.contacts import LEAVE
 from wholebody.methods.newton.equations import EquationSet, unit_lengths
 from wholebody.methods.newton.feasibility import reach
 from wholebody.methods.newton.inequalities import KINDS, Kind
@@ -29,6 +30,7 @@ from wholebody.methods.newton.linear_algebra.choice import NAMES
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.patterns import Patterns
 from wholebody.methods.newton.system import System
+from wholebody.moving_things import Collision, FrameMotion
 from wholebody.pool import OneAtATime
 from wholebody.tasks.inputs import point
 
@@ -72,6 +74,7 @@ class AssemblyStep(NamedTuple):
         iterations: Newton iterations.
         systems: linear systems solved.
         taken: whether the bodies moved there.
+        collisions: what things that move passed through, or are inside of; empty if nothing.
     """
 
     goal_error: float
@@ -79,6 +82,7 @@ class AssemblyStep(NamedTuple):
     iterations: int
     systems: int
     taken: bool
+    collisions: tuple[Collision, ...] = ()
 
 
 class Assembly(AssemblyJoints):
@@ -131,7 +135,7 @@ class Assembly(AssemblyJoints):
 
     def point_goal(self, body: str, target: ArrayLike, *, place: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
         """Move a point of a body, (3,) in its frame, to a position in the world (3,), if possible."""
-        what = f"the goal of {body!r}"
+        what = f"the goal of {shown(body)}"
         index, local = self._moved(body, what)
         offset = local * pin.SE3(np.eye(3), point(place, f"{what}: place"))
         self._goals.append(AssemblyGoal(what, index, offset, to_target(target, False, what), whole=False))
@@ -139,7 +143,7 @@ class Assembly(AssemblyJoints):
 
     def frame_goal(self, body: str, target: PlacementLike) -> Self:
         """Move a body to a placement in the world, if possible."""
-        what = f"the goal of {body!r}"
+        what = f"the goal of {shown(body)}"
         index, local = self._moved(body, what)
         self._goals.append(AssemblyGoal(what, index, local, to_target(target, True, what), whole=True))
         return self
@@ -159,7 +163,8 @@ class Assembly(AssemblyJoints):
         Raises:
             InputError: there is no such goal, or the target is not one.
         """
-        self._goals[self.goal_index(goal)] = self._goals[goal].moved(target)
+        index = self.goal_index(goal)
+        self._goals[index] = self._goals[index].moved(target)
         return self
 
     def goal_index(self, goal: int) -> int:
@@ -243,10 +248,16 @@ class Assembly(AssemblyJoints):
             x, solution = solved(
                 self.bodies, active, start,
                 tolerance=tolerance, iterations=iterations, kind=inequalities,
-                nearest=prepared.nearest() if nearest else None, scene=self._solid_scene(), to_scene=self.to_scene,
+                nearest=prepared.nearest() if nearest else None, scene=self._solid_scene(), to_scene=self._to_scene,
             )  # fmt: skip
             self._places = list(x.reshape(-1, 7))
             return solution
+
+    def prepare(self) -> Self:
+        """Lay the equations out now rather than in the first solve; things are seen to move from here."""
+        with self._alone:
+            self._ready(None)
+        return self
 
     def step(self, tolerance: float = FRAME_TOLERANCE) -> AssemblyStep:
         """One frame of a drag: the least motion towards the present goals, in a few iterations.
@@ -264,21 +275,49 @@ class Assembly(AssemblyJoints):
         with self._alone:
             active = self._ready(None).active
             start = active.begin(self.variables(), self._goal_batches())
-            before = active.system.residual(start)
-            wrong = np.where(active.system.inequality, np.minimum(before, 0.0), before)[~active.system.goal]
-            found = reach(
-                active, start, tolerance=HARD_TOLERANCE, goal_tolerance=tolerance, iterations=FRAME_ITERATIONS,
-                early_exit=True,
-            )  # fmt: skip
-            holds = found.hard <= max(10.0 * HARD_TOLERANCE, float(np.abs(wrong).max(initial=0.0)))
-            taken = holds and (active.contacts is None or self._is_free(active, start, found.x))
-            if taken:
-                self._places = list(found.x.reshape(-1, 7))
-            return AssemblyStep(found.goal, found.hard, found.iterations, found.systems, taken)
+            motion = None if active.contacts is None else active.workspace.next_frame()
+            if motion is None:
+                return self._newton_frame(active, start, tolerance)
+            return self._among_moving(active, start, tolerance, motion)
+
+    def _newton_frame(self, active: AssemblySystem, start: Array, tolerance: float) -> AssemblyStep:
+        """A few Newton steps from the variables `start` (7 n,) of a system that begun there."""
+        before = active.system.residual(start)
+        wrong = np.where(active.system.inequality, np.minimum(before, 0.0), before)[~active.system.goal]
+        found = reach(
+            active, start, tolerance=HARD_TOLERANCE, goal_tolerance=tolerance, iterations=FRAME_ITERATIONS,
+            early_exit=True,
+        )  # fmt: skip
+        holds = found.hard <= max(10.0 * HARD_TOLERANCE, float(np.abs(wrong).max(initial=0.0)))
+        taken = holds and (active.contacts is None or self._is_free(active, start, found.x))
+        if taken:
+            self._places = list(found.x.reshape(-1, 7))
+        return AssemblyStep(found.goal, found.hard, found.iterations, found.systems, taken)
+
+    def _among_moving(
+        self, active: AssemblySystem, x: Array, tolerance: float, motion: FrameMotion
+    ) -> AssemblyStep:  # fmt: skip
+        """A frame in which things move: in shares, at the ends of which no thing is deep in a body."""
+        workspace, path = active.workspace, [(0.0, self._to_scene(x))]
+        steps: list[AssemblyStep] = []
+        while path[-1][0] < 1.0:
+            share, q = path[-1]
+            workspace.place(motion.placements(share))
+            share = motion.next_share(share, workspace.near(q, LEAVE), LEAVE)
+            workspace.place(motion.placements(share))
+            x = active.begin(self.variables(), self._goal_batches())
+            steps.append(self._newton_frame(active, x, tolerance))
+            path.append((share, self.q))
+        collisions = motion.collisions(path)
+        workspace.keep(motion, collisions)
+        counts = [(step.iterations, step.systems) for step in steps]
+        iterations, systems = (sum(column) for column in zip(*counts, strict=True))
+        taken = any(step.taken for step in steps)
+        return AssemblyStep(steps[-1].goal_error, steps[-1].joint_error, iterations, systems, taken, collisions)
 
     def _is_free(self, active: AssemblySystem, before: Array, after: Array) -> bool:
         """Whether the motion of a frame passes through nothing."""
-        return is_free(active.workspace, self.to_scene(before), self.to_scene(after), SHORT)
+        return is_free(active.workspace, self._to_scene(before), self._to_scene(after), SHORT)
 
     def _ready(self, algebra: str | None) -> _Prepared:
         """The equations as they stand; None for the factorisation of the last solve."""
@@ -287,7 +326,7 @@ class Assembly(AssemblyJoints):
         if found is None or (found.algebra, found.revision) != (name, self.revision):
             held, count, weight = self._held(), len(self._places), self._weight()
             active = AssemblySystem(
-                held, list(self._figures.values()), self._solid_scene(), self.to_scene, self.clearance,
+                held, list(self._figures.values()), self._solid_scene(), self._to_scene, self.clearance,
                 Patterns(count, weight, name),
             )  # fmt: skip
             self._analysed = self.structures

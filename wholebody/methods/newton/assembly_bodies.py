@@ -193,9 +193,9 @@ class AssemblyBodies:
     @property
     def q(self) -> Array:
         """(nq,) the present posture of `scene`: seven numbers for each body, and the posture of each figure."""
-        return self.to_scene(self.variables())
+        return self._to_scene(self.variables())
 
-    def to_scene(self, variables: Array) -> Array:
+    def _to_scene(self, variables: Array) -> Array:
         """The posture (nq,) of `scene` at variables (7 n,); the same numbers if there are no figures."""
         if not self._figures:
             return variables
@@ -257,15 +257,21 @@ class AssemblyBodies:
                 self.add(thing.shape, name=thing.name, at=thing.placement, color=thing.color)
         return self
 
-    def move(self, name: str, *, at: PlacementLike) -> Self:
+    def move(self, name: str, *, at: PlacementLike, over: float | None = None) -> Self:
         """Move a thing; the next solve sees it there, and nothing is analysed anew.
+
+        Args:
+            name: of the thing.
+            at: its new placement.
+            over: seconds that the motion takes: in the next frame of a drag it goes there from where it is, and pushes
+                bodies or collides with them; None for a thing that is put there, whatever is in between.
 
         Raises:
             UnknownNameError: there is no such thing.
-            InputError: the placement cannot be read.
+            InputError: the placement cannot be read, or the time is not positive and finite.
         """
         known(name, self._things, "thing")
-        self.scene.move(name, at=at)
+        self.scene.move(name, at=at, over=over)
         self._things[name] = self.scene.objects[name]
         return self
 

@@ -107,7 +107,7 @@ def solved(
         message = f"{why.get(status, 'ran out of iterations')}: {left}"
     least = np.inf
     if scene is not None:
-        with scene.built.pool(AllPairs, lambda: AllPairs(scene.built)).lend() as pairs:
+        with scene.built.pool(AllPairs, lambda: AllPairs(scene.built)).borrow() as pairs:
             pairs.move(to_scene(x))
             least = pairs.least
     path = active_system.path

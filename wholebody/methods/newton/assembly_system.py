@@ -8,6 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.geometry.memory_views import placement_view
+from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.assembly_figure import AssemblyFigure
 from wholebody.methods.newton.batches import Batch, Key
 from wholebody.methods.newton.contacts import LONGEST, ContactSet
@@ -51,7 +53,8 @@ class AssemblySystem(ActiveSystem):
         self.contacts: ContactSet | None = None
         if scene is not None and len(scene.pair_table.pairs):
             self.workspace = scene.workspace()
-            self._data = self.workspace.model.createData()
+            self._data = pin.Data()  # without the tensors of a model's data, which grow with the cube of its freedoms
+            self._data.oMi.extend([pin.SE3.Identity()] * self.workspace.model.njoints)
             self.contacts = ContactSet(np.full(len(scene.pair_table.pairs), clearance), self.workspace)
             self.longest = LONGEST
         self._laid: Hashable = None
@@ -80,10 +83,21 @@ class AssemblySystem(ActiveSystem):
             figure.retract(x)
         if self.contacts is not None:
             self.q = self._to_scene(x)
-            pin.forwardKinematics(self.workspace.model, self._data, self.q)
+            self._place(x)
             self.contacts.measure(self._data)
         self._here = x
         return x
+
+    def _place(self, x: Array) -> None:
+        """Write the placements of the bodies at x (7 n,) into the data."""
+        bodies, joints = x.reshape(-1, 7), placement_view(self._data.oMi)
+        if joints is None:
+            for number, body in enumerate(bodies):
+                self._data.oMi[number + 1] = pin.XYZQUATToSE3(body)
+            return
+        joints[1:, 3] = bodies[:, :3]
+        for axis, unit_vector in enumerate(np.eye(3)):
+            joints[1:, axis] = quat.rotate(bodies[:, 3:], np.broadcast_to(unit_vector, (len(bodies), 3)))
 
     def runs_into(self) -> bool:
         """Whether a pair that is no inequality overlaps at the result of the last `retract`."""

@@ -31,7 +31,7 @@ FAR = 0.05  # m or rad: goal error from which that is tested; nearer, the measur
 ENOUGH = 1.0  # largest damping
 DAMPING_UP, DAMPING_DOWN = 8.0, 0.1
 HARD_SHARE = 1e-6  # of the squared damping applies to constraints, for conflicts among them
-PULL = 0.3  # m or rad: largest reduction of a goal's error in a step; larger = fewer steps, more of them fail
+ERROR_CLAMP = 0.3  # m or rad: largest reduction of a goal's error in a step; larger = fewer steps, more of them fail
 LARGEST_TURN = (
     0.35  # change of Euler parameters in a step, twice that in radians; beyond it the linearisation is useless
 )
@@ -105,7 +105,7 @@ class Iteration:
             measures: minimised, kept from growing, or ignored.
             early_exit: end at the first step that gains little, as in a frame whose goal lies inside something.
         """
-        damping, share, pull, stagnant = self.least_damping, 1.0, PULL, 0
+        damping, share, clamp, stagnant = self.least_damping, 1.0, ERROR_CLAMP, 0
         self.stationary = False
         least = sum(self._norms(self.residual))
         refused = 0
@@ -120,12 +120,12 @@ class Iteration:
             try:
                 restore = not goals or (self.goal > self.goal_tolerance and before[0] > RESTORE_ABOVE * funnel)
                 step = self.step(
-                    damping, share, 0.0 if restore else min(1.0, pull / max(self.goal, 1e-300)), goals, measures
+                    damping, share, 0.0 if restore else min(1.0, clamp / max(self.goal, 1e-300)), goals, measures
                 )
-                asked = before[0] + min(pull, self.goal) if self.goal > FAR and not restore else np.inf
+                asked = before[0] + min(clamp, self.goal) if self.goal > FAR and not restore else np.inf
                 while self._motion(step) > AMPLIFIED * asked and damping < ENOUGH:
                     damping = max(FIRST_DAMPING, damping * DAMPING_UP)
-                    step = self.step(damping, share, min(1.0, pull / max(self.goal, 1e-300)), goals, measures)
+                    step = self.step(damping, share, min(1.0, clamp / max(self.goal, 1e-300)), goals, measures)
             except SingularSystemError:
                 step = np.zeros_like(self.x)
             length = self.length(step)
@@ -150,7 +150,7 @@ class Iteration:
                 if early_exit and stagnant > STALLED:
                     return
                 damping = max(FIRST_DAMPING, damping * DAMPING_UP)
-                share, pull = max(0.5 * share, 0.05), max(0.5 * pull, 1e-3)
+                share, clamp = max(0.5 * share, 0.05), max(0.5 * clamp, 1e-3)
                 continue
             if restore and after[1] >= before[1]:
                 funnel = max(NARROW * funnel, self.tolerance)
@@ -163,7 +163,7 @@ class Iteration:
                 damping = max(damping * DAMPING_DOWN if damping > FIRST_DAMPING else 0.0, self.least_damping)
             elif gain > self.goal_tolerance and before[1] - after[1] < POOR * gain:
                 damping = max(FIRST_DAMPING, damping * DAMPING_UP)
-            share, pull = min(1.0, 2.0 * share), min(PULL, 2.0 * pull)
+            share, clamp = min(1.0, 2.0 * share), min(ERROR_CLAMP, 2.0 * clamp)
             if stagnant >= PATIENCE:
                 self.stationary = True
                 return
@@ -196,22 +196,22 @@ class Iteration:
         self.residuals.append(max(self.hard, self.goal))
 
     def step(
-        self, damping: float, share: float, pull: float, goals: bool, measures: Measures, proximity: float = 1.0
+        self, damping: float, share: float, goal_share: float, goals: bool, measures: Measures, proximity: float = 1.0
     ) -> Array:
         """The step of one iteration; the active set changes until the linear solution agrees with it.
 
         Args:
             damping: of the goals; its square applies to constraints.
             share: of the constraints' errors that the step corrects.
-            pull: share of the goals' errors that the step corrects.
+            goal_share: share of the goals' errors that the step corrects.
             goals: whether goals are pursued at all.
             measures: minimised, kept from growing, or ignored.
             proximity: factor of the least motion, against the measures.
         """
         asked = self.residual * share
-        asked[self.goal_rows] = self.residual[self.goal_rows] * min(pull, share)
+        asked[self.goal_rows] = self.residual[self.goal_rows] * min(goal_share, share)
         diagonal = np.full(len(asked), HARD_DAMPING + HARD_SHARE * damping * damping)
-        softness = (GOAL_DAMPING if pull else RESTORING_DAMPING) + damping if goals else FREE
+        softness = (GOAL_DAMPING if goal_share else RESTORING_DAMPING) + damping if goals else FREE
         diagonal[self.goal_rows] = softness / self.system.share[self.goal_rows] ** 2
         asked[self.objective] = 0.0
         if measures == "lower":

@@ -70,7 +70,7 @@ class Newton:
     def accepts(self, problem: Problem) -> str | None:
         """None if all terms and joints have equations here; otherwise the sentence that names the others."""
         check_problem(problem, "Newton.accepts: problem")
-        with problem.lend() as workspace:
+        with problem.borrow() as workspace:
             try:
                 state_equations(problem, workspace.state)
             except UnsupportedTermError as error:
@@ -89,7 +89,7 @@ class Newton:
         """
         check_problem(problem, "Newton.solve: problem")
         began = time.perf_counter()
-        with problem.lend() as workspace, Control(self.time_limit, progress) as control:
+        with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
             active_system = FigureSystem(problem, workspace, self.algebra)
             active_system.control = control
             search = Search(active_system, self.settings)

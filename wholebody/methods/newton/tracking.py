@@ -131,7 +131,7 @@ class NewtonTracker:
         """The method's answer from q (nq,), with measures relative to q."""
         return self._method.solve(nearest_to(self.problem, q))
 
-    def ways_out(self, q: Array) -> Sequence[Array]:
+    def overlap_resolutions(self, q: Array) -> Sequence[Array]:
         """No postures: the steps lead out."""
         posture(q, self.workspace.model.nq)
         return ()

@@ -74,7 +74,7 @@ class Placo:
             MissingPackageError: placo is not installed.
         """
         check_problem(problem, "Placo.prepare: problem")
-        with problem.lend() as workspace, problem.scene.built.pool(_Room, _Room).lend() as room:
+        with problem.borrow() as workspace, problem.scene.built.pool(_Room, _Room).borrow() as room:
             room.robot(problem, workspace)
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
@@ -91,8 +91,8 @@ class Placo:
         check_problem(problem, "Placo.solve: problem")
         began = time.perf_counter()
         with (
-            problem.lend() as workspace,
-            problem.scene.built.pool(_Room, _Room).lend() as room,
+            problem.borrow() as workspace,
+            problem.scene.built.pool(_Room, _Room).borrow() as room,
             Control(self.time_limit, progress) as control,
         ):
             stepper = _Programs(problem, room.robot(problem, workspace), self.tolerance)

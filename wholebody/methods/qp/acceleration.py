@@ -22,9 +22,9 @@ class Anderson:
 
     def __init__(self) -> None:
         """Begin with nothing remembered."""
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Begin anew: after a rejected step, or when other constraints are at work."""
         self._steps: list[Array] = []
         self._ways: list[Array] = []

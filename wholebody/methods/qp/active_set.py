@@ -67,7 +67,7 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
         program.elastic_weight, program.lower, program.upper,
     )  # fmt: skip
     elastic = len(program.least)
-    settled = kernel.settle(
+    settled = kernel.primal_dual_active_set(
         *map(np.ascontiguousarray, parts), np.arange(elastic), *active, corrections, FULL_CORRECTIONS, BOUND_TOLERANCE,
         ROW_TOLERANCE, np.empty(kernel.work_size(program.size, len(program.target), elastic)),
         np.empty(elastic, dtype=np.intp), x,
@@ -84,7 +84,7 @@ def compiled_kernel() -> Any:
     program = (one, one, np.zeros((0, 1)), none, none, np.zeros((0, 1)), none, none, -one, one)
     index, row = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=bool)
     work = np.empty(active_set_kernel.work_size(1, 0, 0))
-    active_set_kernel.settle(
+    active_set_kernel.primal_dual_active_set(
         *program, index, mask, mask.copy(), row, 1, 1, BOUND_TOLERANCE, ROW_TOLERANCE, work, index, np.zeros(1)
     )
     active_set_kernel.solve_growing(

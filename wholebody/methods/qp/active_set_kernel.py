@@ -55,7 +55,7 @@ def solve_growing(
                 chosen[j] = True
                 places[count] = j
                 count += 1
-        settled = settle(
+        settled = primal_dual_active_set(
             diagonal, linear, rows, target, weight, elastic, least, elastic_weight, lower, upper, places[:count],
             at_lower, at_upper, pushing, int(limits[2]), int(limits[3]), limits[4], limits[5], work, places[k:], x,
         )  # fmt: skip
@@ -82,13 +82,13 @@ def _contains(sorted_keys: Indices, key: int) -> bool:
 
 @compiled()
 def work_size(variables: int, soft: int, elastic: int) -> int:
-    """Floats that `settle` needs for a program of so many variables, soft rows and elastic rows."""
+    """Floats that `primal_dual_active_set` needs for a program of so many variables, soft rows and elastic rows."""
     rows = soft + elastic
     return 2 * rows * variables + rows * rows + 3 * rows + elastic + 3 * variables
 
 
 @compiled(error_model="numpy")
-def settle(
+def primal_dual_active_set(
     diagonal: Array,
     linear: Array,
     rows: Array,

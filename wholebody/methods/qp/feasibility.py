@@ -106,7 +106,7 @@ class Feasibility:
                     return _end(here, True, count)
                 here, history, box = self._iterate_at(q), [], STEP
                 last = np.zeros_like(step)
-                working_set.forget()
+                working_set.reset()
                 self._record(here, 2.0 * np.pi, "turned on")
                 continue
             box = max(SHORTER * box, LEAST_STEP) if float(step @ last) < 0.0 else min(LONGER * box, STEP)

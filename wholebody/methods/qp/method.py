@@ -96,7 +96,7 @@ class QP:
         check_problem(problem, "QP.solve: problem")
         began = time.perf_counter()
         settings = Settings(self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures)
-        with problem.lend() as workspace, Control(self.time_limit, progress) as control:
+        with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
             search = Search(problem, workspace, self._qp_solver(), settings, control)
             best = search.run()
         ending = Ending(

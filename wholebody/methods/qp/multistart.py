@@ -12,6 +12,7 @@ from wholebody.arrays import Array
 from wholebody.linearisation import Lineariser
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
+from wholebody.methods.qp.cancelling import parted
 from wholebody.methods.qp.curved_reach import CurvedReach
 from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.solvers.base import QPSolver
@@ -111,6 +112,7 @@ class Search:
         self._least = least
         if self._proven():
             return
+        self._leave_cancelling()
         rng = np.random.default_rng(self.settings.seed)
         count = min(self.settings.restarts, INSIDE_PROBES) if least else self.settings.restarts
         starts = chain([start], self._through, restarts(self.problem, self.lineariser.state, start, rng, count))
@@ -126,6 +128,14 @@ class Search:
             return local
         self._accept(local, "by feasibility first")
         return self._descend(local.q)
+
+    def _leave_cancelling(self) -> None:
+        """Where contacts hold the best posture inside of something and cancel, come near from where it is left."""
+        if _held(self.best, self.settings.tolerance):
+            return
+        q = parted(self.problem, self.lineariser.workspace, self.best.q)
+        if q is not None:
+            self._accept(self._probe(q, 0.0), "from where contacts that cancel are left")
 
     def _relaxed_probes(self, starts: Iterator[Array]) -> Iterator[tuple[LocalSolution, str]]:
         """Relaxed probes from the start and from seeded postures, and a descent from where one reaches the goals.

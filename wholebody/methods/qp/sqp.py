@@ -24,7 +24,7 @@ from wholebody.methods.qp.acceleration import Anderson
 from wholebody.methods.qp.funnel import Funnel, PredictedReduction, StepAcceptance
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import PULL, Rows, Subproblem, Violation
+from wholebody.methods.qp.subproblem import ERROR_CLAMP, Rows, Subproblem, Violation
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.solution import TraceEntry
 
@@ -167,7 +167,7 @@ class SQP:
                         break
                     if self._measures:
                         self._measures, history = False, []
-                        self._memory.forget()
+                        self._memory.reset()
                 elif self.measures and not self._measures and here.violation.worst <= 10.0 * self.tolerance:
                     self._measures = True
             elif self._anchor is not None:
@@ -197,7 +197,7 @@ class SQP:
 
     @property
     def _pull(self) -> float:
-        return PULL * self._radius * self._stretch
+        return ERROR_CLAMP * self._radius * self._stretch
 
     def _settled(self, here: Iterate, answer: QPSolution, predicted: PredictedReduction) -> bool:
         """Whether nothing worth having is foreseen."""
@@ -235,7 +235,7 @@ class SQP:
         step = float(np.abs(dq).max(initial=0.0))
         if promising:
             self._anchor = here
-            self._memory.forget()
+            self._memory.reset()
             self._shift = np.zeros_like(self._shift)
             return there
         if not acceptance.accepted and self._full_step:
@@ -247,19 +247,19 @@ class SQP:
             self._radius = 0.3 * min(step, self._radius)
             self._damping = max(0.3, 2.0 * self._damping) if acceptance.by != "rejected measure" else self._damping
             self._shift = np.zeros_like(self._shift)
-            self._memory.forget()
+            self._memory.reset()
             return None
         if self._full_step and there.violation.total > (1.0 - FULL_STEP_GAIN) * here.violation.total:
             self._full_step, self._damping = False, 0.0
         if acceptance.by == "goal":
-            self._memory.forget()
+            self._memory.reset()
             self._funnel.narrow(here.violation.total, there.violation.total)
         if not self._full_step and here.violation.left > self._pull and step < 0.25 * self._radius:
             self._stretch *= 2.0
         if acceptance.good:
             if not self._full_step:
                 self._damping *= 0.3
-            if step > 0.5 * self._radius or here.violation.left > PULL * self._radius:
+            if step > 0.5 * self._radius or here.violation.left > ERROR_CLAMP * self._radius:
                 self._radius = min(2.0 * self._radius, LARGEST_RADIUS)
         elif acceptance.poor:
             self._radius = 0.5 * self._radius
@@ -288,7 +288,7 @@ class SQP:
         return passes_through(self.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
 
     def _iterate_at(self, q: Array) -> Iterate:
-        within = min(max(LEAST_WITHIN, PULL * self._radius), MOST_WITHIN)
+        within = min(max(LEAST_WITHIN, ERROR_CLAMP * self._radius), MOST_WITHIN)
         at = self.lineariser.at(q, within)
         rows = self.subproblem.rows(at)
         if self.offset is not None:

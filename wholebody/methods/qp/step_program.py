@@ -18,12 +18,12 @@ from wholebody.methods.qp.solvers.base import ACTIVE_SET
 from wholebody.methods.qp.subproblem import (
     BOX,
     ELASTIC_WEIGHT,
+    ERROR_CLAMP,
     FORCE,
     LEAST_CURVATURE,
     LEVER,
     MOST_ROWS,
     PROXIMAL_SHARE,
-    PULL,
     Rows,
     Subproblem,
 )
@@ -222,7 +222,17 @@ def numbers_of(scale: float, gain: float) -> Array:
         What `subproblem_kernel.program` takes (10), damping, what counts
         as rest, weight of elastic rows, most rows of a contact, force of goals (4), limits of the working set.
     """
-    program = (scale, LEAST_CURVATURE, PROXIMAL_SHARE, RADIUS, PULL * RADIUS, 0.0, LEVER, BOX * RADIUS, PULL * RADIUS)
+    program = (
+        scale,
+        LEAST_CURVATURE,
+        PROXIMAL_SHARE,
+        RADIUS,
+        ERROR_CLAMP * RADIUS,
+        0.0,
+        LEVER,
+        BOX * RADIUS,
+        ERROR_CLAMP * RADIUS,
+    )
     own = (gain, DAMPING, RESTING, ELASTIC_WEIGHT, MOST_ROWS)
     return np.array([*program, *own, *FORCE, *LIMITS])
 

@@ -24,7 +24,7 @@ GOAL_FORCE = 1e4  # 1/m: what a goal pulls with, however far it is; far above wh
 GOAL_WEIGHTS = (1e4, 1e8)  # 1/m^2, 1/rad^2: least and greatest weight of a goal row
 HOLD_WEIGHT = 1e10  # equalities give way by 1e-6 m to the pull of a goal out of reach
 ELASTIC_WEIGHT = 1e10  # and so do contacts
-PULL = 0.4  # m per rad of radius: of a goal farther away, or a deeper overlap, one step asks for this much
+ERROR_CLAMP = 0.4  # m per rad of radius: of a goal farther away, or a deeper overlap, one step asks for this much
 BOX = 2.0  # radii: the box around a step, which seldom holds it; asking for little keeps programs easy instead
 HOLD_SHARE = 3.0  # what a metre of hold counts against a metre of goal when a step is judged
 ELASTIC_SHARE = 10.0  # and a metre of overlap; above any ratio at which overlap could buy goal
@@ -204,7 +204,7 @@ class Subproblem:
         """
         numbers = np.array(
             [self.scale, LEAST_CURVATURE, PROXIMAL_SHARE, radius, 0.0 if pull is None else pull, damping, LEVER]
-            + [BOX * radius, PULL * radius, gain]
+            + [BOX * radius, ERROR_CLAMP * radius, gain]
         )
         columns = np.empty((4, len(at.gradient)))
         target, least = np.empty(len(rows.soft_error)), np.empty(len(rows.elastic_violation))

@@ -191,7 +191,7 @@ class QPTracker:
         """The same with measures that count from q, and are minimised: they say what is near."""
         return self._minimising().solve(nearest_to(self.problem, q))
 
-    def ways_out(self, q: Array) -> Sequence[Array]:
+    def overlap_resolutions(self, q: Array) -> Sequence[Array]:
         """None: the steps lead out."""
         posture(q, self.workspace.model.nq)
         return ()
@@ -357,7 +357,7 @@ class QPTracker:
             anew = moved and self._signatures() != self._goals
         if anew:
             self._set_up()
-            self._working_set.forget()
+            self._working_set.reset()
 
     def _signatures(self) -> list[tuple[type, float, int]]:
         """What programs are set up from: kind, weight and number of rows of each goal."""

@@ -31,7 +31,7 @@ class WorkingSet:
         self.solver = solver
         self._kernel = compiled_kernel()
         self._work, self._places = np.empty(0), np.empty(0, dtype=np.intp)
-        self.forget()
+        self.reset()
 
     def solve(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
         """Solve a program by growing its set of elastic rows until no other row is violated.
@@ -48,7 +48,7 @@ class WorkingSet:
                 return answer
         return self._round_by_round(program, key)
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Drop the guess."""
         self.held: Mask | None = None
         self.pushing = np.zeros(0, dtype=np.intp)

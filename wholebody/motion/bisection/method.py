@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
-from wholebody.motion.bisection.gaps import hold_between
+from wholebody.motion.bisection.holds import hold_between
 from wholebody.motion.bisection.interpolation import Kind
 from wholebody.motion.bisection.key_frames import key_frames
 from wholebody.motion.bisection.path_planes import ANKLES, ELBOWS
@@ -21,9 +21,10 @@ from wholebody.motion.bisection.prediction import Predictor
 from wholebody.motion.bisection.recursion import Recursion, changed_frames
 from wholebody.motion.bisection.stays import Stays
 from wholebody.motion.clip import Clip
-from wholebody.motion.frame_terms import Given, frame_terms
+from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.mending import Mender
 from wholebody.scene import Scene
+from wholebody.tasks import Freeze
 
 OVERLAP = 5e-5
 """Depth up to which a frame is free, and by which a gap may be deeper, metres: together the 0.1 mm of `wb.check`."""
@@ -44,7 +45,7 @@ class Bisection:
 
     Frames that overlap make groups. The middle frame of a group gets the posture of least effort from the original one
     that is free; the others of the group are interpolated; then both halves are looked at again. What still dips
-    between two frames gets larger margins. The postures outside of the groups and their buffers stay as they are.
+    between two frames gets rows of contact there. Postures outside of the groups and their buffers stay as they are.
 
     Attributes:
         evaluation: frames that characterise the motion. They are corrected first and never interpolated; so are the
@@ -123,14 +124,14 @@ class Bisection:
             figure.frame_id(joint)
         stays = Stays(scene, original, terms, frozen)
         method = method_for_motions(self.method)
-        with scene.lend() as workspace:
+        with scene.borrow() as workspace:
             predictor = Predictor(scene, original, terms, frozen, method, self.clearance, OVERLAP, workspace)
             recursion = Recursion(
                 scene, predictor, stays, joints, self.buffer / 100.0, self.least, self.interpolation, watch
             )
             recursion.run(self._points(figure, original, frozen))
             missed = hold_between(recursion, predictor, changed_frames(original, recursion.q), watch)
-            mender = Mender(terms, workspace, frozen=figure.dofs(frozen))
+            mender = Mender(_with_frozen(terms, frozen), workspace)
             q = mender.mend(recursion.q, watch)
             for frame in changed_frames(recursion.q, q):
                 q[frame] = stays.applied(frame, q[frame])
@@ -144,6 +145,10 @@ class Bisection:
         moving = np.ones(figure.model.nv, dtype=bool)
         moving[figure.dofs(frozen)] = False
         return key_frames(figure.model, original, moving, CHARACTER)
+
+
+def _with_frozen(terms: FrameTerms, frozen: tuple[str, ...]) -> FrameTerms:
+    return replace(terms, given=(*terms.given, Freeze(*frozen))) if frozen else terms
 
 
 def _message(recursion: Recursion, missed: list[int], watch: Watch) -> str:

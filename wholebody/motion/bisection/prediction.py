@@ -14,7 +14,7 @@ from wholebody.methods.base import Method
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.problem import Problem
 from wholebody.scene import Scene
-from wholebody.tasks import Effort, Freeze, Hold, Plane
+from wholebody.tasks import Effort, Freeze, Plane
 from wholebody.tasks.base import Goal, Measure, Surroundings, filled
 from wholebody.tasks.distance import SquaredDistance
 from wholebody.workspace import Workspace
@@ -100,9 +100,7 @@ class Predictor:
         start: Array,
         planes: Sequence[Plane] = (),
         *,
-        margins: dict[int, float] | None = None,
         effort_from: Array | None = None,
-        original: Array | None = None,
     ) -> Prediction:
         """Predict the posture of a frame.
 
@@ -110,26 +108,20 @@ class Predictor:
             frame: which; holds and the effort refer to its original posture.
             start: (nq,) where the search starts.
             planes: further constraints.
-            margins: least distances of pairs, by their numbers, metres; the settings' for others.
             effort_from: (nq,) posture from which the effort is counted instead.
-            original: (nq,) original posture where it is not that of the frame, but of a moment after it.
         """
-        feet = [Hold(foot) for foot in self.terms.stands[frame]]
-        original = self.original[frame] if original is None else original
         goals = [term for term in self.terms.given if isinstance(term, Goal)]
         others = [term for term in self.terms.given if not isinstance(term, Goal)]
         problem = Problem(
             self.scene,
-            original,
+            self.original[frame],
             goals=goals,
-            constraints=[*others, *feet, *self._frozen, *planes],
+            constraints=[*others, *self.terms.feet(frame), *self._frozen, *planes],
             measures=self._measures,
             clearance=self._clearance,
         )
         if effort_from is not None:
             problem.measures = tuple(measure.resolve(self.scene, effort_from) for measure in self._measures)
-        for pair, margin in (margins or {}).items():
-            problem.clearances[pair] = max(problem.clearances[pair], margin)
         solution = self._method.solve(problem.with_start(start))
         free = self.free(solution.q)
         return Prediction(solution.q, free, free and self.holds(frame, solution.q), sum(solution.programs.values()))

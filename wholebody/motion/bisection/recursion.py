@@ -155,10 +155,6 @@ class Recursion:
                 self.q[frame] = self._stays.applied(frame, self.q[frame])
                 self.bad[frame] = not self._predictor.free(self.q[frame])
 
-    def applied(self, frame: int, q: Array) -> Array:
-        """A posture of a frame with what stays there; see `Stays`."""
-        return self._stays.applied(frame, q)
-
     def share_done(self) -> float:
         """Share of the frames that overlapped at first which no longer do."""
         return 1.0 - int(self.bad.sum()) / max(1, self.at_first)

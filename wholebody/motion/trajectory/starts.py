@@ -8,13 +8,17 @@ side. The iterations begin with what that gives.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from wholebody.arrays import Array
+from wholebody.motion.dips import dipping
 from wholebody.motion.fade import freed_posture
+from wholebody.motion.following import BACK, Follower, keep_back
 from wholebody.motion.frame_terms import FrameTerms
-from wholebody.motion.per_frame import BACK, Follower
 from wholebody.motion.windows import Window, outwards
+from wholebody.workspace import Workspace
 
 PATIENCE = 0.25  # s: a run of frames at the original posture this long ends the following
 
@@ -37,6 +41,23 @@ class Carried:
     def programs(self) -> int:
         """How many quadratic programs the following took."""
         return 0 if self._follower is None else self._follower.programs
+
+    def beside(self, window: Window, q: Array, gaps: Iterable[int], workspace: Workspace) -> Array:
+        """(n, nq) postures of a window, on one side of what motions between them pass as far as that is found.
+
+        Args:
+            window: which frames.
+            q: (n, nq) its postures.
+            gaps: frames of the window whose motion to the next one passes something.
+            workspace: of this run alone.
+        """
+        if self._follower is None:
+            self._follower = Follower(self._terms, self._clearance)
+        q = np.array(q)
+        for gap in sorted(gaps):
+            if 0 <= gap < len(q) - 1 and dipping(workspace, q, (gap,)):
+                keep_back(self._follower, workspace, q, gap, len(q) - 1, window.first)
+        return q
 
     def outwards(self, window: Window, middle: int) -> Array:
         """(n, nq) postures of a window, followed from the freed posture of a frame in the middle."""

@@ -12,6 +12,7 @@ from wholebody.motion.dips import dips, sampled_dips
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.chart import Chart
+from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import Looking, Node
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
@@ -78,7 +79,7 @@ class ClipRun:
 
     def __init__(
         self, settings: Settings, terms: FrameTerms, workspace: Workspace, solve: Callable[[BandedQP], Answer],
-        reference: Array, rate: float = 1.0,
+        reference: Array, rate: float = 1.0, loads: ClipLoads | None = None,
     ) -> None:  # fmt: skip
         """Take what is needed.
 
@@ -89,9 +90,10 @@ class ClipRun:
             solve: solves one program.
             reference: (n, nq) postures that the deviations are from.
             rate: factor of the speed limits, for a clip that will be slowed by as much.
+            loads: of the reference postures, if they are to keep to their bounds.
         """
         self._settings, self._terms, self._workspace, self._solve = settings, terms, workspace, solve
-        self._reference, self._rate = reference, rate
+        self._reference, self._rate, self._loads = reference, rate, loads
         self._carried = Carried(terms, settings.clearance)
         self._programs = 0
         self._weights = np.ones(workspace.model.nv)
@@ -121,15 +123,16 @@ class ClipRun:
         objective = Objective(len(window), self._weights, self._settings.time, terms.dt, seams)
         limits = self._limits(window, chart, seams)
         held = [terms.held(frame) for frame in range(window.first, window.end)]
-        looking = Looking(self._workspace, chart, held, self._settings.clearance)
+        loads = None if self._loads is None else WindowLoads(self._loads, window.first, len(window))
+        looking = Looking(self._workspace, chart, held, self._settings.clearance, loads)
         always = {gap - window.first for gap in gaps}
         best: _Attempt | None = None
-        for start in self._starts(window, chart, limits, depths):
+        for start in self._starts(window, chart, limits, depths, always):
             attempt = self._attempt(start, chart, looking, objective, limits, always, cancel)
             if attempt is None:
                 return Freed(chart.original, "")
             best = attempt if best is None or attempt.rank < best.rank else best
-            if best.worst <= MET:
+            if best.worst <= MET and not best.dipping:
                 break
         assert best is not None
         missed = ""
@@ -141,11 +144,20 @@ class ClipRun:
         q[changed] = chart.postures(best.x)[changed]
         return Freed(q, missed)
 
-    def _starts(self, window: Window, chart: Chart, limits: Limits, depths: Array) -> Iterable[Array]:
-        """Deviations (n, nv) to begin with: none; then what following gives, from the deepest frame and both ends."""
+    def _starts(self, window: Window, chart: Chart, limits: Limits, depths: Array, always: set[int]) -> Iterable[Array]:
+        """Deviations (n, nv) to begin with.
+
+        None; frames kept on one side of what motions between them pass; what following gives, from the deepest frame
+        and both ends.
+        """
         yield np.zeros((len(window), self._workspace.model.nv))
         if not (limits.lower < limits.upper).any():
             return  # nothing can move
+        if always:
+            q = self._carried.beside(window, chart.original, always, self._workspace)
+            x = np.array([chart.deviation(frame, posture) for frame, posture in enumerate(q)])
+            if x.any():
+                yield np.clip(x, limits.lower, limits.upper)
         deepest = window.first + int(np.argmax(depths[window.first : window.end]))
         for middle in dict.fromkeys((deepest, window.first, window.end - 1)):
             q = self._carried.outwards(window, middle)
@@ -172,13 +184,13 @@ class ClipRun:
             if dipping and found.met:
                 dipping += sampled_dips(self._workspace, q, gaps)
             if not dipping or not found.met:
-                return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), objective.value(x))
+                return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), found.objective)
             before = len(program.nodes)
             program.add([Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in dipping])
             if len(program.nodes) == before:
                 break
         assert found is not None
-        return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), objective.value(x))
+        return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), found.objective)
 
     def _limits(self, window: Window, chart: Chart, seams: tuple[bool, bool]) -> Limits:
         """Bounds on deviations and on their changes; at a seam nothing moves."""

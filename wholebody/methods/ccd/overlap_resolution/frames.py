@@ -89,7 +89,7 @@ def resolve_overlap(
         InputError: a posture of the wrong shape, or a value that is not finite.
     """
     checked = [_posture(scene, q, what) for q, what in ((q_free, "q_free"), (q_wanted, "q_wanted"))]
-    with scene.built.pool(FrameResolver, lambda: FrameResolver(scene)).lend() as frames:
+    with scene.built.pool(FrameResolver, lambda: FrameResolver(scene)).borrow() as frames:
         return frames.remove(checked[0], checked[1], rng, pace)
 
 

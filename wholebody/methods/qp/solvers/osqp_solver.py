@@ -1,4 +1,7 @@
-"""OSQP with a workspace that lives on: set up once for a sparsity, warm from program to program, finished exactly."""
+"""OSQP with a workspace that lives on: set up once for a sparsity, warm from program to program, finished exactly.
+
+A second solver asks it only where active sets, corrected from the rows that lack, are not right after many corrections.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
-from wholebody.methods.qp.active_set import solve_from
+from wholebody.methods.qp.active_set import lacking, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
 from wholebody.methods.qp.solvers.fallback import CORRECTIONS, last_resort
 from wholebody.methods.qp.solvers.split_form import HEAVIEST, IDLE, SCALE, read_active, slots_for
 
@@ -66,6 +69,26 @@ class OSQPSolver(QPSolver):
             self._workspace = Workspace(program, self._workspace)
         self._workspace.load(program)
         return self._workspace
+
+
+class ActiveSetSolver(QPSolver):
+    """The primal-dual active set method throughout; OSQP where the sets do not settle."""
+
+    name = "active_set"
+
+    def __init__(self, hot_start: bool = True) -> None:
+        """Begin without a workspace."""
+        super().__init__(hot_start)
+        self._osqp = OSQPSolver()
+
+    def load(self) -> None:
+        """Import OSQP."""
+        self._osqp.load()
+
+    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
+        """Minimise from no bounds and the rows that x = 0 does not meet; see `QPSolver.solve_cold`."""
+        solution = solve_from(program, lacking(program), WARM_CORRECTIONS)
+        return self._osqp.solve_cold(program) if solution is None else solution._replace(by=ACTIVE_SET)
 
 
 class Workspace:

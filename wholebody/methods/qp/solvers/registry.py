@@ -54,7 +54,7 @@ def make_solver(name: str, hot_start: bool = True) -> QPSolver:
 
         return OSQPSolver(hot_start)
     if name == "active_set":
-        from wholebody.methods.qp.solvers.active_set_solver import ActiveSetSolver
+        from wholebody.methods.qp.solvers.osqp_solver import ActiveSetSolver
 
         return ActiveSetSolver(hot_start)
     if name in NATIVE:

@@ -1,0 +1,138 @@
+"""`wholebody world`: a figure follows a tracker among things that move by themselves."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from wholebody.bench.world_runs import WorldRow
+    from wholebody.dynamics.scenes import WorldScene
+    from wholebody.dynamics.world import WorldFrame
+
+HELP = "let a hand or an avatar meet balls, boxes and dominoes that move by themselves"
+DESCRIPTION = """\
+Run a scene: a scripted tracker moves a hand or an avatar, and the things that it meets fall, roll, slide and bounce.
+Print a table of frame times, impacts and overlap. Write the numbers of every frame (CSV), a chart of the energy and the
+frame times (PNG, SVG) and the animation (HTML, opens without a network)."""
+EPILOG = """\
+examples:
+  wholebody world --list
+  wholebody world flick
+  wholebody world all --out out/world
+exit code: 1 if pieces were deeper in each other than 0.1 mm after a frame, or a collision could not be avoided"""
+DEEPEST = 0.1  # mm
+FILM = (460, 420)  # pixels of a moment
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser("world", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help="name of the scene, or all")
+    parser.add_argument("--list", action="store_true", help="list the scenes")
+    parser.add_argument("--overlap", default="qp", metavar="METHOD", help="qp or ccd (default: qp)")
+    parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the whole script, once)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/world"), metavar="DIR", help="folder (default: out/world)"
+    )
+    parser.add_argument("--picture", action="store_true", help="draw five moments too, by a headless Chromium")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """List the scenes, or run one or all."""
+    from wholebody.bench.machine import machine
+    from wholebody.dynamics.scenes import WORLD_SCENES
+    from wholebody.errors import InputError, UnknownNameError
+    from wholebody.files import check_writable, make_folder
+    from wholebody.tracking.loop import OVERLAPS
+
+    if arguments.list:
+        for name, about in WORLD_SCENES.items():
+            print(f"{name:20} {about}")
+        return 0
+    if arguments.scene is None:
+        raise InputError(f"name a scene: {', '.join(WORLD_SCENES)}, or all; see wholebody world --list")
+    names = list(WORLD_SCENES) if arguments.scene == "all" else [arguments.scene]
+    for name in names:
+        if name not in WORLD_SCENES:
+            raise UnknownNameError("scene", name, WORLD_SCENES)
+    if arguments.overlap not in OVERLAPS:
+        raise UnknownNameError("way to remove overlap", arguments.overlap, OVERLAPS, "--overlap")
+    if arguments.seed < 0:
+        raise InputError(f"--seed is {arguments.seed}; give 0 or more")
+    make_folder(arguments.out)
+    check_writable(arguments.out / f"{names[0]}.csv")
+    facts = machine()
+    rows = [_run_one(name, arguments, facts) for name in names]
+    _print(rows)
+    print(f"wrote {arguments.out}")
+    return 0 if all(row.deepest_mm <= DEEPEST and not row.unavoided for row in rows) else 1
+
+
+def _run_one(name: str, arguments: argparse.Namespace, facts: dict[str, str]) -> WorldRow:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from wholebody.bench.tables import write_rows
+    from wholebody.bench.world_runs import chart, frame_rows, summary
+    from wholebody.dynamics.scenes import build_world_scene
+    from wholebody.dynamics.world import World
+
+    scene = build_world_scene(name, frames=arguments.frames, seed=arguments.seed)
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    frames: list[WorldFrame] = []
+    with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
+        task = bar.add_task(name, total=len(scene.track))
+        world = World(
+            scene.scene, scene.track.q[0], dt=scene.track.dt, overlap=arguments.overlap, seed=arguments.seed
+        )  # fmt: skip
+        for tracked in scene.track.q:
+            frames.append(world.step(tracked))
+            bar.update(task, completed=len(frames))
+    rows = frame_rows(name, frames)
+    write_rows(arguments.out / f"{name}.csv", facts, rows)
+    chart(rows, scene.track.dt, arguments.out / name)
+    _animation(scene, frames, arguments.out, arguments.picture)
+    for row in [row for row in rows if row.note][:5]:
+        print(f"{name}, frame {row.frame}: {row.note}")
+    return summary(len(frames[-1].placements), rows)
+
+
+def _animation(scene: WorldScene, frames: list[WorldFrame], out: Path, picture: bool) -> None:
+    from wholebody.bench.world_runs import moments
+    from wholebody.view import Viewer
+    from wholebody.view.filmstrip import write_filmstrip
+    from wholebody.view.viewed_world import ViewedWorld
+
+    viewed = ViewedWorld(scene.scene, frames[-1].placements)
+    postures = [viewed.configuration(frame.q, frame.placements) for frame in frames]
+    with Viewer(viewed, contact_distance=0.0, see_through=scene.see_through, title=scene.name) as viewer:
+        viewer.look(eye=scene.eye, target=scene.target)
+        viewer.play(postures, scene.track.dt, repeat=float("inf"))
+        viewer.save(out / f"{scene.name}.html")
+        if picture:
+            chosen = [postures[number] for number in moments(frames)]
+            write_filmstrip(viewer, chosen, out / f"{scene.name}-film.png", FILM)
+
+
+def _print(rows: list[WorldRow]) -> None:
+    from rich.console import Console
+
+    from wholebody.cli.tables import table
+
+    shown = table(
+        "scene", "bodies", "frames", "median ms", "p99", "max", "impacts", "deepest mm", "not avoided",
+        "energy J, first", "last",
+    )  # fmt: skip
+    for row in rows:
+        shown.add_row(
+            row.scene, str(row.bodies), str(row.frames), f"{row.median_ms:.2f}", f"{row.p99_ms:.2f}",
+            f"{row.max_ms:.1f}", str(row.events), f"{row.deepest_mm:.4f}", str(row.unavoided),
+            f"{row.first_energy:.3g}", f"{row.last_energy:.3g}",
+        )  # fmt: skip
+    console = Console(width=max(120, Console().width))
+    console.print(shown)

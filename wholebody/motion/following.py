@@ -1,0 +1,122 @@
+"""Frames of a clip by the tracker: each as near to its original posture as contacts and what is held let it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.figures.state import State
+from wholebody.methods.qp.method import QP
+from wholebody.motion.dips import dipping
+from wholebody.motion.faults import DEPTH, depth
+from wholebody.motion.frame_terms import FrameTerms
+from wholebody.problem import Problem
+from wholebody.tasks import Posture
+from wholebody.tasks.base import Bound, Constraint, Goal
+from wholebody.workspace import Workspace
+
+BACK = 1e-4  # rad, m: a posture this near to the original one is the original one
+MOST = 3  # steps of one frame; more = nearer to the original where much is in the way, dearer frames
+STEP = 1e-3  # rad, m: a step no longer than this ends a frame
+
+
+class Follower:
+    """Follows the original motion frame by frame.
+
+    Attributes:
+        programs: how many quadratic programs were solved.
+    """
+
+    def __init__(self, terms: FrameTerms, clearance: float) -> None:
+        """Set up on a scene.
+
+        Args:
+            terms: original postures, and what is held.
+            clearance: least distance of every pair, metres.
+        """
+        self._terms, self._clearance, self.programs = terms, clearance, 0
+        q = terms.scene.figure.clamp(terms.q[0])
+        self._problem = Problem(terms.scene, q, goals=[Posture(terms.q[0])], measures=(), clearance=0.0)
+        bounds = [term.resolve(terms.scene, q) for term in terms.given if isinstance(term, Bound)]
+        still = [bound for bound in bounds if np.isfinite(bound.bounds(State(terms.scene.model), None)).any()]
+        self._problem.bounds = tuple(still)
+        self._tracker = QP(restarts=0).tracker(self._problem, terms.dt)
+        self._state = State(terms.scene.model)
+
+    def _still(self, number: int) -> tuple[Array, Array]:
+        """Least and greatest deviation (nv,) of a frame."""
+        low, high, _, _ = self._terms.bounds(number, self._state)
+        return low, high
+
+    def frame(self, number: int, q: Array, more: float = 0.0) -> Array:
+        """The posture of a frame, begun at a posture (nq,): steps until they are short.
+
+        Args:
+            number: of the frame.
+            q: (nq,) where the steps begin.
+            more: metres that are asked of every pair beyond the clearance.
+        """
+        terms, problem = self._terms, self._problem
+        problem.clearances = np.full_like(problem.clearances, self._clearance + more)
+        low, high = self._still(number)
+        if (low > -np.inf).any() or (high < np.inf).any():  # what is frozen keeps to the original motion
+            model = terms.scene.model
+            away = np.asarray(pin.difference(model, terms.q[number], q))
+            q = np.asarray(pin.integrate(model, terms.q[number], np.clip(away, low, high)))
+        goal = Posture(terms.q[number]).resolve(terms.scene, problem.start)
+        held = terms.held(number)
+        problem.goals = (goal, *(term for term in held if isinstance(term, Goal)))
+        problem.constraints = tuple(term for term in held if isinstance(term, Constraint))
+        for _ in range(MOST):
+            step = self._tracker.step(q)
+            self.programs += 1
+            q = step.q
+            if np.abs(step.displacement).max(initial=0.0) <= STEP:
+                break
+        return q
+
+
+def keep_back(follower: Follower, workspace: Workspace, q: Array, gap: int, most: int, first: int = 0) -> bool:
+    """Keep frames beside a gap on one side of what the motion in it passes, in place, as few as can be.
+
+    Args:
+        follower: of the clip.
+        workspace: of this run alone.
+        q: (n, nq) postures; those that change are replaced.
+        gap: the frame before the motion that passes through something.
+        most: how many frames may change.
+        first: frame of the clip that the first posture belongs to.
+
+    Returns:
+        Whether a way back to the other frames was found; if not, q stays as it is.
+    """
+    best: tuple[int, Array] | None = None
+    for side in (1, -1):
+        found = _beside(follower, workspace, q, gap, side, most, first)
+        if found is not None:
+            best, most = (gap + 1 if side > 0 else gap + 1 - len(found), found), len(found) - 1
+    if best is not None:
+        q[best[0] : best[0] + len(best[1])] = best[1]
+    return best is not None
+
+
+def _beside(
+    follower: Follower, workspace: Workspace, q: Array, gap: int, side: int, most: int, first: int
+) -> Array | None:
+    """Frames (k, nq) on the one side of what a motion between two frames passes, as far as they were on the other.
+
+    They follow the original motion from one end of the gap, in contact with what is in the way, until the way from
+    there to the next one of q is free. For `side` 1 it is frames after the gap, for -1 frames before it.
+    """
+    here, frame = (q[gap], gap + 1) if side > 0 else (q[gap + 1], gap)
+    found: list[Array] = []
+    while 0 <= frame < len(q) and len(found) < most:
+        there = follower.frame(first + frame, here)
+        if depth(workspace, there) > DEPTH or dipping(workspace, np.array([here, there]), (0,)):
+            return None
+        found.append(there)
+        here, frame = there, frame + side
+        if not 0 <= frame < len(q) or not dipping(workspace, np.array([here, q[frame]]), (0,)):
+            return np.array(found[::side])
+    return None
