@@ -42,6 +42,16 @@ def test_a_body_stops_at_a_body_and_pushes_it_to_a_wall() -> None:
     assert max(touching.penetration, pushed.penetration, stopped.penetration) < 1e-5
 
 
+@pytest.mark.parametrize("algebra", ["llt", "kkt", "schur", "dense"])
+@pytest.mark.parametrize("inequalities", ["slack", "barrier"])
+def test_every_factorisation_and_both_inequalities_stop_there(algebra: str, inequalities: Any) -> None:
+    made = _ball_box_wall().retarget(0, (1.5, 0, 0.5))
+    stopped = made.solve(algebra=algebra, inequalities=inequalities)
+    assert stopped.status == "unreachable"
+    assert stopped.placements["ball"].translation[0] == pytest.approx(0.59, abs=1e-4)
+    assert stopped.penetration < 1e-5
+
+
 def test_the_distance_that_is_reported_is_coals() -> None:
     made = _ball_box_wall()
     answer = made.retarget(0, (0.1, 0.05, 0.4)).solve()
