@@ -22,6 +22,7 @@ import pytest
 
 import wholebody as wb
 from wholebody import tracking
+from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.state import State
 from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
@@ -252,7 +253,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "Scene.move",
         Call(
             lambda **given: scene(path).move(**given),
-            {"name": "ball", "at": (1.0, 1.0, 1.0)},
+            {"name": "ball", "at": (1.0, 1.0, 1.0), "over": 0.1},
             lambda made: made.contacts(q),
         ),
     )
@@ -263,7 +264,36 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Scene.workspace", Call(there.workspace, {})
     yield "Scene.remove", Call(lambda **given: scene(path).remove(**given), {"name": "ball"})
     yield "Scene.state", Call(there.state, {"q": q})
-    yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4})
+    moves = {"ball": ((1.0, 1.0, 1.0), (1.0, 0.9, 1.0))}
+    yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4, "moves": moves})
+    world = {"scene": there, "start": q, "dt": 0.1, "overlap": "qp", "seed": 0, "spring": wb.Spring()}
+    yield "World", Call(wb.World, world, lambda made: made.step(q))
+    yield "World.step", Call(wb.World(there, q).step, {"tracked": q})
+    body = {"mass": 0.5, "material": "wood", "velocity": (0.1, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.1)}
+
+    def loose(body: Any) -> Any:
+        return wb.Scene(arm).add(wb.Sphere(0.1), name="ball", at=(1.0, 1.0, 1.0), body=body)
+
+    yield "Body", Call(wb.Body, body, lambda made: RigidBodies(loose(made)).advance(0.1))
+    yield "Body(density)", Call(wb.Body, {"density": 500.0}, lambda made: RigidBodies(loose(made)).advance(0.1))
+    material = {"name": "glass", "against": {"wood": (0.5, 0.1)}, "others": (0.5, 0.1)}
+    yield "Material", Call(wb.Material, material, lambda made: RigidBodies(loose(wb.Body(material=made))))
+    engine = RigidBodies(loose(wb.Body()))
+    yield "RigidBodies", Call(RigidBodies, {"scene": loose(wb.Body()), "gravity": (0.0, 0.0, -9.8)})
+    still = {"link1": (np.eye(4), np.eye(4))}
+    yield "RigidBodies.advance", Call(engine.advance, {"dt": 0.1, "kinematic": None})
+    yield "RigidBodies.advance(kinematic)", Call(engine.advance, {"dt": 0.1, "kinematic": still})
+    for name in ("placement", "twist"):
+        yield f"RigidBodies.{name}", Call(getattr(engine, name), {"name": "ball"})
+    for name in ("energy", "momentum"):
+        yield f"RigidBodies.{name}", Call(getattr(engine, name), {})
+    point = {"name": "ball", "point": (1.0, 1.0, 1.0)}
+    for name in ("velocity_at", "mobility"):
+        yield f"RigidBodies.{name}", Call(getattr(engine, name), point)
+    yield "RigidBodies.push", Call(engine.push, {**point, "impulse": (0.0, 0.1, 0.0)}, lambda _: engine.energy())
+    spring = {"stiffness": 1000.0, "damping": 40.0, "mass": 0.4}
+    yield "Spring", Call(wb.Spring, spring, lambda made: made.transition(0.1))
+    yield "Spring.transition", Call(wb.Spring().transition, {"time": 0.1})
 
     def put(shape: Any) -> Any:
         return wb.Scene(arm).add(shape, name="it").contacts(q)
@@ -472,9 +502,17 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Parts.posture(at)", Call(lambda at: one.posture({"one": at}), {"at": at})
     yield "Parts.contacts", Call(one.contacts, {"q": one.posture({"one": at}), "within": 0.1})
 
-    followed = {"scene": there, "track": track, "overlap": "qp", "seed": 0, "rigid": False, "progress": print}
+    followed = {
+        "scene": there,
+        "track": track,
+        "overlap": "qp",
+        "seed": 0,
+        "rigid": False,
+        "progress": print,
+        "moves": None,
+    }
     yield "follow", Call(tracking.follow, followed)
-    loop = {"scene": there, "start": q, "overlap": "qp", "dt": 0.1, "seed": 0, "rigid": False}
+    loop = {"scene": there, "start": q, "overlap": "qp", "dt": 0.1, "seed": 0, "rigid": False, "touching": ["ball"]}
     yield "FrameLoop", Call(tracking.FrameLoop, loop, lambda made: made.frame(q))
     yield "FrameLoop.frame", Call(tracking.FrameLoop(there, q).frame, {"tracked": q})
     recording = tracking.follow(there, track)
@@ -638,7 +676,7 @@ ANSWERS = (
     "Scene.of_parts", "ClipCheck", "DerivativeCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding",
     "Deviation",
     "Torques", "SphereFilling",
-    "Torques", "SphereFilling", "AvoidedCase", "BatchProgress",
+    "Torques", "SphereFilling", "AvoidedCase", "BatchProgress", "WorldFrame", "Overlap", "EngineFrame", "Event",
 )  # fmt: skip
 """What calls return: nobody builds it, so its constructor is not fed."""
 

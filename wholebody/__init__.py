@@ -27,6 +27,8 @@ from wholebody.version import __version__
 if TYPE_CHECKING:
     from wholebody.assessment import Assessment, assess
     from wholebody.derivatives import DerivativeCheck, check_derivatives
+    from wholebody.dynamics.coupling import Spring
+    from wholebody.dynamics.world import World
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
     from wholebody.matter.body import Body
@@ -149,6 +151,7 @@ __all__ = [
     "SkeletonMotion",
     "Solution",
     "Sphere",
+    "Spring",
     "StanceFeet",
     "StepLimit",
     "Strength",
@@ -158,6 +161,7 @@ __all__ = [
     "UnknownNameError",
     "Viewer",
     "WholebodyError",
+    "World",
     "__version__",
     "assess",
     "avoid",
@@ -182,6 +186,8 @@ _MODULES = {
     "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
     "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
+    "wholebody.dynamics.coupling": "Spring",
+    "wholebody.dynamics.world": "World",
     "wholebody.matter.body": "Body",
     "wholebody.matter.materials": "Material",
     "wholebody.methods.ccd.method": "CCD",

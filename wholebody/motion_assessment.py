@@ -7,7 +7,8 @@ steps of compared tools are all judged by this module.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import copy
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -51,10 +52,19 @@ class MotionAssessment:
     jerk: Array
 
 
-def assess_motion(scene: Scene, q: Array, dt: float) -> MotionAssessment:
-    """Assess postures (n, nq), `dt` seconds apart, in a scene whose things do not move."""
+def assess_motion(
+    scene: Scene, q: Array, dt: float, moves: Mapping[str, Sequence[pin.SE3]] | None = None
+) -> MotionAssessment:
+    """Assess postures (n, nq), `dt` seconds apart.
+
+    Args:
+        scene: figure and things.
+        q: (n, nq) postures.
+        dt: seconds from one to the next.
+        moves: thing to its n placements, at the postures; all others stay.
+    """
     depth, overlapping = np.zeros(len(q)), np.zeros(len(q), dtype=np.intp)
-    for frame, pairs in enumerate(pairs_along(scene, q)):
+    for frame, pairs in enumerate(pairs_along(scene, q, moves)):
         depth[frame] = max(0.0, -pairs.least)
         overlapping[frame] = int((pairs.distance < -OVERLAPS).sum())
     return MotionAssessment(
@@ -62,11 +72,17 @@ def assess_motion(scene: Scene, q: Array, dt: float) -> MotionAssessment:
     )
 
 
-def pairs_along(scene: Scene, q: Array) -> Iterator[AllPairs]:
-    """All pairs at each of the postures (n, nq), with the kinematic state; each is valid until the next one."""
+def pairs_along(scene: Scene, q: Array, moves: Mapping[str, Sequence[pin.SE3]] | None = None) -> Iterator[AllPairs]:
+    """All pairs at each of the postures (n, nq), with the kinematic state; each is valid until the next one.
+
+    `moves` has n placements of each thing that moves; the scene itself stays as it is.
+    """
+    scene = copy.copy(scene) if moves else scene
     built = scene.built
     with built.pool(AllPairs, lambda: AllPairs(built)).borrow() as pairs:
-        for posture in q:
+        for frame, posture in enumerate(q):
+            for name, places in (moves or {}).items():
+                scene.move(name, at=places[frame])
             pairs.move(np.asarray(posture, dtype=float))
             yield pairs
 
@@ -107,8 +123,22 @@ def root_mean_square(values: Array) -> Array:
     return np.asarray(np.sqrt((values**2).sum(axis=1) / max(1, values.shape[1])))
 
 
-def passed(scene: Scene, q: Array, depth: float) -> tuple[int, ...]:
-    """Indices of postures of (n, nq): some pair gets deeper than `depth` metres between the previous one and it."""
+def passed(
+    scene: Scene, q: Array, depth: float, moves: Mapping[str, Sequence[pin.SE3]] | None = None
+) -> tuple[int, ...]:
+    """Indices of postures of (n, nq): some pair gets deeper than `depth` metres between the previous one and it.
+
+    `moves` has n placements of each thing that moves, at the postures; it goes straight from one to the next.
+    """
+    if moves:
+        return tuple(
+            frame
+            for frame, (before, after) in enumerate(pairwise(q), start=1)
+            if scene.sweep(
+                before, after, depth, moves={name: (way[frame - 1], way[frame]) for name, way in moves.items()}
+            )
+            is not None
+        )
     sweep, ways = Sweep(scene.model, scene.geometry), enumerate(pairwise(q), start=1)
     return tuple(frame for frame, way in ways if sweep.first_contact(*way, tolerance=depth) is not None)
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.arrays import Array, Mask
 from wholebody.geometry.continuous.passing_through import OVERLAP, Entered, entered
 from wholebody.geometry.continuous.sweep import FirstContact, Sweep
 from wholebody.geometry.continuous.swept_depth import SweptDepth
@@ -179,4 +179,4 @@ class _BothSides:
         self.depths = SweptDepth(self.table, scene.geometry, OVERLAP)
         self.rest = pin.neutral(scene.built.model)
         owners = np.array([owner in scene.joints for owner in scene.owners], dtype=bool)
-        self.moves = owners[self.table.pairs].any(axis=1)
+        self.moves: Mask = np.asarray(owners[self.table.pairs].any(axis=1))

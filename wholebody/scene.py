@@ -345,8 +345,9 @@ class Scene:
         begin, end = checks.posture(q0, nq, "q0"), checks.posture(q1, nq, "q1")
         tolerance = checks.number(tolerance, "tolerance", 1e-5, FARTHEST, "m")
         with self.borrow() as workspace:
-            if not moves:
+            if moves is None:
                 return workspace.sweep.first_contact(begin, end, tolerance=tolerance)
+            checks.instance(moves, Mapping, "sweep: moves", "give {name: (placement at the start, at the end)}")
             frame = workspace.frame({name: self._way(name, way) for name, way in moves.items()})
             found = frame.first_contact(begin, end, tolerance)
             return None if found is None else replace(found, q=found.q[:nq])

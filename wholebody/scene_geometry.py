@@ -52,9 +52,9 @@ class SceneObject:
         segment: the segment that carries it; None for a thing in the world.
         color: red, green, blue, alpha from 0 to 1, or None for the viewer's choice.
         rests_on: segments and carried things that a carried thing is not tested against.
+        motion: how it came to its placement; None if it was put there.
         body: mass and velocity of a thing that `wholebody.dynamics` moves; None for one that it does not.
         material: what it is made of; a body's own.
-        motion: how it came to its placement; None if it was put there.
     """
 
     name: str
@@ -63,9 +63,9 @@ class SceneObject:
     segment: str | None = None
     color: tuple[float, float, float, float] | None = None
     rests_on: tuple[str, ...] = ()
+    motion: Motion | None = None
     body: Body | None = None
     material: Material = DEFAULT
-    motion: Motion | None = None
 
 
 class SceneGeometry:

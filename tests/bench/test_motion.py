@@ -92,6 +92,12 @@ def test_the_report_has_every_method(tmp_path: Path) -> None:
     assert "| fade | 0 of 1 | 2.00 |" in text
     assert "deviation (rad) is 0.60 of bisection's" in text
     assert "| walk | pack | 60 | 20 | 0 | 30.0 | 0.1 |" in text
+    assert "| trajectory | no frame deeper than 0.1 mm | 1 of 1 |  |" in text
+    assert "| fade | no frame deeper than 0.1 mm | 0 of 1 | walk, pack: 3 frames |" in text
+    assert "| trajectory | deviation (rad) at most 0.7 of bisection's | 1 of 1 |  |" in text
+    assert "| trajectory | at most 2 s a second of motion | 1 of 1 |  |" in text
+    assert "| bisection | hands on the weapon" not in text
+    assert "| trajectory | hands on the weapon within 1 mm | 1 of 1 |  |" in text
     assert "nan" not in text
     for path in (*report.chart(rows(), tmp_path / "motion"), *report.check_chart(rows(), tmp_path / "check")):
         assert path.stat().st_size > 1000

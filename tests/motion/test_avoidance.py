@@ -244,6 +244,11 @@ def test_the_command_frees_a_file(tmp_path: Path, human: Figure, capsys: pytest.
     free = wb.read_clip(tmp_path / "arm-free.npz", human)
     assert wb.check(free).free
     assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "none"]) == 2
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "fade", "--stretch", "2"]) == 2
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "fade", "--dynamics"]) == 2
+    told = capsys.readouterr()
+    assert "does not slow" in told.err + told.out
+    assert "does not take dynamics" in told.err + told.out
 
 
 def test_an_answer_is_told_in_three_lines() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +16,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody import tracking
+from wholebody.methods.solve import as_method
 from wholebody.tracking.loop import FrameLoop
 
 DT = 1.0 / 60.0
@@ -227,3 +230,44 @@ def test_wrong_motions_are_one_sentence(planar_arm) -> None:
         scene.sweep(q, q, moves={"ball": (0.0, 0.0, 0.0)})
     with pytest.raises(wb.InputError, match="end"):
         scene.sweep(q, q, moves={"ball": ((0.0, 0.0, 0.0), (np.nan, 0.0, 0.0))})
+
+
+def test_a_whole_track_with_a_thing_that_moves_is_judged_with_it(planar_arm) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.05), name="ball", at=(0.7, 0.5, 0.0))
+    q = np.array([0.1, 0.2, 0.2])
+    ys = np.concatenate([np.linspace(0.5, 0.1, 30), np.linspace(0.1, 0.5, 20)])
+    places = [(0.7, float(y), 0.0) for y in ys]
+    track = tracking.Track.of(scene.figure, np.tile(q, (50, 1)), DT)
+    recording = tracking.follow(scene, track, moves={"ball": places})
+    assert scene.objects["ball"].placement.translation == pytest.approx([0.7, 0.5, 0.0])
+    assert np.abs(recording.q - q).max() > 0.1  # it gave way
+    judged = tracking.judge(scene, recording)
+    deepest = []
+    for shown, tracked, place in zip(recording.q, recording.tracked, places, strict=True):
+        scene.move("ball", at=place)
+        deepest.append([-scene.contacts(one, 0.0).distance.min(initial=0.0) for one in (shown, tracked)])
+    assert pytest.approx(np.array(deepest), abs=1e-9) == np.array([judged.depth, judged.tracked_depth]).T
+    assert judged.depth.max() < 1e-4
+    assert judged.tracked_depth.max() > 0.02
+    assert judged.passed == ()
+    held = replace(recording, q=recording.tracked)
+    assert tracking.judge(scene, held).passed  # who stays is passed through
+    for wrong in ({"ball": places[1:]}, {"ball": 3}, 4):
+        with pytest.raises(wb.InputError, match="moves"):
+            tracking.follow(scene, track, moves=wrong)
+    with pytest.raises(wb.UnknownNameError, match="ball"):
+        tracking.follow(scene, track, moves={"bell": places})
+
+
+@pytest.mark.parametrize("method", ["qp", "newton", "ccd", "dls"])
+def test_the_steps_of_every_tracker_name_what_passed(planar_arm, method: str) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.02), name="ball", at=(0.7, 0.8, 0.0))
+    q = np.array([0.1, 0.2, 0.2])
+    tip = scene.state(q).frame(scene.frame_id("tip")).translation.copy()
+    problem = wb.Problem(scene, q, goals=[wb.Point("tip", tip)], constraints=[wb.StepLimit(0.5)])
+    tracker = as_method(method).tracker(problem, DT)
+    q = tracker.step(q).q
+    assert tracker.step(q).collisions == ()
+    scene.move("ball", at=(0.7, -0.8, 0.0), over=DT)
+    named = tracker.step(q).collisions
+    assert [(one.second, one.inside) for one in named][:1] == [("ball", False)]

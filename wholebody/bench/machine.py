@@ -12,7 +12,7 @@ from wholebody.version import __version__
 
 PACKAGES = (
     "pin", "coal", "numpy", "scipy", "osqp", "daqp", "quadprog", "proxsuite", "piqp", "qpsolvers",
-    "placo", "pin-pink", "mink", "mujoco", "matplotlib",
+    "placo", "pin-pink", "mink", "mujoco", "rapier3d", "matplotlib",
 )  # fmt: skip
 THREADS = "OMP_NUM_THREADS"
 

@@ -18,8 +18,9 @@ class BodiesState:
         pieces: the bodies and their pieces.
         position: (n, 3) centres of mass.
         rotation: (n, 3, 3).
-        velocity: (n, 3) of the centres, m/s.
-        spin: (n, 3) angular velocities about the world's axes, rad/s.
+        twist: (n, 6) velocities of the centres and angular velocities along the world's axes, m/s and rad/s.
+        velocity: (n, 3) view of the former.
+        spin: (n, 3) view of the latter.
         given: (n,) bodies whose motion is given for this frame.
         moving: (n,) bodies that move by themselves, and do not sleep.
         inverse: (n, 3, 3) inverse inertias in the body.
@@ -30,7 +31,8 @@ class BodiesState:
         count = len(pieces.names)
         self.pieces = pieces
         self.position, self.rotation = np.zeros((count, 3)), np.zeros((count, 3, 3))
-        self.velocity, self.spin = np.zeros((count, 3)), np.zeros((count, 3))
+        self.twist = np.zeros((count, 6))
+        self.velocity, self.spin = self.twist[:, :3], self.twist[:, 3:]
         self.given: Mask = np.zeros(count, dtype=bool)
         self.moving: Mask = pieces.dynamic.copy()
         self.inverse: Array = np.linalg.inv(pieces.inertia).astype(np.float64)
@@ -59,21 +61,13 @@ class BodiesState:
         self.spin[number] = pin.log3(after.rotation @ before.rotation.T) / time
         self.given[number] = bool(self.velocity[number].any() or self.spin[number].any())
 
-    def kept(self) -> tuple[Array, Array, Array, Array]:
-        """Copies of positions, rotations, velocities and angular velocities."""
-        return self.position.copy(), self.rotation.copy(), self.velocity.copy(), self.spin.copy()
+    def kept(self) -> tuple[Array, Array, Array]:
+        """Copies of positions, rotations and velocities."""
+        return self.position.copy(), self.rotation.copy(), self.twist.copy()
 
-    def restore(self, kept: tuple[Array, Array, Array, Array]) -> None:
+    def restore(self, kept: tuple[Array, Array, Array]) -> None:
         """Go back to what `kept` gave."""
-        self.position[:], self.rotation[:], self.velocity[:], self.spin[:] = kept
-
-    def relative(
-        self, first: Indices, second: Indices, point: Array, velocity: Array | None = None, spin: Array | None = None
-    ) -> Array:
-        """Velocities (m, 3) of points (m, 3) of the second bodies (m,) relative to the first, present or others."""
-        v, w = self.velocity if velocity is None else velocity, self.spin if spin is None else spin
-        at_second = v[second] + np.cross(w[second], point - self.position[second])
-        return np.asarray(at_second - v[first] - np.cross(w[first], point - self.position[first]))
+        self.position[:], self.rotation[:], self.twist[:] = kept
 
     def local(self, body: Indices, point: Array) -> Array:
         """Points (m, 3) in the axes of bodies (m,), from their centres of mass."""

@@ -6,7 +6,12 @@ changes the velocities by M^-1 J^T p, and u = J v is the velocity of B's point r
     0 <= p_n  complementary to  u_n - target >= 0                                                    (Signorini)
     p_t = -min(mu p_n, sticking) u_t / |u_t|                                                         (Coulomb)
 
-by Gauss and Seidel's method with projection, one point after the other, forwards and backwards in turn.
+by Gauss and Seidel's method with projection, one point after the other, forwards and backwards in turn, with the
+conjugate directions of Silcowitz, Niebe and Erleben (2010) between sweeps.
+
+The loops share these arrays: `bodies` (m, 2) has A and B of every point, `jacobian` (m, 3, 2, 6) the rows of J along
+n, t1, t2 for the velocity and angular velocity of A and of B, `answer` (m, 3, 2, 6) the same of J M^-1, `mobility`
+(m, 2) the change of u by a unit impulse, along n and the most along a tangent, `twist` (n, 6) the velocities of all.
 """
 
 from __future__ import annotations
@@ -18,36 +23,34 @@ from wholebody.compiled import compiled
 
 
 @compiled()
-def frames(
-    first: Indices,
-    second: Indices,
+def lay(
+    bodies: Indices,
     normal: Array,
     point: Array,
     position: Array,
     inverse_mass: Array,
     inverse_inertia: Array,
     axes: Array,
-    levers: Array,
-    answers: Array,
+    jacobian: Array,
+    answer: Array,
     mobility: Array,
 ) -> None:
     """Write what the program needs of every contact point.
 
     Args:
-        first: (m,) body A of each point.
-        second: (m,) body B.
+        bodies: (m, 2).
         normal: (m, 3) unit normals from A to B.
         point: (m, 3) in the world.
         position: (n, 3) centres of mass.
         inverse_mass: (n,) zero for bodies that contacts do not move.
         inverse_inertia: (n, 3, 3) along the world's axes.
         axes: (m, 3, 3) room for the rows n, t1, t2.
-        levers: (m, 2, 3, 3) room for r cross axis, of A and of B.
-        answers: (m, 2, 3, 3) room for I^-1 (r cross axis).
-        mobility: (m, 2) room for the change of u by a unit impulse: along n, and the most along a tangent.
+        jacobian: (m, 3, 2, 6) room.
+        answer: (m, 3, 2, 6) room.
+        mobility: (m, 2) room.
     """
     gram = np.zeros((3, 3))
-    for c in range(len(first)):
+    for c in range(len(bodies)):
         least = 0
         for k in range(1, 3):
             if abs(normal[c, k]) < abs(normal[c, least]):
@@ -59,80 +62,108 @@ def frames(
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3
             axes[c, 2, k] = normal[c, i] * axes[c, 1, j] - normal[c, j] * axes[c, 1, i]
-        gram[:] = 0.0
         for side in range(2):
-            body = first[c] if side == 0 else second[c]
+            body, sign = bodies[c, side], 1.0 if side == 1 else -1.0
             for row in range(3):
                 for k in range(3):
                     i, j = (k + 1) % 3, (k + 2) % 3
-                    levers[c, side, row, k] = (point[c, i] - position[body, i]) * axes[c, row, j] - (
-                        point[c, j] - position[body, j]
-                    ) * axes[c, row, i]
-            for row in range(3):
+                    turn = (point[c, i] - position[body, i]) * axes[c, row, j]
+                    turn -= (point[c, j] - position[body, j]) * axes[c, row, i]
+                    jacobian[c, row, side, k] = sign * axes[c, row, k]
+                    jacobian[c, row, side, 3 + k] = sign * turn
+                    answer[c, row, side, k] = inverse_mass[body] * sign * axes[c, row, k]
                 for k in range(3):
                     total = 0.0
-                    for j in range(3):
-                        total += inverse_inertia[body, k, j] * levers[c, side, row, j]
-                    answers[c, side, row, k] = total
-            for row in range(3):
-                gram[row, row] += inverse_mass[body]
-                for other in range(3):
-                    for k in range(3):
-                        gram[row, other] += levers[c, side, row, k] * answers[c, side, other, k]
+                    for i in range(3):
+                        total += inverse_inertia[body, k, i] * jacobian[c, row, side, 3 + i]
+                    answer[c, row, side, 3 + k] = total
+        for row in range(3):
+            for other in range(3):
+                gram[row, other] = coupling(c, row, other, jacobian, answer)
         mobility[c, 0] = gram[0, 0]
         mean = 0.5 * (gram[1, 1] + gram[2, 2])
         mobility[c, 1] = mean + np.sqrt((0.5 * (gram[1, 1] - gram[2, 2])) ** 2 + gram[1, 2] ** 2)
 
 
 @compiled()
-def relative(
-    c: int, row: int, first: Indices, second: Indices, axes: Array, levers: Array, v: Array, w: Array
-) -> float:
-    """Velocity of B's point relative to A's along an axis of a contact point."""
-    a, b = first[c], second[c]
+def coupling(c: int, row: int, other: int, jacobian: Array, answer: Array) -> float:
+    """Change of the relative velocity along one axis of a point by a unit impulse along another."""
     total = 0.0
-    for k in range(3):
-        total += axes[c, row, k] * (v[b, k] - v[a, k])
-        total += levers[c, 1, row, k] * w[b, k] - levers[c, 0, row, k] * w[a, k]
+    for side in range(2):
+        for k in range(6):
+            total += jacobian[c, row, side, k] * answer[c, other, side, k]
     return total
 
 
 @compiled()
-def push(
-    c: int,
-    row: int,
-    impulse: float,
-    first: Indices,
-    second: Indices,
-    axes: Array,
-    answers: Array,
-    inverse_mass: Array,
-    v: Array,
-    w: Array,
-) -> None:
+def relative(c: int, row: int, bodies: Indices, jacobian: Array, twist: Array) -> float:
+    """Velocity of B's point relative to A's along an axis of a contact point."""
+    a, b = bodies[c, 0], bodies[c, 1]
+    total = 0.0
+    for k in range(6):
+        total += jacobian[c, row, 0, k] * twist[a, k] + jacobian[c, row, 1, k] * twist[b, k]
+    return total
+
+
+@compiled()
+def push(c: int, row: int, impulse: float, bodies: Indices, answer: Array, twist: Array) -> None:
     """Change the velocities by an impulse along an axis of a contact point: on B, and its opposite on A."""
-    a, b = first[c], second[c]
-    for k in range(3):
-        v[a, k] -= impulse * inverse_mass[a] * axes[c, row, k]
-        v[b, k] += impulse * inverse_mass[b] * axes[c, row, k]
-        w[a, k] -= impulse * answers[c, 0, row, k]
-        w[b, k] += impulse * answers[c, 1, row, k]
+    a, b = bodies[c, 0], bodies[c, 1]
+    for k in range(6):
+        twist[a, k] += impulse * answer[c, row, 0, k]
+        twist[b, k] += impulse * answer[c, row, 1, k]
+
+
+@compiled()
+def _sweep(
+    c: int,
+    bodies: Indices,
+    jacobian: Array,
+    answer: Array,
+    mobility: Array,
+    friction: float,
+    target: float,
+    twist: Array,
+    impulse: Array,
+) -> tuple[float, float]:
+    """Solve the program for one point alone; the change of u, and the square of that of the impulse."""
+    change, square = 0.0, 0.0
+    now = max(0.0, impulse[0] - (relative(c, 0, bodies, jacobian, twist) - target) / mobility[0])
+    step = now - impulse[0]
+    if step != 0.0:
+        push(c, 0, step, bodies, answer, twist)
+        impulse[0] = now
+        change = abs(step) * mobility[0]
+        square = step * step * mobility[0]
+    most = friction * now
+    if most == 0.0 and impulse[1] == 0.0 and impulse[2] == 0.0:
+        return change, square
+    one = impulse[1] - relative(c, 1, bodies, jacobian, twist) / mobility[1]
+    two = impulse[2] - relative(c, 2, bodies, jacobian, twist) / mobility[1]
+    size = np.sqrt(one * one + two * two)
+    if size > most:
+        share = most / size
+        one, two = share * one, share * two
+    for row, wanted in ((1, one), (2, two)):
+        step = wanted - impulse[row]
+        if step != 0.0:
+            push(c, row, step, bodies, answer, twist)
+            impulse[row] = wanted
+            change = max(change, abs(step) * mobility[1])
+            square += step * step * mobility[1]
+    return change, square
 
 
 @compiled()
 def solve(
     chosen: Indices,
-    first: Indices,
-    second: Indices,
-    axes: Array,
-    levers: Array,
-    answers: Array,
+    bodies: Indices,
+    jacobian: Array,
+    answer: Array,
     mobility: Array,
     friction: Array,
     target: Array,
-    inverse_mass: Array,
-    v: Array,
-    w: Array,
+    twist: Array,
     impulse: Array,
     tolerance: float,
     most: int,
@@ -141,77 +172,68 @@ def solve(
 
     Args:
         chosen: (k,) points of the program.
-        first: (m,) body A of each point.
-        second: (m,) body B.
-        axes: (m, 3, 3), see `frames`; so levers, answers and mobility.
-        levers: (m, 2, 3, 3).
-        answers: (m, 2, 3, 3).
+        bodies: (m, 2).
+        jacobian: (m, 3, 2, 6).
+        answer: (m, 3, 2, 6).
         mobility: (m, 2).
         friction: (m,) coefficients.
         target: (m,) least u_n after it, m/s.
-        inverse_mass: (n,).
-        v: (n, 3) velocities with the impulses at the start; changed in place.
-        w: (n, 3) angular velocities, likewise.
+        twist: (n, 6) velocities with the impulses at the start; changed in place.
         impulse: (m, 3) along n, t1, t2, N s; a start, changed in place.
         tolerance: a sweep that changes no u by more ends it, m/s.
-        most: sweeps.
+        most: sweeps, the last of which is always one of projection.
     """
     count = len(chosen)
+    before, way = np.empty((count, 3)), np.zeros((count, 3))
+    last = np.inf
     for sweep in range(most):
-        change = 0.0
+        change, square = 0.0, 0.0
         for number in range(count):
-            c = chosen[number if sweep % 2 == 0 else count - 1 - number]
-            if mobility[c, 0] <= 0.0:
-                continue
-            u = relative(c, 0, first, second, axes, levers, v, w)
-            now = max(0.0, impulse[c, 0] - (u - target[c]) / mobility[c, 0])
-            step = now - impulse[c, 0]
-            if step != 0.0:
-                push(c, 0, step, first, second, axes, answers, inverse_mass, v, w)
-                impulse[c, 0] = now
-                change = max(change, abs(step) * mobility[c, 0])
-            most_tangential = friction[c] * now
-            if most_tangential == 0.0 and impulse[c, 1] == 0.0 and impulse[c, 2] == 0.0:
-                continue
-            one = impulse[c, 1] - relative(c, 1, first, second, axes, levers, v, w) / mobility[c, 1]
-            two = impulse[c, 2] - relative(c, 2, first, second, axes, levers, v, w) / mobility[c, 1]
-            size = np.sqrt(one * one + two * two)
-            if size > most_tangential:
-                share = most_tangential / size
-                one, two = share * one, share * two
-            for row, wanted in ((1, one), (2, two)):
-                step = wanted - impulse[c, row]
-                if step != 0.0:
-                    push(c, row, step, first, second, axes, answers, inverse_mass, v, w)
-                    impulse[c, row] = wanted
-                    change = max(change, abs(step) * mobility[c, 1])
-        if change < tolerance:
+            place = number if sweep % 2 == 0 else count - 1 - number
+            c = chosen[place]
+            for row in range(3):
+                before[place, row] = impulse[c, row]
+            if mobility[c, 0] > 0.0:
+                largest, moved = _sweep(
+                    c, bodies, jacobian, answer, mobility[c], friction[c], target[c], twist, impulse[c]
+                )
+                change, square = max(change, largest), square + moved
+        if change < tolerance or sweep == most - 1:
             return sweep + 1
+        share, last = square / last, square
+        for place in range(count):
+            c = chosen[place]
+            for row in range(3):
+                if share < 1.0:
+                    farther = share * way[place, row]
+                    way[place, row] = farther + impulse[c, row] - before[place, row]
+                    if farther != 0.0:
+                        push(c, row, farther, bodies, answer, twist)
+                        impulse[c, row] += farther
+                else:
+                    way[place, row] = 0.0
     return most
 
 
 @compiled()
 def residuals(
-    first: Indices,
-    second: Indices,
-    axes: Array,
-    levers: Array,
+    bodies: Indices,
+    jacobian: Array,
     mobility: Array,
     friction: Array,
     target: Array,
-    v: Array,
-    w: Array,
+    twist: Array,
     impulse: Array,
 ) -> tuple[float, float]:
     """Largest violation of Signorini's and of Coulomb's law over all points, both m/s: see `solve`."""
     signorini, coulomb = 0.0, 0.0
-    for c in range(len(first)):
+    for c in range(len(bodies)):
         if mobility[c, 0] <= 0.0:
             continue
-        open_by = relative(c, 0, first, second, axes, levers, v, w) - target[c]
+        open_by = relative(c, 0, bodies, jacobian, twist) - target[c]
         signorini = max(signorini, abs(min(impulse[c, 0] * mobility[c, 0], open_by)))
-        one = impulse[c, 1] - relative(c, 1, first, second, axes, levers, v, w) / mobility[c, 1]
-        two = impulse[c, 2] - relative(c, 2, first, second, axes, levers, v, w) / mobility[c, 1]
+        one = impulse[c, 1] - relative(c, 1, bodies, jacobian, twist) / mobility[c, 1]
+        two = impulse[c, 2] - relative(c, 2, bodies, jacobian, twist) / mobility[c, 1]
         size = np.sqrt(one * one + two * two)
         share = min(1.0, friction[c] * impulse[c, 0] / max(size, 1e-300))
         off = np.sqrt((share * one - impulse[c, 1]) ** 2 + (share * two - impulse[c, 2]) ** 2)
@@ -220,21 +242,20 @@ def residuals(
 
 
 @compiled()
-def apply(
-    first: Indices,
-    second: Indices,
-    axes: Array,
-    answers: Array,
-    inverse_mass: Array,
-    v: Array,
-    w: Array,
-    impulse: Array,
-) -> None:
+def rates(bodies: Indices, jacobian: Array, twist: Array, result: Array) -> None:
+    """Write the relative velocities (m, 3) along the axes of all points."""
+    for c in range(len(bodies)):
+        for row in range(3):
+            result[c, row] = relative(c, row, bodies, jacobian, twist)
+
+
+@compiled()
+def apply(bodies: Indices, answer: Array, twist: Array, impulse: Array) -> None:
     """Change the velocities by the impulses (m, 3) of all points."""
-    for c in range(len(first)):
+    for c in range(len(bodies)):
         for row in range(3):
             if impulse[c, row] != 0.0:
-                push(c, row, impulse[c, row], first, second, axes, answers, inverse_mass, v, w)
+                push(c, row, impulse[c, row], bodies, answer, twist)
 
 
 @compiled()
@@ -287,3 +308,25 @@ def start_from(
             start[c, 0] = max(start[c, 0], 0.0)
     for old in range(len(pair)):
         head[pair[old]] = -1
+    # what found no point near it goes to the nearest of its pair: witness points jump from corner to corner
+    others = np.full(len(new_pair), -1, dtype=np.intp)
+    for c in range(len(new_pair)):
+        others[c] = head[new_pair[c]]
+        head[new_pair[c]] = c
+    for old in range(len(pair)):
+        best, least = -1, np.inf
+        c = -1 if used[old] else head[pair[old]]
+        while c >= 0:
+            square = 0.0
+            for k in range(3):
+                square += (local[old, k] - new_local[c, k]) ** 2
+            if square < least:
+                best, least = c, square
+            c = others[c]
+        if best >= 0:
+            for row in range(3):
+                for k in range(3):
+                    start[best, row] += axes[best, row, k] * impulse[old, k]
+            start[best, 0] = max(start[best, 0], 0.0)
+    for c in range(len(new_pair)):
+        head[new_pair[c]] = -1

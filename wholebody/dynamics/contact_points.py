@@ -21,16 +21,14 @@ class ContactPoints(NamedTuple):
 
     Attributes:
         pair: (m,) place of the pair among the pairs of pieces.
-        first: (m,) body A.
-        second: (m,) body B.
+        bodies: (m, 2) A and B.
         normal: (m, 3) unit normal from A to B.
         point: (m, 3) in the world, between the two surfaces.
         gap: (m,) metres.
     """
 
     pair: Indices
-    first: Indices
-    second: Indices
+    bodies: Indices
     normal: Array
     point: Array
     gap: Array
@@ -76,6 +74,5 @@ class ContactFinder:
         middle = 0.5 * (contacts.point_a + contacts.point_b)
         height = (normal * middle[owner]).sum(axis=1)
         point = np.cross(normal, rows.wrench[:, 3:]) + height[:, None] * normal
-        bodies = self.pieces.body[contacts.pair[owner]]
-        first, second = bodies[:, 0].copy(), bodies[:, 1].copy()
-        return ContactPoints(contacts.number[owner], first, second, normal, point, rows.gap)
+        bodies: Indices = self.pieces.body[contacts.pair[owner]]
+        return ContactPoints(contacts.number[owner], bodies, normal, point, rows.gap)

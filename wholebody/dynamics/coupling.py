@@ -52,7 +52,11 @@ class Spring:
 
         With a = R / 2m and s^2 = a^2 - K / m it is exp(-a t) [[C + a S, S], [-K / m S, C - a S]], C = cosh(s t) and
         S = sinh(s t) / s, or cos and sin where s^2 is negative.
+
+        Raises:
+            InputError: the time is not positive and finite.
         """
+        time = time_step(time, "time")
         rate, stiff = 0.5 * self.damping / self.mass, self.stiffness / self.mass
         square = rate * rate - stiff
         if abs(square) <= NEAR_CRITICAL * rate * rate:

@@ -16,7 +16,7 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices
 from wholebody.compiled import compiled
-from wholebody.dynamics.contact_kernel import push, relative, solve
+from wholebody.dynamics.contact_kernel import coupling, push, relative, solve
 
 EXACT = 1e-10  # m/s: to which the program of one pair is solved
 SWEEPS = 200  # of it
@@ -26,17 +26,14 @@ SWEEPS = 200  # of it
 def resolve(
     touching: Indices,
     pair: Indices,
-    first: Indices,
-    second: Indices,
+    bodies: Indices,
     axes: Array,
-    levers: Array,
-    answers: Array,
+    jacobian: Array,
+    answer: Array,
     mobility: Array,
     restitution: Array,
     friction: Array,
-    inverse_mass: Array,
-    v: Array,
-    w: Array,
+    twist: Array,
     slow: float,
     most: int,
     impulse: Array,
@@ -47,21 +44,18 @@ def resolve(
     Args:
         touching: (k,) contact points that touch.
         pair: (m,) pair of each point; the other arrays are as in `contact_kernel`.
-        first: (m,).
-        second: (m,).
+        bodies: (m, 2).
         axes: (m, 3, 3).
-        levers: (m, 2, 3, 3).
-        answers: (m, 2, 3, 3).
+        jacobian: (m, 3, 2, 6).
+        answer: (m, 3, 2, 6).
         mobility: (m, 2).
         restitution: (m,).
         friction: (m,).
-        inverse_mass: (n,).
-        v: (n, 3) changed in place.
-        w: (n, 3) changed in place.
+        twist: (n, 6) changed in place.
         slow: approach that is no impact, m/s.
         most: events.
         impulse: (m, 3) room for the impulses of one event.
-        events: (most, 5) room for the point, the approach [m/s] and the impulse [N s] along its axes.
+        events: (most, 5) room for the point, the approach [m/s] and the impulse [N s] along the world's axes.
 
     Returns:
         How many events there were, and whether all are resolved.
@@ -71,7 +65,7 @@ def resolve(
     for event in range(most):
         worst, speed = -1, -slow
         for c in touching:
-            u = relative(c, 0, first, second, axes, levers, v, w)
+            u = relative(c, 0, bodies, jacobian, twist)
             if u < speed and mobility[c, 0] > 0.0:
                 worst, speed = c, u
         if worst < 0:
@@ -81,21 +75,18 @@ def resolve(
             if pair[c] == pair[worst]:
                 chosen[count] = c
                 for row in range(3):
-                    before[count, row] = relative(c, row, first, second, axes, levers, v, w)
+                    before[count, row] = relative(c, row, bodies, jacobian, twist)
                     impulse[c, row] = 0.0
                 target[c] = -restitution[c] * before[count, 0]
                 count += 1
         if count == 1:
             _single(
-                worst, first, second, axes, levers, answers, mobility, restitution[worst], friction[worst],
-                inverse_mass, v, w, before[0], impulse[worst],
+                worst, bodies, jacobian, answer, mobility, restitution[worst], friction[worst], twist, before[0],
+                impulse[worst],
             )  # fmt: skip
         else:
-            solve(
-                chosen[:count], first, second, axes, levers, answers, mobility, friction, target, inverse_mass, v, w,
-                impulse, EXACT, SWEEPS,
-            )  # fmt: skip
-            _lose(chosen[:count], first, second, axes, levers, answers, inverse_mass, v, w, before, impulse)
+            solve(chosen[:count], bodies, jacobian, answer, mobility, friction, target, twist, impulse, EXACT, SWEEPS)
+            _lose(chosen[:count], bodies, jacobian, answer, twist, before, impulse)
         events[event, 0], events[event, 1] = worst, -speed
         events[event, 2:] = 0.0
         for number in range(count):
@@ -108,35 +99,27 @@ def resolve(
 @compiled()
 def _single(
     c: int,
-    first: Indices,
-    second: Indices,
-    axes: Array,
-    levers: Array,
-    answers: Array,
+    bodies: Indices,
+    jacobian: Array,
+    answer: Array,
     mobility: Array,
     restitution: float,
     friction: float,
-    inverse_mass: Array,
-    v: Array,
-    w: Array,
+    twist: Array,
     before: Array,
     impulse: Array,
 ) -> None:
     """The impulse at one point; eqs. 8 to 10."""
     normal = -(1.0 + restitution) * before[0] / mobility[c, 0]
-    push(c, 0, normal, first, second, axes, answers, inverse_mass, v, w)
+    push(c, 0, normal, bodies, answer, twist)
     impulse[0] = normal
     sliding = np.sqrt(before[1] ** 2 + before[2] ** 2)
     if sliding < 1e-12 or friction == 0.0:
         return
     one, two = before[1] / sliding, before[2] / sliding
-    along = inverse_mass[first[c]] + inverse_mass[second[c]]
-    for side in range(2):
-        for k in range(3):
-            lever = one * levers[c, side, 1, k] + two * levers[c, side, 2, k]
-            along += lever * (one * answers[c, side, 1, k] + two * answers[c, side, 2, k])
-    now = one * relative(c, 1, first, second, axes, levers, v, w)
-    now += two * relative(c, 2, first, second, axes, levers, v, w)
+    along = one * one * coupling(c, 1, 1, jacobian, answer) + two * two * coupling(c, 2, 2, jacobian, answer)
+    along += 2.0 * one * two * coupling(c, 1, 2, jacobian, answer)
+    now = one * relative(c, 1, bodies, jacobian, twist) + two * relative(c, 2, bodies, jacobian, twist)
     size = min(friction * normal, max(0.0, now / along))
     # energy added by the share f of friction: lost + f linear + f^2 square
     lost = 0.5 * normal * before[0] * (1.0 - restitution)
@@ -144,21 +127,17 @@ def _single(
     if lost + linear + square > 0.0:
         size *= max(0.0, (-linear + np.sqrt(max(linear * linear - 4.0 * square * lost, 0.0))) / (2.0 * square))
     for row, part in ((1, -size * one), (2, -size * two)):
-        push(c, row, part, first, second, axes, answers, inverse_mass, v, w)
+        push(c, row, part, bodies, answer, twist)
         impulse[row] = part
 
 
 @compiled()
 def _lose(
     chosen: Indices,
-    first: Indices,
-    second: Indices,
-    axes: Array,
-    levers: Array,
-    answers: Array,
-    inverse_mass: Array,
-    v: Array,
-    w: Array,
+    bodies: Indices,
+    jacobian: Array,
+    answer: Array,
+    twist: Array,
     before: Array,
     impulse: Array,
 ) -> None:
@@ -167,7 +146,7 @@ def _lose(
     for number in range(len(chosen)):
         c = chosen[number]
         for row in range(3):
-            now = relative(c, row, first, second, axes, levers, v, w)
+            now = relative(c, row, bodies, jacobian, twist)
             linear += impulse[c, row] * before[number, row]
             square += impulse[c, row] * (now - before[number, row])
     if linear + 0.5 * square <= 0.0 or square <= 0.0:
@@ -175,5 +154,5 @@ def _lose(
     share = max(0.0, -2.0 * linear / square)
     for c in chosen:
         for row in range(3):
-            push(c, row, (share - 1.0) * impulse[c, row], first, second, axes, answers, inverse_mass, v, w)
+            push(c, row, (share - 1.0) * impulse[c, row], bodies, answer, twist)
             impulse[c, row] *= share

@@ -132,8 +132,7 @@ def _orthonormal(rotation: Array) -> None:
 def drift(
     position: Array,
     rotation: Array,
-    velocity: Array,
-    spin: Array,
+    twist: Array,
     inertia: Array,
     inverse: Array,
     moving: Mask,
@@ -142,13 +141,12 @@ def drift(
     gravity: Array,
     time: float,
 ) -> None:
-    """Move all bodies for a time with their velocities at its end; all but the last six arguments change in place.
+    """Move all bodies for a time; positions, rotations and angular velocities change in place.
 
     Args:
         position: (n, 3) centres of mass.
         rotation: (n, 3, 3) of the bodies.
-        velocity: (n, 3) at the end of the time, m/s.
-        spin: (n, 3) angular velocities, rad/s.
+        twist: (n, 6) velocities at the end of the time and angular velocities, m/s and rad/s.
         inertia: (n, 3, 3) in the body.
         inverse: (n, 3, 3) their inverses.
         moving: (n,) which bodies move by themselves.
@@ -158,31 +156,29 @@ def drift(
         gravity: (3,) m/s2.
         time: seconds.
     """
-    turn, now = np.empty(3), np.empty((3, 3))
+    now = np.empty((3, 3))
     for b in range(len(position)):
         if not moving[b] and not given[b]:
             continue
         half = 0.0 if pushed[b] or given[b] else 0.5 * time * time
         for k in range(3):
-            position[b, k] += time * velocity[b, k] - half * gravity[k]
+            position[b, k] += time * twist[b, k] - half * gravity[k]
         if moving[b]:
-            turn_freely(rotation[b], inertia[b], inverse[b], spin[b], time)
+            turn_freely(rotation[b], inertia[b], inverse[b], twist[b, 3:], time)
         else:
-            for k in range(3):
-                turn[k] = time * spin[b, k]
-            _turned(turn, rotation[b], now)
+            _turned(time * twist[b, 3:], rotation[b], now)
             rotation[b] = now
 
 
 @compiled()
-def displace(position: Array, rotation: Array, shift: Array, turn: Array, moving: Mask) -> None:
-    """Displace the bodies that move by themselves by (n, 3) metres and turn them by (n, 3) radians, in place."""
+def displace(position: Array, rotation: Array, way: Array, moving: Mask) -> None:
+    """Displace the bodies that move by themselves by (n, 6) metres and radians, in place."""
     now = np.empty((3, 3))
     for b in range(len(position)):
         if moving[b]:
             for k in range(3):
-                position[b, k] += shift[b, k]
-            _turned(turn[b], rotation[b], now)
+                position[b, k] += way[b, k]
+            _turned(way[b, 3:], rotation[b], now)
             rotation[b] = now
 
 

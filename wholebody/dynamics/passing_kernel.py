@@ -122,24 +122,33 @@ def doubtful(
         # to be in each other on the way, and out again, they move by both gaps at least
         if way + turn + sag <= max(gap[c], 0.0) + max(gap_after[c], 0.0) + depth:
             continue
-        if _parts(pair[c], gap[c], normal[c], after, points, start, count, radius, axes, plane) - sag > -depth:
+        end = _part(pair[c], normal[c], after, points, start, count, radius, axes, plane)
+        if min(gap[c], end) - sag > -depth:
             continue
         known = normal_after[c, 0] != 0.0 or normal_after[c, 1] != 0.0 or normal_after[c, 2] != 0.0
         # as seen from one of the bodies, the points of the other also turn with the first
         both = angle[a] + angle[b]
         sag = 0.125 * both * both * (lever[a] + lever[b] + max(gap[c], 0.0) + way) + 0.25 * both * way + fall
-        parted = False
+        until, since = 0.0, 1.0  # shares of the step until which the first direction parts, and since which the last
         for own in (p, q):
             turned = _carried(normal[c], before[own], after[own])
-            least = _parts(pair[c], gap[c], turned, after, points, start, count, radius, axes, plane)
-            parted = parted or least - sag > -depth
+            end = _part(pair[c], turned, after, points, start, count, radius, axes, plane)
+            until = max(until, _share(gap[c] - sag, end - sag, -depth))
             if known:
                 turned = _carried(normal_after[c], after[own], before[own])
-                least = _parts(pair[c], gap_after[c], turned, before, points, start, count, radius, axes, plane)
-                parted = parted or least - sag > -depth
-        if not parted:
+                end = _part(pair[c], turned, before, points, start, count, radius, axes, plane)
+                since = min(since, 1.0 - _share(gap_after[c] - sag, end - sag, -depth))
+        if until < since:
             found += 1
     return found
+
+
+@compiled()
+def _share(start: float, end: float, least: float) -> float:
+    """Share of the way from a start to an end on which a value that changes linearly is not below the least one."""
+    if end >= least:
+        return 1.0 if start >= least else 0.0
+    return 0.0 if start <= least else (start - least) / (start - end)
 
 
 @compiled()
@@ -154,10 +163,9 @@ def _carried(direction: Array, before: Array, after: Array) -> Array:
 
 
 @compiled()
-def _parts(
+def _part(
     pair: Indices,
-    gap: float,
-    turned: Array,
+    direction: Array,
     placement: Array,
     points: Array,
     start: Indices,
@@ -166,10 +174,9 @@ def _parts(
     axes: Array,
     plane: Array,
 ) -> float:
-    """By how much a direction parts two pieces at the worse end of a step: by `gap` at one, measured at the other."""
-    least = -highest(pair[1], placement, turned, -1.0, points, start, count, radius, axes, plane)
-    least -= highest(pair[0], placement, turned, 1.0, points, start, count, radius, axes, plane)
-    return min(gap, least)
+    """By how much a direction parts two pieces, metres."""
+    low = -highest(pair[1], placement, direction, -1.0, points, start, count, radius, axes, plane)
+    return low - highest(pair[0], placement, direction, 1.0, points, start, count, radius, axes, plane)
 
 
 @compiled()

@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from wholebody import checks
 from wholebody.arrays import Array, Mask
-from wholebody.dynamics import motion_kernel, passing_kernel
+from wholebody.dynamics import contact_kernel, impact_kernel, motion_kernel, passing_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
 from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord
@@ -25,19 +25,22 @@ from wholebody.dynamics.pieces import Pieces
 from wholebody.dynamics.sleeping import Sleepers
 from wholebody.dynamics.step_program import NOTHING, SKIN, StepProgram
 from wholebody.errors import InputError
+from wholebody.geometry.placement import FARTHEST, placement
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene import Scene
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s2
 SUBSTEP = 1.0 / 240.0  # s: longest step; smaller is more accurate and slower
 SHORTEST = 1e-6  # s: of a step that ends with an impact
-INSIDE = 5e-5  # m: a step that leaves pieces deeper in each other is made again with half the time
-LEAST_GAP = 1e-5  # m: pieces nearer than this are parted before the next step
+INSIDE = 1e-4  # m: a step that leaves pieces deeper in each other is made again with half the time
+LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
 PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
 HALVINGS = 6  # of a step, at most
 MARGIN = 2e-3  # m: pairs are looked at from this much farther than bodies come in a step
-STOPS = 8  # early ends of steps in a frame, and two for each step of it
+STOPS = 12  # early ends of steps in a frame, at most
 DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
+FASTEST = 1e3  # m/s2: of gravity
+STRONGEST = 1e6  # N s
 PARTINGS = 4  # rounds of parting pieces after a step
 
 
@@ -59,7 +62,7 @@ class RigidBodies:
                 know each other.
         """
         checks.instance(scene, Scene, "scene", "give a wb.Scene")
-        self.gravity = np.array(checks.numbers(gravity, (3,), "gravity"))
+        self.gravity = _bounded(gravity, FASTEST, "gravity")
         pieces = Pieces(scene)
         if not pieces.dynamic.any():
             raise InputError("nothing in the scene moves by itself; add a thing with body=wb.Body(density=700)")
@@ -96,16 +99,16 @@ class RigidBodies:
         Raises:
             UnknownNameError: there is none of that name.
         """
-        number = self._number(name)
-        return np.concatenate([self.state.velocity[number], self.state.spin[number]])
+        return np.array(self.state.twist[self._number(name)])
 
     def velocity_at(self, name: str, point: Array) -> Array:
         """Velocity (3,) of a body's point at a place (3,) in the world, m/s.
 
         Raises:
             UnknownNameError: there is none of that name.
+            InputError: the place is not three finite numbers.
         """
-        number = self._number(name)
+        number, point = self._number(name), _bounded(point, FARTHEST, "point")
         lever = point - self.state.position[number]
         return np.asarray(self.state.velocity[number] + np.cross(self.state.spin[number], lever))
 
@@ -114,8 +117,9 @@ class RigidBodies:
 
         Raises:
             UnknownNameError: there is none of that name.
+            InputError: the place is not three finite numbers.
         """
-        number = self._number(name)
+        number, point = self._number(name), _bounded(point, FARTHEST, "point")
         lever = pin.skew(point - self.state.position[number])
         return np.asarray(np.eye(3) / self._pieces.mass[number] - lever @ self._inverse_inertia(number) @ lever)
 
@@ -124,8 +128,12 @@ class RigidBodies:
 
         Raises:
             UnknownNameError: there is none of that name.
+            InputError: impulse or place are not three finite numbers, or the body does not move by itself.
         """
-        number = self._number(name)
+        number, point = self._number(name), _bounded(point, FARTHEST, "point")
+        impulse = _bounded(impulse, STRONGEST, "impulse")
+        if not self._pieces.dynamic[number]:
+            raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
         lever = point - self.state.position[number]
         self.state.velocity[number] += impulse / self._pieces.mass[number]
         self.state.spin[number] += self._inverse_inertia(number) @ np.cross(lever, impulse)
@@ -159,13 +167,13 @@ class RigidBodies:
             UnknownNameError: there is no such segment or thing.
         """
         dt = checks.time_step(dt, "dt")
-        state, given = self.state, {self._number(name): ways for name, ways in (kinematic or {}).items()}
+        state, given = self.state, {self._number(name): _ways(ways, name) for name, ways in _given(kinematic).items()}
         for number, (before, after) in given.items():
             if self._pieces.dynamic[number]:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
             state.give(number, before, after, dt)
         count = int(np.ceil(dt / SUBSTEP - 1e-9))
-        record = FrameRecord(STOPS + 2 * count, np.zeros((len(self.names), 3)))
+        record = FrameRecord(STOPS, np.zeros((len(self.names), 3)))
         self._look(dt / count)
         for number in range(count):
             end = dt * (number + 1) / count
@@ -173,7 +181,7 @@ class RigidBodies:
                 self._step(end - record.time, record)
         for number, (_, after) in given.items():
             state.put(number, after)
-            state.velocity[number] = state.spin[number] = 0.0
+            state.twist[number] = 0.0
         state.given[:] = False
         self._sleepers.look(self._near, dt)
         self.time += dt
@@ -193,9 +201,9 @@ class RigidBodies:
         first = float(program.hits.min(initial=np.inf))
         if not together and first < time:
             time, record.stops = max(first, SHORTEST), record.stops - 1
-        kept, near, margin = state.kept(), self._near, self._margin
+        kept, near, margin, start = state.kept(), self._near, self._margin, self._old
         for halving in range(HALVINGS + 1):
-            program.solve(time, together, self._old)
+            program.solve(time, together, start)
             impulse, pushed = program.world_impulse(), program.pushed()
             self._falling = ~pushed
             self._drift(time, pushed)
@@ -205,11 +213,11 @@ class RigidBodies:
             if clear or halving == HALVINGS:
                 break
             state.restore(kept)
-            time *= 0.5
+            start, time = program.remembered(time), 0.5 * time
         record.time += time
         self._old = program.remembered(time)
-        np.add.at(record.impulse, program.points.second, impulse)
-        np.add.at(record.impulse, program.points.first, -impulse)
+        np.add.at(record.impulse, program.points.bodies[:, 1], impulse)
+        np.add.at(record.impulse, program.points.bodies[:, 0], -impulse)
         record.contacts = int((impulse != 0.0).any(axis=1).sum())
         record.signorini = max(record.signorini, program.residuals[0])
         record.coulomb = max(record.coulomb, program.residuals[1])
@@ -221,7 +229,7 @@ class RigidBodies:
         points = program.points
         for row in events:
             number = int(row[0])
-            first, second = points.first[number], points.second[number]
+            first, second = points.bodies[number]
             record.impulse[second] += row[2:]
             record.impulse[first] -= row[2:]
             place = points.point[number], points.normal[number]
@@ -231,7 +239,7 @@ class RigidBodies:
     def _drift(self, time: float, pushed: Mask) -> None:
         state = self.state
         motion_kernel.drift(
-            state.position, state.rotation, state.velocity, state.spin, self._pieces.inertia, state.inverse,
+            state.position, state.rotation, state.twist, self._pieces.inertia, state.inverse,
             state.moving, state.given, pushed, self.gravity, time,
         )  # fmt: skip
 
@@ -265,10 +273,11 @@ class RigidBodies:
         listed = found >= 0
         gap, normal = self._margin[bodies].sum(axis=1), np.zeros((len(listed), 3))
         gap[listed], normal[listed] = after.distance[found[listed]], after.normal[found[listed]]
+        spin, fall = np.linalg.norm(self.state.spin, axis=1), float(np.linalg.norm(self.gravity))
         doubtful = passing_kernel.doubtful(
-            near.pair, near.distance, near.normal, gap, normal, near.placements, after.placements, pieces.body,
-            self.state.position - kept, np.linalg.norm(self.state.spin, axis=1) * time, pieces.levers,
-            float(np.linalg.norm(self.gravity)) * time**2 / 8.0, PASSING, *pieces.heights,
+            near.pair, np.ascontiguousarray(near.distance), np.ascontiguousarray(near.normal), gap, normal,
+            near.placements, after.placements, pieces.body, self.state.position - kept, spin * time, pieces.levers,
+            fall * time**2 / 8.0, PASSING, *pieces.heights,
         )  # fmt: skip
         return int(doubtful) == 0
 
@@ -277,14 +286,60 @@ class RigidBodies:
         state = self.state
         for _ in range(PARTINGS):
             program = StepProgram(state, self._finder.points(self._near), self.gravity)
-            shift, turn = program.parting(0.5 * SKIN)
-            motion_kernel.displace(state.position, state.rotation, shift, turn, state.moving)
+            motion_kernel.displace(state.position, state.rotation, program.parting(0.5 * SKIN), state.moving)
             least = self._look(SUBSTEP)
             if least >= LEAST_GAP:
                 break
         return least
 
 
+def _bounded(value: object, most: float, what: str) -> Array:
+    """Three numbers, none of them beyond `most`."""
+    numbers = np.array(checks.numbers(value, (3,), what))
+    if np.abs(numbers).max() > most:
+        raise InputError(f"{what} is {checks.shown(value)}; give at most {most:g}")
+    return numbers
+
+
+def _given(kinematic: object) -> Mapping[str, object]:
+    if kinematic is None:
+        return {}
+    return checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")  # type: ignore[type-abstract]
+
+
+def _ways(ways: object, name: str) -> tuple[pin.SE3, pin.SE3]:
+    """Two placements; checking each of those that are pin.SE3 already would take a frame longer than its bodies."""
+    if not isinstance(ways, (tuple, list)) or len(ways) != 2:
+        raise InputError(
+            f"kinematic: {checks.shown(name)} has {checks.shown(ways)}; give its placements before and after"
+        )
+    before, after = (
+        way if isinstance(way, pin.SE3) and np.isfinite(way.homogeneous).all() else placement(way, f"kinematic: {name}")
+        for way in ways
+    )
+    return before, after
+
+
 @lru_cache(maxsize=1)
 def compiled_kernel() -> None:
     """Compile the loops or read them back: not in the middle of a frame."""
+    one, none, mask = np.zeros((1, 3)), np.zeros(0, dtype=np.intp), np.ones(1, dtype=bool)
+    unit, vectors, turned, twist = np.eye(3)[None].copy(), np.zeros((0, 3)), np.zeros((1, 4, 3)), np.zeros((1, 6))
+    some, mass, pairs = np.zeros(0), np.zeros(1), np.zeros((0, 2), dtype=np.intp)
+    motion_kernel.drift(one, unit.copy(), twist, unit, unit, mask, mask, mask, np.zeros(3), 1.0)
+    motion_kernel.displace(one, unit.copy(), twist, mask)
+    motion_kernel.world_inverses(unit, unit, mask, unit.copy())
+    motion_kernel.place_pieces(one, unit, one, np.zeros(1, dtype=np.intp), turned, turned.copy())
+    laid = np.zeros((0, 3, 3)), np.zeros((0, 3, 2, 6)), np.zeros((0, 3, 2, 6)), np.zeros((0, 2))
+    contact_kernel.lay(pairs, vectors, vectors, one, mass, unit, *laid)
+    contact_kernel.solve(none, pairs, *laid[1:], some, some, twist, vectors, 1.0, 1)
+    contact_kernel.residuals(pairs, laid[1], laid[3], some, some, twist, vectors)
+    contact_kernel.rates(pairs, laid[1], twist, vectors)
+    contact_kernel.apply(pairs, laid[2], twist, vectors)
+    contact_kernel.start_from(none, vectors, vectors, none, none, vectors, laid[0], 1.0, vectors)
+    impact_kernel.resolve(none, none, pairs, *laid, some, some, twist, 1.0, 1, vectors, np.zeros((1, 5)))
+    passing_kernel.doubtful(
+        pairs, some, vectors, some, vectors, turned, turned, none, one, mass, mass, 0.0, 1.0, vectors,
+        none, none, some, vectors, np.zeros((0, 4)),
+    )  # fmt: skip
+    passing_kernel.join(none, none, none, none)

@@ -14,8 +14,8 @@ from wholebody.dynamics.contact_points import ContactPoints
 SKIN = 5e-5  # m: gap at which bodies rest: coal's distances stay positive, its normals right to 0.02 rad
 TOUCH = 1e-5  # m: a gap larger than SKIN by this still touches
 SLOW = 0.02  # m/s: slower approaches are no impacts; 20 um of fall
-TOLERANCE = 1e-5  # m/s: of the program of a step
-SWEEPS = 200  # of it, at most
+TOLERANCE = 1e-4  # m/s: of the program of a step; 0.4 um of its way
+FEWEST, MOST, VISITS = 50, 1000, 40_000  # sweeps of it, and points times sweeps: more is exacter and slower
 SAME_POINT = 0.01  # m: contact points nearer than this, in the body, are the same from step to step
 MOST_EVENTS = 1000  # at one stop
 RELAXED = 1e-9  # m/s: by which a step that ends with an impact may overshoot
@@ -40,6 +40,15 @@ class Impulses(NamedTuple):
 NOTHING = Impulses(np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros((0, 3)), 1.0)
 
 
+class _Laid(NamedTuple):
+    """What the loops need of all points; see `contact_kernel`."""
+
+    axes: Array
+    jacobian: Array
+    answer: Array
+    mobility: Array
+
+
 class StepProgram:
     """The contact points of a step and their program.
 
@@ -56,30 +65,36 @@ class StepProgram:
         self.state, self.points, self.gravity = state, points, gravity
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
-        self.touching = points.gap <= SKIN + TOUCH
-        self.inverse_mass = np.where(state.moving, 1.0 / pieces.mass, 0.0)
-        self._laid = self._lay(self.inverse_mass, state.inverse_inertia(state.moving))
+        self._touching = points.gap <= SKIN + TOUCH
+        self._laid = self._lay(state.moving)
         self.impulse = np.zeros((len(points.gap), 3))
         self.residuals = (0.0, 0.0)
-        self._local = state.local(points.first, points.point)
-        self.look()
+        self._local = state.local(points.bodies[:, 0], points.point)
+        self.look(state.moving)
 
-    def look(self, falling: Mask | None = None) -> None:
+    def look(self, falling: Mask) -> None:
         """Read the present velocities: approaches and times of impact; `falling` (n,) are bodies that nothing bears."""
-        state, points = self.state, self.points
-        rates = state.relative(points.first, points.second, points.point)
-        self.speed = (rates * points.normal).sum(axis=1)
-        fall = (state.moving if falling is None else state.moving & falling)[:, None] * self.gravity
-        self._pull = ((fall[points.second] - fall[points.first]) * points.normal).sum(axis=1)
-        self.hits = times(points.gap - SKIN, self.speed, self._pull)
-        self.hits[(self.speed > -SLOW) | self.touching] = np.inf
+        bodies, normal = self.points.bodies, self.points.normal
+        self.speed = self._rates(self.state.twist)[:, 0]
+        fall = (self.state.moving & falling).astype(float)
+        self._pull = (fall[bodies[:, 1]] - fall[bodies[:, 0]]) * (normal @ self.gravity)
+        self.hits = times(self.points.gap - SKIN, self.speed, self._pull)
+        self.hits[(self.speed > -SLOW) | self._touching] = np.inf
 
-    def _lay(self, inverse_mass: Array, inverse_inertia: Array) -> tuple[Array, Array, Array, Array]:
-        points, count = self.points, len(self.points.gap)
-        laid = np.empty((count, 3, 3)), np.empty((count, 2, 3, 3)), np.empty((count, 2, 3, 3)), np.empty((count, 2))
-        contact_kernel.frames(
-            points.first, points.second, points.normal, points.point, self.state.position, inverse_mass,
-            inverse_inertia, *laid,
+    def _rates(self, twist: Array) -> Array:
+        """Relative velocities (m, 3) along the axes of the points."""
+        found = np.empty((len(self.points.gap), 3))
+        contact_kernel.rates(self.points.bodies, self._laid.jacobian, twist, found)
+        return found
+
+    def _lay(self, movable: Mask) -> _Laid:
+        state, points, count = self.state, self.points, len(self.points.gap)
+        laid = _Laid(
+            np.empty((count, 3, 3)), np.empty((count, 3, 2, 6)), np.empty((count, 3, 2, 6)), np.empty((count, 2))
+        )
+        contact_kernel.lay(
+            points.bodies, points.normal, points.point, state.position, np.where(movable, 1.0 / state.pieces.mass, 0.0),
+            state.inverse_inertia(movable), *laid,
         )  # fmt: skip
         return laid
 
@@ -88,18 +103,17 @@ class StepProgram:
 
         A body whose motion is given takes part with its mass, and keeps its motion afterwards.
         """
-        if not (self.touching & (self.speed < -SLOW)).any():
+        if not (self._touching & (self.speed < -SLOW)).any():
             return np.zeros((0, 5)), True
         state, points = self.state, self.points
-        weighed = state.moving | (state.given & np.isfinite(state.pieces.mass))
-        inverse_mass = np.where(weighed, 1.0 / state.pieces.mass, 0.0)
-        laid = self._lay(inverse_mass, state.inverse_inertia(weighed))
-        velocity, spin, events = state.velocity.copy(), state.spin.copy(), np.zeros((MOST_EVENTS, 5))
+        weighed = state.given & np.isfinite(state.pieces.mass)
+        laid = self._lay(state.moving | weighed) if weighed.any() else self._laid
+        twist, events = state.twist.copy(), np.zeros((MOST_EVENTS, 5))
         count, ended = impact_kernel.resolve(
-            np.flatnonzero(self.touching), points.pair, points.first, points.second, *laid, self._restitution,
-            self._friction, inverse_mass, velocity, spin, SLOW, MOST_EVENTS, np.zeros((len(points.gap), 3)), events,
+            np.flatnonzero(self._touching), points.pair, points.bodies, *laid, self._restitution, self._friction, twist,
+            SLOW, MOST_EVENTS, np.zeros((len(points.gap), 3)), events,
         )  # fmt: skip
-        state.velocity[state.moving], state.spin[state.moving] = velocity[state.moving], spin[state.moving]
+        state.twist[state.moving] = twist[state.moving]
         return events[:count], ended
 
     def solve(self, time: float, together: bool, old: Impulses) -> None:
@@ -114,55 +128,44 @@ class StepProgram:
         state.velocity[state.moving] += time * self.gravity
         target = np.where(points.gap > SKIN, (SKIN - points.gap) / time, 0.0)
         ends = self.hits <= time * (1.0 + 1e-9)
+        start = old._replace(impulse=old.impulse * (time / old.time))
         if together:
-            bouncing = ends | (self.touching & (self.speed < -SLOW))
+            bouncing = ends | (self._touching & (self.speed < -SLOW))
             if bouncing.any():
-                before = state.velocity.copy(), state.spin.copy()
-                self._solve(np.where(bouncing, -self._restitution * self.speed, target), NOTHING)
-                if self._lost(*before):
+                before = state.twist.copy()
+                self._solve(np.where(bouncing, -self._restitution * self.speed, target), start)
+                # the work of the impulses is that along the mean of the velocities before and after
+                if float((self._rates(0.5 * (before + state.twist)) * self.impulse).sum()) <= 0.0:
                     return
-                state.velocity[:], state.spin[:] = before
+                state.twist[:] = before
         else:  # bodies that nothing bears move with the mean of both velocities
             target = np.where(ends, target + 0.5 * np.minimum(self._pull, 0.0) * time - RELAXED, target)
-        self._solve(target, old._replace(impulse=old.impulse * (time / old.time)))
+        self._solve(target, start)
 
-    def _solve(self, target: Array, old: Impulses) -> None:
+    def _solve(self, target: Array, start: Impulses) -> None:
         state, points = self.state, self.points
-        axes, levers, answers, mobility = self._laid
+        axes, jacobian, answer, mobility = self._laid
         self.impulse[:] = 0.0
-        if len(old.pair):
+        if len(start.pair):
             head = np.full(len(state.pieces.table.pairs), -1, dtype=np.intp)
-            contact_kernel.start_from(
-                old.pair, old.local, old.impulse, head, points.pair, self._local, axes, SAME_POINT, self.impulse
-            )
-            contact_kernel.apply(
-                points.first, points.second, axes, answers, self.inverse_mass, state.velocity, state.spin, self.impulse
-            )
+            contact_kernel.start_from(*start[:3], head, points.pair, self._local, axes, SAME_POINT, self.impulse)
+            contact_kernel.apply(points.bodies, answer, state.twist, self.impulse)
         contact_kernel.solve(
-            np.arange(len(points.gap)), points.first, points.second, axes, levers, answers, mobility, self._friction,
-            target, self.inverse_mass, state.velocity, state.spin, self.impulse, TOLERANCE, SWEEPS,
+            np.arange(len(points.gap)), points.bodies, jacobian, answer, mobility, self._friction, target, state.twist,
+            self.impulse, TOLERANCE, sweeps(len(points.gap)),
         )  # fmt: skip
         self.residuals = contact_kernel.residuals(
-            points.first, points.second, axes, levers, mobility, self._friction, target, state.velocity, state.spin,
-            self.impulse,
-        )  # fmt: skip
-
-    def _lost(self, velocity: Array, spin: Array) -> bool:
-        """Whether the impulses since these velocities added no energy: their work is that along the mean velocity."""
-        mean_v, mean_w = 0.5 * (velocity + self.state.velocity), 0.5 * (spin + self.state.spin)
-        points = self.points
-        rates = self.state.relative(points.first, points.second, points.point, mean_v, mean_w)
-        return float((rates * self.world_impulse()).sum()) <= 0.0
+            points.bodies, jacobian, mobility, self._friction, target, state.twist, self.impulse
+        )
 
     def world_impulse(self) -> Array:
         """Impulses (m, 3) on the second bodies, along the world's axes, N s."""
-        return np.asarray(np.einsum("cr,crk->ck", self.impulse, self._laid[0]))
+        return np.asarray(np.einsum("cr,crk->ck", self.impulse, self._laid.axes))
 
     def pushed(self) -> Mask:
         """Bodies (n,) on which a contact acts."""
         found: Mask = np.zeros(len(self.state.moving), dtype=bool)
-        acting = self.impulse[:, 0] > 0.0
-        found[self.points.first[acting]] = found[self.points.second[acting]] = True
+        found[self.points.bodies[self.impulse[:, 0] > 0.0]] = True
         return found
 
     def remembered(self, time: float) -> Impulses:
@@ -170,17 +173,21 @@ class StepProgram:
         kept = np.flatnonzero(self.impulse[:, 0] > 0.0)
         return Impulses(self.points.pair[kept], self._local[kept], self.world_impulse()[kept], time)
 
-    def parting(self, gap: float) -> tuple[Array, Array]:
-        """Least displacements of all bodies, (n, 3) metres and (n, 3) radians, that part every point by a gap."""
-        points = self.points
-        axes, levers, answers, mobility = self._laid
-        shift, turn = np.zeros_like(self.state.velocity), np.zeros_like(self.state.spin)
+    def parting(self, gap: float) -> Array:
+        """Least displacements (n, 6) of all bodies, metres and radians, that part every point by a gap."""
+        points, count = self.points, len(self.points.gap)
+        _, jacobian, answer, mobility = self._laid
+        way = np.zeros_like(self.state.twist)
         contact_kernel.solve(
-            np.arange(len(points.gap)), points.first, points.second, axes, levers, answers, mobility,
-            np.zeros(len(points.gap)), gap - points.gap, self.inverse_mass, shift, turn, np.zeros((len(points.gap), 3)),
-            0.01 * gap, SWEEPS,
+            np.arange(count), points.bodies, jacobian, answer, mobility, np.zeros(count), gap - points.gap, way,
+            np.zeros((count, 3)), 0.01 * gap, sweeps(count),
         )  # fmt: skip
-        return shift, turn
+        return way
+
+
+def sweeps(count: int) -> int:
+    """Most sweeps for a number of points."""
+    return min(max(VISITS // max(count, 1), FEWEST), MOST)
 
 
 def times(gap: Array, speed: Array, pull: Array) -> Array:

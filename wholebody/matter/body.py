@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from wholebody import checks
 from wholebody.errors import InputError
 from wholebody.matter.materials import DEFAULT, Material, material
@@ -45,7 +47,7 @@ class Body:
         object.__setattr__(self, "material", material(self.material, "Body material"))
         for name in ("velocity", "angular_velocity"):
             values = checks.numbers(getattr(self, name), (3,), f"Body {name}")
-            if float((values**2).sum()) > FASTEST**2:
+            if np.abs(values).max() > FASTEST or float((values**2).sum()) > FASTEST**2:
                 raise InputError(f"Body {name} is {checks.shown(getattr(self, name))}; give at most {FASTEST:g}")
             object.__setattr__(self, name, tuple(float(x) for x in values))
 

@@ -16,6 +16,7 @@ from wholebody.checks import number, posture, time_step
 from wholebody.errors import InputError
 from wholebody.methods.control import Progress
 from wholebody.methods.inputs import TOLERANCE, check_problem
+from wholebody.moving_things import Collision, FrameMotion
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.workspace import Workspace
@@ -149,11 +150,13 @@ class SolvedStep(NamedTuple):
         q: (nq,) the next posture.
         iterations: of the method.
         judging: seconds of wall time that the assessment took.
+        collisions: what things that moved meanwhile (`Scene.move` with `over`) passed through, or are inside of.
     """
 
     q: Array
     iterations: int
     judging: float
+    collisions: tuple[Collision, ...] = ()
 
 
 class SolvingTracker:
@@ -189,8 +192,12 @@ class SolvingTracker:
         self._asked = copy.copy(problem)  # one for all steps, so that methods can reuse what they build for it
 
     def step(self, q: Array) -> SolvedStep:
-        """A whole solve from the posture q (nq,)."""
-        return self.frame(q)
+        """A whole solve from the posture q (nq,); what things that moved meanwhile met is named."""
+        self.workspace.refresh()
+        motion, step = self.workspace.next_frame(), self.frame(q)
+        if motion is None:
+            return step
+        return step._replace(collisions=judged(self.workspace, motion, q, step.q))
 
     def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
         """A whole solve from the posture q (nq,): by the method, or without a tolerance by the rough method."""
@@ -221,6 +228,13 @@ class SolvingTracker:
         )  # fmt: skip
         asked.clearances = now.clearances
         return asked
+
+
+def judged(workspace: Workspace, motion: FrameMotion, before: Array, after: Array) -> tuple[Collision, ...]:
+    """What a figure that goes straight from one posture to another, both (nq,), could not avoid in a frame."""
+    collisions = motion.collisions(((0.0, np.asarray(before, dtype=float)), (1.0, after)))
+    workspace.keep(motion, collisions)
+    return collisions
 
 
 def nearest_to(problem: Problem, q: Array) -> Problem:

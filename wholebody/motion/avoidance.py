@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from types import MappingProxyType
 
@@ -17,7 +17,11 @@ from wholebody.motion.avoider import Avoider, MethodResult, Progress, check_inpu
 from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
+from wholebody.motion.load_change import LoadChange, load_change
+from wholebody.motion.soles import standing_feet, usual_feet
 from wholebody.motion.stance import StanceFeet, has_feet
+from wholebody.motion.strength import Strength
+from wholebody.motion.trajectory.method import Trajectory
 from wholebody.motion_assessment import limit_violation
 from wholebody.scene import Scene
 
@@ -56,6 +60,7 @@ class AvoidanceReport:
         times: (m,) seconds of the clip as it was at which each frame of the answer is.
         before: the check of the clip as it was.
         after: the check of the answer.
+        loads: torques and the zero moment point before and after, where `dynamics` was asked for; else None.
     """
 
     solved: bool
@@ -71,6 +76,7 @@ class AvoidanceReport:
     times: Array
     before: ClipCheck
     after: ClipCheck
+    loads: LoadChange | None = None
 
     def __str__(self) -> str:
         """Three lines: what is left, before and after, and what it took."""
@@ -143,6 +149,7 @@ def avoid(
     method: str | Avoider = "trajectory",
     constraints: Iterable[Given] = (),
     hold_feet: bool = True,
+    dynamics: bool | Strength = False,
     progress: Progress | None = None,
 ) -> Avoided:
     """Free a clip of collisions of the figure with itself, with what it carries, and with what stands around.
@@ -155,6 +162,11 @@ def avoid(
             its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has.
         hold_feet: keep the feet of a figure that has some where they stand, as `wb.StanceFeet()` does, unless
             `constraints` has a `wb.StanceFeet` of its own; False lets them slide.
+        dynamics: keep the torques of joints within the strength of a person (a man of median strength if True; effort
+            limits of a robot), and the zero moment point within the support. What the clip exceeds already is exceeded
+            by no more: no joint needs more than its strength or than its largest torque before, and in no frame is the
+            zero moment point farther outside than it was. Contacts come first; the report says what is left. The method
+            "trajectory" can do this.
         progress: called with an `AvoidProgress` now and then; the method ends with what it has if it returns True.
 
     Returns:
@@ -172,17 +184,36 @@ def avoid(
     given: tuple[Given, ...] = tuple(listed(constraints, "avoid: constraints", "[wb.Freeze('root')]"))
     if flag(hold_feet, "avoid: hold_feet") and not any(isinstance(term, StanceFeet) for term in given):
         given = (*given, StanceFeet()) if has_feet(scene.figure) else given
+    strong = _strength(dynamics)
+    if strong is not None:
+        if not isinstance(chosen, Trajectory):
+            raise InputError(f"avoid: the method {chosen.name} does not take dynamics; give method='trajectory'")
+        chosen = replace(chosen, dynamics=strong)
+    strong = chosen.dynamics if isinstance(chosen, Trajectory) else None
+    stands = {} if strong is None else standing_feet(clip, usual_feet(scene.figure, given))
     terms = frame_terms(scene, clip.q, clip.dt, given)
     began = time.perf_counter()
     result = chosen.avoid(clip, scene, given, progress)
     seconds = time.perf_counter() - began
     found = clip.with_q(result.q)
-    return Avoided(found, _report(clip, found, terms, result, chosen.name, seconds))
+    change = None
+    if strong is not None:
+        old, new = (Clip(scene.figure, each.q, each.dt, each.name) for each in (clip, found))
+        change = load_change(old, new, result.times, stands, strong, terms)
+    return Avoided(found, _report(clip, found, terms, result, chosen.name, seconds, change))
+
+
+def _strength(dynamics: object) -> Strength | None:
+    """What `dynamics=` asks for."""
+    if isinstance(dynamics, Strength):
+        return dynamics
+    return Strength() if flag(dynamics, "avoid: dynamics") else None
 
 
 def _report(
-    before: Clip, after: Clip, terms: FrameTerms, result: MethodResult, method: str, seconds: float
-) -> AvoidanceReport:
+    before: Clip, after: Clip, terms: FrameTerms, result: MethodResult, method: str, seconds: float,
+    loads: LoadChange | None,
+) -> AvoidanceReport:  # fmt: skip
     scene = terms.scene
     was, now = check(before, scene, depth=COLLISION), check(after, scene, depth=COLLISION)
     times = before.times if result.times is None else result.times
@@ -201,7 +232,9 @@ def _report(
         left.append(f"a joint limit is missed by {beyond:.3g} rad or m")
     if missed > HELD:
         left.append(f"what is to hold is missed by {missed:.3g} m or rad")
-    solved = now.free and beyond <= ROUNDING and missed <= HELD
+    solved = now.free and beyond <= ROUNDING and missed <= HELD and (loads is None or loads.kept)
+    if loads is not None and not loads.kept:
+        left.append("loads are beyond their bounds")
     if not (solved or left):
         left = ["something collides between two frames that collide"]
     message = "; ".join(left) if left else "nothing collides, in the frames and between them, to 0.1 mm"
@@ -210,8 +243,10 @@ def _report(
         fast = now.speeds[0] if now.speeds else None
         if fast is not None:
             message += f"; {fast.joint} is still faster than its limit of {fast.limit:.3g} rad/s or m/s"
+    if loads is not None:
+        message += f"; {loads}"
     changed = int((np.abs(after.q - timed.q) > SAME).any(axis=1).sum())
     return AvoidanceReport(
         solved, message, method, seconds, result.posture_solves, result.programs, changed, missed, result.stretch,
-        after.duration, times, was, now,
+        after.duration, times, was, now, loads,
     )  # fmt: skip

@@ -133,8 +133,8 @@ class BatchTable:
         made = csv.DictWriter(sheet, names, lineterminator="\n")
         made.writeheader()
         made.writerows(rows)
-        write(self.folder / SHEET, sheet.getvalue())
         write(self.folder / TABLE, json.dumps({"cases": rows, "originals": self._originals}, indent=1))
+        write(self.folder / SHEET, sheet.getvalue())  # nobody reads it back: it may be older by a row after a crash
 
     def _read(self) -> None:
         path = self.folder / TABLE

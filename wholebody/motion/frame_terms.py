@@ -67,6 +67,14 @@ class FrameTerms:
             found.append(replace(foot, at=pin.SE3(at.rotation, at.translation + shift)))
         return tuple(found)
 
+    def shift(self, frame: int, joint: int) -> Array:
+        """(3,) by how much what stands on a joint, or on those after it, is held beside where it was, metres."""
+        model = self.scene.model
+        for name, shift in zip(self.stands[frame], self.shifts[frame], strict=True):
+            if joint in model.supports[model.frames[self.scene.figure.frame_id(name)].parentJoint]:
+                return shift
+        return np.zeros(3)
+
     def bounds(self, frame: int, state: State) -> tuple[Array, Array, Array, Array]:
         """Bounds of a frame.
 

@@ -8,7 +8,6 @@ on the joints through the foot's Jacobian.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -32,8 +31,8 @@ class Stand(NamedTuple):
     Attributes:
         points: (p, 3) points of the soles that bear force, metres.
         owner: (p,) number of the foot of each.
-        corners: (e, 2) of the support polygon, anticlockwise; none where there is no area.
-        normals: (e, 2) inward normals of its edges.
+        corners: (c, 2) of the support polygon, anticlockwise; both ends where the points lie on a line; none in flight.
+        normals: (e, 2) inward normals of its edges; of a line of both sides and both ends.
         offsets: (e,) inside, ``normals @ place >= offsets``, metres.
         height: of the ground, metres.
     """
@@ -44,6 +43,12 @@ class Stand(NamedTuple):
     normals: Array
     offsets: Array
     height: float
+
+    def shifted(self, shifts: Sequence[Array]) -> Stand:
+        """The same with each foot (3,) farther, metres."""
+        if not any(shift.any() for shift in shifts):
+            return self
+        return _standing(self.points + np.array(shifts)[self.owner], self.owner)
 
     def margins(self, place: Array) -> Array:
         """(e,) distances of a place (2,) from the edges, metres; positive inside."""
@@ -104,13 +109,7 @@ class InverseDynamics:
         """Where a posture (nq,) stands, on some of the feet."""
         pin.forwardKinematics(self._model, self._data, q)
         points, owner = self.soles.points(self._data, list(feet))
-        corners, height = np.zeros((0, 2)), 0.0
-        if len(points):
-            height = float(points[:, 2].min())
-            with suppress(InputError):  # the points lie on a line, which bears no moment about itself
-                corners = convex_polygon(points[:, :2])
-        normals, offsets = edges(corners) if len(corners) else (np.zeros((0, 2)), np.zeros(0))
-        return Stand(points, owner, corners, normals, offsets, height)
+        return _standing(points, owner)
 
     def loads(self, q: Array, v: Array, a: Array, stand: Stand) -> Loads:
         """Loads of a posture (nq,) with its velocity and acceleration (nv,)."""
@@ -126,6 +125,35 @@ class InverseDynamics:
             torque -= pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.WORLD).T @ total
         return Loads(torque, wrench, ground, center)
 
+    def free_torque(self, q: Array, v: Array, a: Array) -> Array:
+        """(nv,) torques in the air."""
+        return np.array(pin.rnea(self._model, self._data, q, v, a))
+
+    def grounded(self, q: Array, torques: Array, shares: Array, stand: Stand) -> tuple[Array, Array]:
+        """Parts of torques (k, nv) in the air, after the ground's forces, and the wrenches (k, 6) of the parts.
+
+        Args:
+            q: (nq,) posture.
+            torques: (k, nv) parts; the ground's forces are linear in them while the same edges of friction bear.
+            shares: (k,) of the parts in the sum, at which edges are chosen.
+            stand: where it stands.
+        """
+        model, data = self._model, self._data
+        if not self.free:
+            return torques, np.zeros((len(torques), 6))
+        center = np.array(pin.centerOfMass(model, data, q))
+        pin.computeJointJacobians(model, data, q)
+        wrenches = np.array([data.oMi[1].act(pin.Force(part[:ROOT])).vector for part in torques])
+        split = self.split(shares @ wrenches, center, stand).split
+        left = torques.copy()
+        for foot, joint in enumerate(self.soles.joints):
+            mine = stand.owner == foot
+            if mine.any():
+                jacobian = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.WORLD)
+                given = point_map(stand.points[mine]) @ split[np.repeat(mine, 3)] @ moving(center)
+                left -= wrenches @ (jacobian.T @ given).T
+        return left, wrenches
+
     def split(self, wrench: Array, center: Array, stand: Stand) -> GroundForces:
         """The ground's forces for a wrench (6,) about the world's origin."""
         return ground_forces(moved(wrench, center), center, stand.points, self._friction)
@@ -138,7 +166,8 @@ class InverseDynamics:
         if (stand.margins(place) >= 0.0).all():
             return 0.0
         ends = np.roll(stand.corners, -1, axis=0) - stand.corners
-        along = np.einsum("ij,ij->i", place - stand.corners, ends) / np.einsum("ij,ij->i", ends, ends)
+        length = np.maximum(np.einsum("ij,ij->i", ends, ends), np.finfo(float).tiny)
+        along = np.einsum("ij,ij->i", place - stand.corners, ends) / length
         nearest = stand.corners + np.clip(along, 0.0, 1.0)[:, None] * ends
         return float(np.linalg.norm(place - nearest, axis=1).min())
 
@@ -186,6 +215,28 @@ class InverseDynamics:
                 for early, axis in before:
                     found[late, early] = axis.cross(turned).dot(force)
         return found
+
+
+def _standing(points: Array, owner: Indices) -> Stand:
+    """Where points (p, 3) of feet stand."""
+    if not len(points):
+        return Stand(points, owner, np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0), 0.0)
+    return Stand(points, owner, *_support(points[:, :2]), float(points[:, 2].min()))
+
+
+def _support(points: Array) -> tuple[Array, Array, Array]:
+    """Corners (c, 2), normals (e, 2) and offsets (e,) of the convex hull of points (p, 2), which may lie on a line."""
+    try:
+        corners = convex_polygon(points)
+        return corners, *edges(corners)
+    except InputError:  # one capsule, or one point: a foot without width
+        middle = points.mean(axis=0)
+        along = np.linalg.svd(points - middle)[2][0]
+        places = (points - middle) @ along
+        corners = np.unique(points[[int(np.argmin(places)), int(np.argmax(places))]], axis=0)
+        across = np.array([-along[1], along[0]])
+        normals = np.array([across, -across, along, -along])
+        return corners, normals, (corners @ normals.T).min(axis=0)
 
 
 def foot_wrenches(forces: Array, stand: Stand, soles: Soles) -> list[Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,14 +22,25 @@ SPREAD_CORNERS = 12
 """Most points of one foot: the outermost ones in as many directions. Fewer cut off the ends of a rounded sole."""
 
 
+def usual_feet(figure: Figure, constraints: Iterable[object]) -> tuple[str, ...]:
+    """The segments on which a figure with a free root stands, or else the frames that `StanceFeet` among terms name."""
+    if figure.root != "free":
+        return ()
+    found = tuple(name for name in FEET if name in figure.segments)
+    given = [term for term in constraints if isinstance(term, StanceFeet) and term.feet is not None]
+    return found or tuple(name for term in given for name in term.names(figure))
+
+
 def standing_feet(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:
-    """In which frames (n,) each foot stands: one of its points does.
+    """In which frames (n,) each foot stands: one of its points does; none of a root that is fixed.
 
     Raises:
         InputError: no feet are named.
     """
     figure = clip.figure
     found: dict[str, Mask] = {}
+    if figure.root != "free":
+        return found
     for name in feet:
         joint = figure.model.frames[figure.frame_id(name)].parentJoint
         points = tuple(

@@ -14,7 +14,7 @@ from wholebody.arrays import Array, Mask
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, foot_wrenches
+from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, Stand, foot_wrenches
 from wholebody.motion.soles import standing_feet
 from wholebody.motion.stance import FEET
 from wholebody.motion.strength import Strength, torque_limits
@@ -74,6 +74,11 @@ class Torques:
         return found
 
     @property
+    def largest_share(self) -> float:
+        """The largest `share` of any joint in any frame."""
+        return float(self.share.max(initial=0.0))
+
+    @property
     def beyond(self) -> Mask:
         """(n,) frames in which a joint needs more than its strength."""
         return np.asarray((self.share > 1.0).any(axis=1))
@@ -87,17 +92,24 @@ class Torques:
             found[name] = float(peaks[joint.idx_v : joint.idx_v + joint.nv].max())
         return found
 
+    def joint_of(self, column: int) -> str:
+        """Name of the joint of a column of `torque`."""
+        for name in self.figure.joints:
+            joint = self.figure.model.joints[self.figure.joint_id(name)]
+            if joint.idx_v <= column < joint.idx_v + joint.nv:
+                return name
+        return "root"
+
     def __str__(self) -> str:
         """Three lines: the joint nearest to its strength, what the ground cannot give, and how many frames stand."""
         share = self.share
         frame, column = (int(k) for k in np.unravel_index(np.argmax(share), share.shape))
-        names = {self.figure.model.joints[self.figure.joint_id(name)].idx_v: name for name in self.figure.joints}
         first = "no joint has a known strength"
         if np.isfinite(self.lower).any():
             first = (
-                f"{names[column]} needs {abs(self.torque[frame, column]):.0f} N m, {share[frame, column]:.0%} of its "
-                f"strength, at {frame * self.dt:.2f} s; {int(self.beyond.sum())} of {len(self.torque)} frames need "
-                "more than the strength of a joint"
+                f"{self.joint_of(column)} needs {abs(self.torque[frame, column]):.0f} N m, {share[frame, column]:.0%} "
+                f"of its strength, at {frame * self.dt:.2f} s; {int(self.beyond.sum())} of {len(self.torque)} frames "
+                "need more than the strength of a joint"
             )
         force, moment = (np.linalg.norm(part, axis=1) for part in (self.missing[:, :3], self.missing[:, 3:]))
         return (
@@ -152,13 +164,13 @@ def torques(
         figure.frame_id(name)
     if not sum(inertia.mass for inertia in figure.model.inertias[1:]) > 0.0:
         raise InputError(f"torques: {figure.name} has no mass; give its segments masses")
-    stands = standing_feet(clip, feet) if figure.root == "free" else {}
-    return clip_torques(clip, stands, strength, friction, cutoff)
+    return clip_torques(clip, standing_feet(clip, feet), strength, friction, cutoff)
 
 
 def clip_torques(
-    clip: Clip, stands: Mapping[str, Mask], strength: Strength, friction: float, cutoff: float | None
-) -> Torques:
+    clip: Clip, stands: Mapping[str, Mask], strength: Strength, friction: float, cutoff: float | None,
+    soles: Sequence[Stand] | None = None,
+) -> Torques:  # fmt: skip
     """Torques of a clip that stands on given feet in given frames; see `torques`.
 
     Args:
@@ -167,6 +179,7 @@ def clip_torques(
         strength: of the person.
         friction: coefficient.
         cutoff: Hz, or None.
+        soles: where each frame stands; None for where its own feet are.
     """
     figure, steady = clip.figure, smoothed(clip, cutoff)
     v, a = steady.velocities(), steady.accelerations()
@@ -176,7 +189,7 @@ def clip_torques(
     force, moment, pressure = (np.zeros((count, len(stands), 3)) for _ in range(3))
     both, outside = np.zeros((count, 3)), np.zeros(count)
     for k in range(count):
-        stand = dynamics.stand(steady.q[k], [bool(marks[k]) for marks in stands.values()])
+        stand = dynamics.stand(steady.q[k], [bool(m[k]) for m in stands.values()]) if soles is None else soles[k]
         loads = dynamics.loads(steady.q[k], v[k], a[k], stand)
         torque[k] = loads.torque
         if not dynamics.free:

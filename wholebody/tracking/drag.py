@@ -16,7 +16,7 @@ from wholebody.arrays import Array
 from wholebody.checks import time_step
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.passing_through import GRAZE, is_free
-from wholebody.methods.base import Method, Tracker, goal_error
+from wholebody.methods.base import Method, Tracker, goal_error, judged
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_solution import AssemblySolution
 from wholebody.methods.solve import method_for_motions
@@ -78,8 +78,7 @@ class ProblemDrag:
                 before, self._motion = self.q, self._workspace.next_frame()
                 iterations = self._followed()
                 if self._motion is not None:
-                    collisions = self._motion.collisions(((0.0, before), (1.0, self.q)))
-                    self._workspace.keep(self._motion, collisions)
+                    collisions = judged(self._workspace, self._motion, before, self.q)
             error = goal_error(self.problem, self._workspace, self.q)
             return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions)
 

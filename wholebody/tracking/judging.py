@@ -60,7 +60,7 @@ def judge(scene: Scene, recording: Recording) -> Judgement:
     """Assess a recording of a scene."""
     instance(scene, Scene, "judge: scene", "make one with wb.Scene(figure)")
     instance(recording, Recording, "judge: recording", "make one with follow(scene, track)")
-    shown, tracked = (assess_motion(scene, q, recording.dt) for q in (recording.q, recording.tracked))
+    shown, tracked = (assess_motion(scene, q, recording.dt, recording.moves) for q in (recording.q, recording.tracked))
     model, free = scene.model, scene.figure.root == "free"
     each = [pin.difference(model, *pair) for pair in zip(recording.tracked, recording.q, strict=True)]
     apart = np.array(each)
@@ -71,7 +71,7 @@ def judge(scene: Scene, recording: Recording) -> Judgement:
         tracked_pairs=tracked.overlapping,
         limit_violation=shown.limit_violation,
         cone_violation=cone_violation(scene, recording.q),
-        passed=passed(scene, recording.q, PASSING[recording.overlap]),
+        passed=passed(scene, recording.q, PASSING[recording.overlap], recording.moves),
         distance=root_mean_square(apart[:, 6 if free else 0 :]),
         root_distance=places if free else np.zeros(len(recording)),
         jerk=shown.jerk,

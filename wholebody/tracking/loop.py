@@ -7,9 +7,10 @@ is attracted to the tracked posture as far as contact allows.
 
 from __future__ import annotations
 
+import copy
 import itertools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike
 from wholebody.arrays import Array
 from wholebody.checks import array, flag, function, instance, known, listed, time_step
 from wholebody.errors import InputError
+from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.proximity import PENETRATION
 from wholebody.methods.inputs import SEED
 from wholebody.methods.qp.method import QP
@@ -220,6 +222,28 @@ def _clocks() -> tuple[float, float]:
     return time.perf_counter(), time.thread_time()
 
 
+def frame_placements(
+    scene: Scene, moves: Mapping[str, Sequence[PlacementLike]] | None, count: int, what: str
+) -> dict[str, tuple[pin.SE3, ...]]:
+    """Placements of things at the ends of `count` frames, checked.
+
+    Raises:
+        InputError: not a mapping, not as many placements as frames, or one that cannot be read.
+        UnknownNameError: there is no such thing.
+    """
+    if moves is None:
+        return {}
+    instance(moves, Mapping, what, "give {name: a placement for each frame}")  # type: ignore[type-abstract]
+    found = {}
+    for name, given in moves.items():
+        known(name, scene.objects, "object", what)
+        places = listed(given, f"{what}[{name!r}]", "[(x, y, z), ...]")
+        if len(places) != count:
+            raise InputError(f"{what}[{name!r}] has {len(places)} placements; give {count}, one for each frame")
+        found[name] = tuple(placement(at, f"{what}[{name!r}][{number}]") for number, at in enumerate(places))
+    return found
+
+
 def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
     """The posture q, or the nearest one without overlap, with a note of the change.
 
@@ -257,6 +281,7 @@ def follow(
     seed: int = 0,
     rigid: bool = False,
     progress: Callable[[int], None] | None = None,
+    moves: Mapping[str, Sequence[PlacementLike]] | None = None,
 ) -> Recording:
     """Follow a whole track.
 
@@ -267,6 +292,8 @@ def follow(
         seed: of all random orders; the same seed gives the same frames.
         rigid: whether the figure is displaced as a whole, see `FrameLoop`.
         progress: called after each frame with the number of frames done.
+        moves: thing to its placement at the end of each frame, as many as the track has; it moves from one to the next,
+            and begins where the scene has it. The scene is left as it was.
 
     Raises:
         UnknownNameError, InputError: the track does not fit the figure, or no posture near its start is free; frame
@@ -276,10 +303,14 @@ def follow(
     instance(track, Track, "follow: track", "make one with Track.of(figure, q, dt)")
     function(progress, "progress")
     track.check(scene.figure)
+    ways = frame_placements(scene, moves, len(track.q), "follow: moves")
+    scene = copy.copy(scene) if ways else scene
     loop = FrameLoop(scene, track.q[0], overlap=overlap, dt=track.dt, seed=seed, rigid=rigid)
     frames = []
     for number, tracked in enumerate(track.q):
+        for name, places in ways.items():
+            scene.move(name, at=places[number], over=track.dt)
         frames.append(loop.frame(tracked))
         if progress is not None:
             progress(number + 1)
-    return Recording.of(frames, track.q, track.dt, overlap)
+    return Recording.of(frames, track.q, track.dt, overlap, ways)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
@@ -56,6 +57,7 @@ class Recording:
         seconds, cpu_seconds, contact_seconds, solve_seconds: (n,) as in `Frame`.
         iterations, joints, pairs: (n,) as in `Frame`.
         notes: a note for each frame, mostly empty.
+        moves: things that moved, with their placements at the ends of the frames.
     """
 
     q: Array
@@ -70,9 +72,17 @@ class Recording:
     joints: Counts
     pairs: Counts
     notes: tuple[str, ...]
+    moves: Mapping[str, Sequence[pin.SE3]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, frames: Sequence[Frame], tracked: Array, dt: float, overlap: str) -> Recording:
+    def of(
+        cls,
+        frames: Sequence[Frame],
+        tracked: Array,
+        dt: float,
+        overlap: str,
+        moves: Mapping[str, Sequence[pin.SE3]] | None = None,
+    ) -> Recording:
         """Collect frames."""
         return cls(
             q=np.array([frame.q for frame in frames]),
@@ -87,6 +97,7 @@ class Recording:
             joints=np.array([frame.joints for frame in frames], dtype=np.intp),
             pairs=np.array([frame.pairs for frame in frames], dtype=np.intp),
             notes=tuple(frame.note for frame in frames),
+            moves={} if moves is None else dict(moves),
         )
 
     def __len__(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +24,12 @@ from wholebody.motion.avoider import Avoider
 from wholebody.motion.batch import avoid_many
 from wholebody.motion.batch_table import AvoidedCase
 from wholebody.motion.bisection.method import Bisection
+from wholebody.motion.checking import check
 from wholebody.motion.clip import Clip
 from wholebody.motion.equipment import Equipment
 from wholebody.motion.frame_terms import Given
 from wholebody.motion.reading import read_clip
-from wholebody.motion.ready_equipment import Worn, dressed
+from wholebody.motion.ready_equipment import Worn, dressed, equipment
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import Freeze, Hold, Point
@@ -43,7 +44,7 @@ TILE = (230, 330)  # pixels of a picture
 GAP = 4  # pixels between two
 COLORS = 96  # of a picture's palette: it is a third of the size
 PICTURES = 7
-AWAY = 2.9  # m: of the camera from the figure
+AWAY = 3.5  # m: of the camera from the figure
 
 View = tuple[float, float, float]
 FRONT, SIDE, SLANTED = (1.0, 0.12, 0.12), (0.12, -1.0, 0.12), (0.8, 0.7, 0.15)
@@ -64,6 +65,7 @@ class Drawing:
         span: seconds of the clip, from and to.
         armed: whether both hands carry a weapon.
         feet: whether feet that stand are held.
+        shown: method whose answer the picture shows.
     """
 
     number: str
@@ -73,9 +75,16 @@ class Drawing:
     methods: tuple[str | Avoider, ...] = METHODS
     constraints: tuple[Given, ...] = ()
     views: tuple[View, ...] = (SLANTED,)
-    span: tuple[float, float] = (0.0, 3.0)
+    span: tuple[float, float] = (0.0, 1.8)
     armed: bool = False
     feet: bool = True
+    shown: str = "trajectory"
+
+
+def belt(figure: Figure) -> tuple[Equipment, ...]:
+    """Pouches that rest on the hips too, into which a crouch presses them."""
+    hips = ("pelvis", "left_thigh", "right_thigh")
+    return tuple(replace(pouch, rests_on=(*pouch.rests_on, *hips)) for pouch in equipment("pouches", figure))
 
 
 def weapon(figure: Figure) -> Worn:
@@ -100,16 +109,18 @@ def carrying(figure: Figure) -> Array:
 
 DRAWINGS = (
     Drawing("4.1", "a walk, with a sphere at the torso's side", WALK, lambda _: "side_sphere"),
-    Drawing("4.2", "a vertical jump, with a sphere at the torso's side", JUMP, lambda _: "side_sphere"),
-    Drawing("4.3", "the take-off of the jump, with pouches", JUMP, lambda _: "pouches", views=(FRONT, SLANTED)),
+    Drawing("4.2", "a vertical jump, with a sphere at the torso's side", JUMP, lambda _: "side_sphere",
+            span=(0.4, 2.0)),
+    Drawing("4.3", "the take-off of the jump, with pouches", JUMP, belt, views=(FRONT, SLANTED),
+            span=(0.6, 1.2)),
     Drawing("4.4", "a walk with a weapon in both hands, with pouches, hands free", WALK, weapon, armed=True,
-            views=(FRONT, SLANTED)),
+            views=(FRONT, SLANTED), shown="bisection"),
     Drawing("4.5", "the same, with the grip of both hands held", WALK, weapon, armed=True, views=(FRONT, SLANTED),
-            constraints=(Hold(HANDS[1], relative_to=HANDS[0]),)),
+            constraints=(Hold(HANDS[1], relative_to=HANDS[0]),), shown="bisection"),
     Drawing("4.6", "from prone to standing, all joints free to move", RISE, lambda _: "nothing",
-            (*METHODS, Bisection(frozen=())), views=(SIDE, SLANTED), span=(1.0, 3.0), feet=False),
+            (*METHODS, Bisection(frozen=())), views=(SIDE, SLANTED), span=(1.4, 2.8), feet=False, shown="bisection 2"),
     Drawing("4.7", "the same, with the feet that stand held", RISE, lambda _: "nothing",
-            views=(SIDE, SLANTED), span=(1.0, 3.0)),
+            views=(SIDE, SLANTED), span=(1.4, 2.8), shown="bisection"),
 )  # fmt: skip
 
 
@@ -145,9 +156,11 @@ def redraw(drawing: Drawing, recordings: Mapping[str, Path], figure: Figure, fol
         hold_feet=drawing.feet, jobs=jobs,
     )  # fmt: skip
     after = {row.method: read_clip(folder / name / row.file, figure) for row in rows if row.file}
-    shown = after["bisection 2" if "bisection 2" in after else "trajectory"]
+    if drawing.shown not in after:
+        raise InputError(f"figure {drawing.number}: there is no clip by {drawing.shown}, which its picture shows")
+    shown = after[drawing.shown]
     strip = _strip(drawing, dressed(figure, worn), before, shown, folder / f"{name}.png")
-    return Redrawn(drawing, strip, _curves(drawing, before, after, folder / f"{name}-curves")[0], rows)
+    return Redrawn(drawing, strip, _curves(drawing, before, after, shown, folder / f"{name}-curves")[0], rows)
 
 
 def _clip(drawing: Drawing, recordings: Mapping[str, Path], figure: Figure, folder: Path) -> Clip:
@@ -172,7 +185,7 @@ def _strip(drawing: Drawing, scene: Scene, before: Clip, after: Clip, path: Path
 
     from wholebody.view import Viewer
 
-    scene.add(HalfSpace(), name="floor")
+    scene.add(HalfSpace(offset=-_sunk(before, after)), name="floor")
     if len(drawing.views) == 1:
         frames = np.linspace(0, len(before) - 1, PICTURES).round().astype(int).tolist()
         tiles = [[(frame, drawing.views[0], freed) for frame in frames] for freed in (False, True)]
@@ -185,7 +198,8 @@ def _strip(drawing: Drawing, scene: Scene, before: Clip, after: Clip, path: Path
         for row, line in enumerate(tiles):
             for column, (frame, view, freed) in enumerate(line):
                 middle = before.q[frame][:3]
-                viewer.look(middle + AWAY * np.array(view) / np.linalg.norm(view), middle)
+                away = _facing(before.q[0]) @ np.array(view)
+                viewer.look(middle + AWAY * away / np.linalg.norm(view), middle)
                 viewer.ghosts([before.q[frame]] if freed else [])
                 viewer.show(after.q[frame] if freed else before.q[frame])
                 with Image.open(viewer.picture(scratch / "one.png", TILE)) as picture:
@@ -195,10 +209,27 @@ def _strip(drawing: Drawing, scene: Scene, before: Clip, after: Clip, path: Path
     return write(path, made.getvalue())
 
 
-def _curves(drawing: Drawing, before: Clip, after: Mapping[str, Clip], path: Path) -> tuple[Path, Path]:
-    """The two joints that change most before and after, and what the figure is about."""
+def _facing(q: Array) -> Array:
+    """Rotation about z to where the root faces; none where it lies."""
+    forward = pin.Quaternion(np.array(q[3:7])).matrix()[:2, 0]
+    if np.linalg.norm(forward) < 0.5:
+        return np.eye(3)
+    c, s = forward / np.linalg.norm(forward)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _sunk(*clips: Clip) -> float:
+    """How far clips go into the floor, metres: it takes no part in the avoiding, and is drawn below them."""
+    floor = Scene(clips[0].figure)
+    floor.add(HalfSpace(), name="floor")
+    found = [contact for clip in clips for contact in check(clip, floor).contacts]
+    return max((contact.deepest for contact in found if "floor" in contact.names), default=0.0)
+
+
+def _curves(drawing: Drawing, before: Clip, after: Mapping[str, Clip], shown: Clip, path: Path) -> tuple[Path, Path]:
+    """The two joints that change most in the picture before and after, and what the figure is about."""
     figure = before.figure
-    change = np.max([np.abs(_change(before, clip)).max(axis=0) for clip in after.values()], axis=0)
+    change = np.abs(_change(before, shown)).max(axis=0)
     columns = {figure.model.joints[figure.joint_id(name)].idx_v: name for name in figure.joints}
     ranked = sorted(columns, key=lambda column: -change[column])[:2]
     drawn, axes = plot_style.figure(1, 3, (11.0, 2.9))
@@ -217,7 +248,7 @@ def _curves(drawing: Drawing, before: Clip, after: Mapping[str, Clip], path: Pat
     last.set_title(title, fontsize=10)
     for axis in axes[0]:
         axis.set_xlabel("s")
-    axes[0][0].legend(fontsize=7, frameon=False)
+    drawn.legend(*axes[0][0].get_legend_handles_labels(), loc="outside right upper", fontsize=8, frameon=False)
     return plot_style.save(drawn, path)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +14,12 @@ from wholebody.bench.report import render
 
 DEEP = 0.1  # mm: what may remain, in frames and in between
 ASKED = {"jerk": 1.2, "sliding_mm": 1.0, "hand_mm": 1.0}
+OF_BISECTION = 0.7
+"""Of bisection's deviation that is asked of the trajectory's."""
+
+NAMED = 3
+"""Cases that fall short that a line names."""
+
 REAL_TIME = {"check": 0.1, "bisection": 1.0, "frames": 1.0, "trajectory": 2.0}
 """Seconds for each second of motion that are asked of a method."""
 
@@ -79,6 +85,64 @@ def against_bisection(rows: Sequence[MotionRow]) -> float:
     return float(np.median(ratios)) if ratios else float("nan")
 
 
+@dataclass(frozen=True)
+class Line:
+    """What is asked of a method, and how many cases reach it.
+
+    Attributes:
+        method: whose.
+        asked: in words.
+        cases: how many there are.
+        short: those that fall short, the worst first, each with its value.
+        unit: of the values.
+    """
+
+    method: str
+    asked: str
+    cases: int
+    short: tuple[tuple[MotionRow, float], ...]
+    unit: str
+
+    @property
+    def named(self) -> str:
+        """The worst that fall short, and how many there are besides."""
+        told = [f"{row.clip}, {row.equipment}: {value:.3g}{self.unit}" for row, value in self.short[:NAMED]]
+        more = len(self.short) - NAMED
+        return "; ".join(told) + (f"; {more} more" if more > 0 else "")
+
+
+def lines(rows: Sequence[MotionRow]) -> list[Line]:
+    """Everything that is asked, line by line, of each method that was measured."""
+    bisected = {row.key[:2]: row.angle for row in rows if row.method == "bisection" and row.outcome == "free"}
+    asked: list[tuple[str, str, str, float, Callable[[MotionRow], float | None]]] = []
+    for method in (each.method for each in standings(rows) if each.method != CHECKED):
+        asked += [
+            (method, f"no frame deeper than {DEEP} mm", " frames", 0.0, lambda row: row.after),
+            (method, f"no dip deeper than {DEEP} mm between frames", " mm", DEEP, lambda row: row.between_mm),
+            (method, "joint limits hold", " rad or m", 1e-6, lambda row: row.limit),
+            (method, "standing feet slide at most 1 mm", " mm", ASKED["sliding_mm"], lambda row: row.sliding_mm),
+            (method, "hands on the weapon within 1 mm", " mm", ASKED["hand_mm"],
+             lambda row: row.hand_mm if row.hand_mm >= 0.0 else None),
+        ]  # fmt: skip
+        if method in REAL_TIME:
+            most = REAL_TIME[method]
+            asked.append((method, f"at most {most:g} s a second of motion", " s", most, lambda row: row.slowness))
+    asked += [
+        ("trajectory", "jerk at most 1.2 of that before", "", ASKED["jerk"], lambda row: row.jerk),
+        ("trajectory", "deviation (rad) at most 0.7 of bisection's", "", OF_BISECTION,
+         lambda row: row.angle / other if row.outcome == "free" and (other := bisected.get(row.key[:2])) else None),
+        (CHECKED, "at most a tenth of real time", "", REAL_TIME[CHECKED], lambda row: row.slowness),
+    ]  # fmt: skip
+    found = []
+    for method, words, unit, most, value in asked:
+        own = [(row, value(row)) for row in rows if row.method == method and row.measured]
+        told = [(row, float(number)) for row, number in own if number is not None]
+        short = sorted((each for each in told if not each[1] <= most), key=lambda each: -each[1])
+        if told:
+            found.append(Line(method, words, len(told), tuple(short), unit))
+    return found
+
+
 def report(rows: Sequence[MotionRow], facts: Mapping[str, str]) -> str:
     """The tables as Markdown."""
     return render(
@@ -90,6 +154,7 @@ def report(rows: Sequence[MotionRow], facts: Mapping[str, str]) -> str:
         ratio=against_bisection(rows),
         asked=ASKED,
         deep=DEEP,
+        lines=lines(rows),
         facts=facts,
     )
 

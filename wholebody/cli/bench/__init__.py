@@ -20,6 +20,7 @@ from wholebody.cli.bench import (
     solve,
     stability,
     step,
+    world,
 )
 
 HELP = "measure steps, solves and random reaches, beside other tools where installed"
@@ -48,5 +49,6 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         attack,
         ablation,
         regress,
+        world,
     ):
         command.add_to(kinds)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from wholebody.motion.avoidance import Avoided
+    from wholebody.motion.avoider import Avoider
     from wholebody.motion.batch_table import AvoidedCase
 
 DESCRIPTION = """\
@@ -26,6 +28,7 @@ examples:
   wholebody clip avoid walk.bvh --equipment pack
   wholebody clip avoid walk.bvh run.bvh --equipment pack --equipment vest_plate+pouches --jobs 4 --out freed"""
 METHOD, WORN, FOLDER = "trajectory", "nothing", "freed"
+WIDE = 120  # letters that a line of a batch's table needs
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -40,6 +43,17 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     )
     add_equipment(parser)
     parser.add_argument("--no-feet", action="store_true", help="let feet slide that stand; without it they are held")
+    parser.add_argument(
+        "--dynamics",
+        action="store_true",
+        help="keep torques within the strength of a median person, and the balance within the feet",
+    )
+    parser.add_argument(
+        "--stretch",
+        type=float,
+        metavar="FACTOR",
+        help="slow the motion by up to this factor where joints are too fast or, with --dynamics, too weak",
+    )
     parser.add_argument(
         "--out", type=Path, metavar="OUT",
         help="the file to write (default: <name>-free.npz, beside FILE); of a batch a folder (default: freed)",
@@ -56,13 +70,13 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from wholebody.files import check_writable
-    from wholebody.motion.avoidance import as_avoider, avoid
+    from wholebody.motion.avoidance import avoid
     from wholebody.motion.reading import read_clip
     from wholebody.motion.ready_equipment import dressed
 
     (file,) = arguments.files
     out = check_writable(arguments.out or file.with_name(f"{file.stem}-free.npz"))
-    method, figure = as_avoider(methods[0]), figure_of(arguments)
+    method, figure = _method(methods[0], arguments), figure_of(arguments)
     scene, clip = dressed(figure, worn[0]), read_clip(file, figure)
     with bar(clip.name) as tell:
         avoided = avoid(
@@ -80,6 +94,28 @@ def _ignored(_: object) -> None:
     """Go on: a method ends where its progress returns True."""
 
 
+def _method(name: str, arguments: argparse.Namespace) -> Avoider:
+    """The method, which may slow the motion, and keep to the strength of a person of the sex that was asked for.
+
+    Raises:
+        WholebodyError: there is no such method, or it does not slow motions.
+    """
+    from wholebody.errors import InputError
+    from wholebody.motion.avoidance import as_avoider
+    from wholebody.motion.strength import Strength
+    from wholebody.motion.trajectory.method import Trajectory
+
+    method = as_avoider(name)
+    if not isinstance(method, Trajectory):
+        if arguments.stretch is not None:
+            raise InputError(f"--stretch: the method {method.name} does not slow motions; leave out --method")
+        if arguments.dynamics:
+            raise InputError(f"--dynamics: the method {method.name} does not take dynamics; leave out --method")
+        return method
+    strength = Strength(sex=arguments.sex or "male") if arguments.dynamics else None
+    return replace(method, stretch=arguments.stretch or method.stretch, dynamics=strength)
+
+
 def _tell(console: Console, avoided: Avoided, written: Path) -> None:
     from rich.markup import escape
 
@@ -93,6 +129,13 @@ def _tell(console: Console, avoided: Avoided, written: Path) -> None:
     made.add_row("frames in collision", str(report.before.colliding), str(report.after.colliding))
     made.add_row("deepest in a frame", f"{1e3 * report.before.deepest:.3g} mm", f"{1e3 * report.after.deepest:.3g} mm")
     made.add_row("dips between frames", str(report.before.dips), str(report.after.dips))
+    if report.loads is not None:
+        was, now = report.loads.before, report.loads.after
+        made.add_row("largest torque", f"{was.largest_share:.0%} of strength", f"{now.largest_share:.0%} of strength")
+        far = [f"{1e3 * each.outside.max():.0f} mm" for each in (was, now)]
+        made.add_row("zero moment point outside of the feet", *far)
+    if report.stretch > 1.0:
+        made.add_row("duration", f"{report.before.clip.duration:.2f} s", f"{report.duration:.2f} s")
     console.print(made)
     console.print(
         f"{report.method}: {report.seconds:.2f} s, {rate:.2f} s a second of motion; {report.programs} programs, "
@@ -107,7 +150,8 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
 
     from wholebody.motion.batch import BatchProgress, avoid_many
 
-    console, folder = Console(), arguments.out or Path(FOLDER)
+    console, folder = Console(width=max(WIDE, Console().width)), arguments.out or Path(FOLDER)
+    ways = [_method(name, arguments) for name in methods]
     count = len(arguments.files) * len(methods) * len(worn)
     try:
         with bar("reading the motions", count) as tell:
@@ -117,16 +161,16 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
                 tell(now.done, done)
 
             rows = avoid_many(
-                arguments.files, folder, figure=figure_of(arguments), equipment=worn, methods=methods,
+                arguments.files, folder, figure=figure_of(arguments), equipment=worn,
+                methods=ways,
                 hold_feet=not arguments.no_feet, jobs=jobs_of(arguments), cluster=arguments.cluster, progress=said,
             )  # fmt: skip
     except KeyboardInterrupt:
-        console.print(
-            f"ended; {folder} keeps what is done, and the same command goes on", highlight=False, markup=False
-        )
+        said_last = f"ended; {folder} keeps what is done, and the same command goes on"
+        console.print(said_last, highlight=False, markup=False, soft_wrap=True)
         raise
     _table(console, rows)
-    console.print(f"written: {folder}", highlight=False, markup=False)
+    console.print(f"written: {folder}", highlight=False, markup=False, soft_wrap=True)
     return 0 if all(row.outcome == "free" for row in rows) else 1
 
 
@@ -135,7 +179,9 @@ def _table(console: Console, rows: tuple[AvoidedCase, ...]) -> None:
 
     from wholebody.cli.tables import table
 
-    made = table("motion", "wears", "method", "", "collide", "after", "dips", "deepest mm", "deviation mm", "s a s")
+    made = table(
+        "motion", "wears", "method", "", "collide", "after", "dips", "deepest mm", "deviation mm", "s a second"
+    )
     for column in made.columns[1:4]:
         column.justify = "left"
     for row in rows:
@@ -153,4 +199,4 @@ def _table(console: Console, rows: tuple[AvoidedCase, ...]) -> None:
     for row in rows:
         if row.outcome != "free":
             where = f"{row.clip}, {row.equipment}, {row.method}"
-            console.print(f"{where}: {row.message}", highlight=False, markup=False)
+            console.print(f"{where}: {row.message}", highlight=False, markup=False, soft_wrap=True)

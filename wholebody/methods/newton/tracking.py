@@ -11,12 +11,13 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.checks import number, posture, time_step
 from wholebody.geometry.continuous.passing_through import SHORT
-from wholebody.methods.base import Method, nearest_to
+from wholebody.methods.base import Method, judged, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.feasibility import reach
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.linear_algebra.base import Pattern
 from wholebody.methods.newton.multistart import SHARPER, Search, Settings
+from wholebody.moving_things import Collision
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.solution import Solution
@@ -34,12 +35,14 @@ class NewtonStep(NamedTuple):
         iterations: Newton iterations.
         systems: linear systems solved.
         structures: number of patterns analysed since the tracker was made.
+        collisions: what things that moved meanwhile (`Scene.move` with `over`) passed through, or are inside of.
     """
 
     q: Array
     iterations: int
     systems: int
     structures: int
+    collisions: tuple[Collision, ...] = ()
 
 
 class NewtonTracker:
@@ -80,18 +83,30 @@ class NewtonTracker:
         self._lay_out()
 
     def step(self, q: Array, tolerance: float = FRAME_TOLERANCE) -> NewtonStep:
+        """The same as `frame`; what things that moved meanwhile met is named.
+
+        Raises:
+            InputError: as for `frame`.
+        """
+        self.workspace.refresh()
+        motion, step = self.workspace.next_frame(), self.frame(q, tolerance)
+        if motion is None:
+            return step
+        return step._replace(collisions=judged(self.workspace, motion, q, step.q))
+
+    def frame(self, q: Array, tolerance: float | None = None) -> NewtonStep:
         """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
 
         Args:
             q: posture at the beginning of the frame.
-            tolerance: of the goals, metres and radians.
+            tolerance: of the goals, metres and radians; `FRAME_TOLERANCE` where None.
 
         Raises:
             InputError: objects were added to or removed from the scene, a new term has no equations, or another thread
                 is within a call of this tracker.
         """
         q = posture(q, self.workspace.model.nq)
-        tolerance = number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
+        enough = FRAME_TOLERANCE if tolerance is None else number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
         with self._alone:
             active_system = self._renewed()
             active_system.objective.anchor(q)
@@ -103,7 +118,7 @@ class NewtonTracker:
                 active_system,
                 active_system.variables(q),
                 tolerance=SHARPER * self._settings.tolerance,
-                goal_tolerance=tolerance,
+                goal_tolerance=enough,
                 iterations=FRAME_ITERATIONS,
                 kind=self._settings.inequalities,
                 early_exit=True,
@@ -111,10 +126,6 @@ class NewtonTracker:
             return NewtonStep(
                 active_system.posture(found.x), found.iterations, found.systems, active_system.patterns.structures
             )
-
-    def frame(self, q: Array, tolerance: float | None = None) -> NewtonStep:
-        """One frame of a motion: the same as `step`."""
-        return self.step(q, FRAME_TOLERANCE if tolerance is None else tolerance)
 
     def nearest(self, q: Array) -> Solution:
         """The method's answer from q (nq,), with measures relative to q."""

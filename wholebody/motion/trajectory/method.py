@@ -10,18 +10,23 @@ import pinocchio as pin
 
 from wholebody import checks
 from wholebody.arrays import Array
+from wholebody.checks import listed
 from wholebody.figures.state import State
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import faults
 from wholebody.motion.frame_terms import FrameTerms, Given, between, frame_terms
+from wholebody.motion.soles import standing_feet, usual_feet
+from wholebody.motion.strength import Strength
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP, banded_solver
+from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
 from wholebody.motion.trajectory.window_run import ClipRun
 from wholebody.motion.windows import windows
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
 
+RELOADED = 3  # programs of a timing: in each the ground's forces are split as the one before makes them
 LOOKED = 0.1  # share of the progress that looking for collisions counts for
 
 
@@ -40,6 +45,8 @@ class Trajectory:
         stretch: factor by which the clip may be slowed, at most and anywhere, so that joints keep to their speed
             limits. The postures stay on their path, and the clip gets more frames of the same time step. 1 keeps the
             timing; joints that the clip moves faster than their limits then stay as fast.
+        dynamics: strength of the person, to keep torques within it and the zero moment point within the support, or no
+            farther beyond than they are in the original clip; None for any torques.
 
     Raises:
         InputError: a value out of range.
@@ -53,6 +60,7 @@ class Trajectory:
     solver: str | None = None
     iterations: int = 40
     stretch: float = 1.0
+    dynamics: Strength | None = None
 
     def __post_init__(self) -> None:
         """Check the settings."""
@@ -61,6 +69,8 @@ class Trajectory:
         checks.number(self.margin, "Trajectory: margin", 0.0, 100.0, "s")
         checks.whole(self.iterations, "Trajectory: iterations", 1, 10_000)
         checks.number(self.stretch, "Trajectory: stretch", 1.0, 100.0)
+        if self.dynamics is not None:
+            checks.instance(self.dynamics, Strength, "Trajectory: dynamics", "give wb.Strength(percentile=50)")
         banded_solver(self.solver)
 
     @property
@@ -71,18 +81,26 @@ class Trajectory:
     def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
         check_input(clip, scene, progress)
+        constraints = tuple(listed(constraints, "avoid: constraints", "[wb.Freeze('root')]"))
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
         _, solve = banded_solver(self.solver)
         with scene.borrow() as workspace:
-            run = ClipRun(self, terms, workspace, solve, clip.q, self.stretch)
+            loads = None
+            if self.dynamics is not None:
+                stands = standing_feet(clip, usual_feet(scene.figure, constraints))
+                loads = ClipLoads.original(
+                    Clip(scene.figure, clip.q, clip.dt), stands, self.dynamics, terms, self.stretch
+                )
+            run = ClipRun(self, terms, workspace, solve, clip.q, self.stretch, loads)
             q, missed = self._freed(run, terms, workspace, clip.q, watch)
-            new = None if watch.ended else self._timing(q, terms, workspace.state, solve)
+            new = None if watch.ended else self._timing(q, terms, workspace.state, solve, loads)
             if new is None:
                 return MethodResult(q, run.posture_solves, run.programs, _said(watch, missed))
             # On the same path nothing is new but chords, which cut its corners; what they touch is freed from there.
             slower = terms.at(new.times)
             passed = between(scene.model, q, new.times / clip.dt)
-            again = ClipRun(self, slower, workspace, solve, passed)
+            loads = None if loads is None else loads.of(passed, new.times)
+            again = ClipRun(self, slower, workspace, solve, passed, 1.0, loads)
             q, left = self._freed(again, slower, workspace, passed, watch)
         return MethodResult(
             q, run.posture_solves + again.posture_solves, run.programs + again.programs, _said(watch, [*missed, *left]),
@@ -111,7 +129,9 @@ class Trajectory:
             done += len(window)
         return q, missed
 
-    def _timing(self, q: Array, terms: FrameTerms, state: State, solve: Callable[[BandedQP], Answer]) -> Timing | None:
+    def _timing(
+        self, q: Array, terms: FrameTerms, state: State, solve: Callable[[BandedQP], Answer], loads: ClipLoads | None
+    ) -> Timing | None:
         """The new timing of postures (n, nq); None where it stays."""
         stretch = allowance(len(q), self.stretch)
         if stretch <= 1.0 or len(q) < 2:
@@ -120,7 +140,12 @@ class Trajectory:
         steps = np.array([pin.difference(model, q[gap], q[gap + 1]) for gap in gaps])
         bounds = [terms.step_bounds(gap, state) for gap in gaps]
         most = speed_bounds(steps, np.array([one[0] for one in bounds]), np.array([one[1] for one in bounds]))
-        return timing(slowed(most, terms.dt, stretch, solve), terms.dt)
+        b = slowed(most, terms.dt, stretch, solve)
+        if loads is not None:
+            path = loads.of(q)
+            for _ in range(RELOADED):
+                b = slowed(most, terms.dt, stretch, solve, path.timed(b))
+        return timing(b, terms.dt)
 
     def _teller(self, watch: Watch, begun: float, share: float, note: str) -> Callable[[float], bool]:
         return lambda part: watch.tell(LOOKED + (1.0 - LOOKED) * (begun + share * part), note)

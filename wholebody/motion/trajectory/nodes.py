@@ -15,6 +15,7 @@ import numpy as np
 from wholebody.arrays import Array, Indices
 from wholebody.figures.state import State, Wrench
 from wholebody.motion.trajectory.chart import Chart
+from wholebody.motion.trajectory.loads import WindowLoads
 from wholebody.tasks.base import Constraint, Goal
 from wholebody.workspace import Workspace
 
@@ -22,20 +23,36 @@ Terms = Sequence[Constraint | Goal]
 
 
 class Node(NamedTuple):
-    """A frame of the window, or a share (0 to 1) of the way from it to the next."""
+    """A frame of the window, a share (0 to 1) of the way from it to the next, or the loads of a frame.
+
+    Attributes:
+        frame: the first frame whose deviation counts.
+        share: of the way to the next one.
+        loaded: the frame whose loads are looked at, which depend on the frames before and after it; -1 for contacts.
+    """
 
     frame: int
     share: float = 0.0
+    loaded: int = -1
+
+    @classmethod
+    def of_loads(cls, frame: int) -> Node:
+        """The node of the loads of a frame."""
+        return cls(max(frame - 1, 0), 0.0, frame)
+
+    @property
+    def soft(self) -> bool:
+        """Whether its rows are missed where they must be, for contacts come first."""
+        return self.loaded >= 0
 
 
 class Rows(NamedTuple):
-    """What holds at a node, to first order in the deviations of its frame and of the next.
+    """What holds at a node, to first order in the deviations of its frame and of the next ones.
 
     Attributes:
         node: where.
         gap: (r,) by how much a row is met, metres and radians; to be at least zero.
-        first: (r, nv) derivative with respect to the deviation of the node's frame.
-        second: (r, nv) with respect to that of the next frame; None at a frame.
+        parts: (r, nv) derivatives with respect to the deviations of the node's frame and of those after it that count.
         group: (r,) rows of one contact share a number; the worst of them counts.
         equal: (e,) values of the equalities; to be zero.
         equal_rows: (e, nv) their derivatives.
@@ -43,8 +60,7 @@ class Rows(NamedTuple):
 
     node: Node
     gap: Array
-    first: Array
-    second: Array | None
+    parts: tuple[Array, ...]
     group: Indices
     equal: Array
     equal_rows: Array
@@ -63,9 +79,13 @@ class Looking:
     Attributes:
         chart: the window's frames.
         clearance: least distance asked of every pair, metres.
+        loads: of the window; None where they are not looked at.
     """
 
-    def __init__(self, workspace: Workspace, chart: Chart, terms: Sequence[Terms], clearance: float) -> None:
+    def __init__(
+        self, workspace: Workspace, chart: Chart, terms: Sequence[Terms], clearance: float,
+        loads: WindowLoads | None = None,
+    ) -> None:  # fmt: skip
         """Take what is needed.
 
         Args:
@@ -73,8 +93,15 @@ class Looking:
             chart: the window's frames.
             terms: for each frame, its resolved constraints.
             clearance: metres.
+            loads: of the window.
         """
         self.workspace, self.chart, self.clearance, self._terms = workspace, chart, clearance, terms
+        self.loads = loads
+
+    def nodes(self) -> list[Node]:
+        """Every frame, and its loads if they are looked at."""
+        found = [Node(frame) for frame in range(len(self.chart))]
+        return found if self.loads is None else sorted([*found, *map(Node.of_loads, self.loads.frames)])
 
     def at(self, node: Node, x: Array, within: float) -> Rows:
         """The rows of a node.
@@ -84,6 +111,11 @@ class Looking:
             x: (n, nv) deviations of the window's frames.
             within: metres beyond the clearance; pairs farther apart have no rows.
         """
+        if node.loaded >= 0:
+            assert self.loads is not None
+            gap, parts = self.loads.rows(node.loaded, x)
+            none = np.zeros((0, self.chart.model.nv))
+            return Rows(node, gap, parts, np.arange(len(gap), dtype=np.intp), np.zeros(0), none)
         if node.share:
             return self._between(node, x, within)
         frame = node.frame
@@ -91,20 +123,20 @@ class Looking:
         equal, equal_rows = np.zeros(0), np.zeros((0, rows.shape[1]))
         if self._terms[frame]:
             state = self.workspace.state
-            parts = [_split(term, state) for term in self._terms[frame]]
-            equal = np.concatenate([part[0] for part in parts])
-            equal_rows = self.chart.carried(frame, x[frame], np.vstack([part[1] for part in parts]))
-            more = np.concatenate([part[2] for part in parts])
+            held = [_split(term, state) for term in self._terms[frame]]
+            equal = np.concatenate([part[0] for part in held])
+            equal_rows = self.chart.carried(frame, x[frame], np.vstack([part[1] for part in held]))
+            more = np.concatenate([part[2] for part in held])
             group = np.concatenate([group, group.max(initial=-1) + 1 + np.arange(len(more), dtype=np.intp)])
-            gap, rows = np.concatenate([gap, more]), np.vstack([rows, *(part[3] for part in parts)])
-        return Rows(node, gap, self.chart.carried(frame, x[frame], rows), None, group, equal, equal_rows)
+            gap, rows = np.concatenate([gap, more]), np.vstack([rows, *(part[3] for part in held)])
+        return Rows(node, gap, (self.chart.carried(frame, x[frame], rows),), group, equal, equal_rows)
 
     def _between(self, node: Node, x: Array, within: float) -> Rows:
         chart, now, then = self.chart, node.frame, node.frame + 1
         q, first, second = chart.between(chart.posture(now, x[now]), chart.posture(then, x[then]), node.share)
         gap, rows, group = self._contacts(q, within)
         before, after = chart.carried(now, x[now], rows @ first), chart.carried(then, x[then], rows @ second)
-        return Rows(node, gap, before, after, group, np.zeros(0), np.zeros((0, rows.shape[1])))
+        return Rows(node, gap, (before, after), group, np.zeros(0), np.zeros((0, rows.shape[1])))
 
     def _contacts(self, q: Array, within: float) -> tuple[Array, Array, Indices]:
         workspace = self.workspace

@@ -18,6 +18,8 @@ from wholebody.motion.trajectory.banded_qp import BandedQP
 from wholebody.motion.trajectory.nodes import Rows
 from wholebody.motion.trajectory.objective import Objective
 
+SOFT = 1e3  # 1/m, of loads that are beyond their bounds: large, so that they are met where contacts let them be
+LITTLE = 0.1  # share of a load's greatest derivative: what moves the load by less does not join the program for it
 SLACK_CURVATURE = 1e-2  # 1/m^2, of a share of the penalty: keeps equal splits of a shortfall unique
 ONE_STEP = 0.03  # m, rad: of a deeper shortfall one step asks for this much; the normals are looked at again on the way
 SMALL_EXCESS = 0.1  # of the radius: speeds that exceed their bound by less are brought back by one step
@@ -92,9 +94,13 @@ def lay_out(
     start = np.concatenate([[0], np.cumsum(count + per_frame)]).astype(np.intp)
     size = int(start[-1])
     place = start[:-1, None] + np.arange(count)[None]
-    is_slack = np.ones(size, dtype=bool)
-    is_slack[place.ravel()] = False
-    P, c = _cost(objective, rows, x, dofs, place, is_slack, penalty, multipliers, stiffness)
+    prices = np.zeros(size)
+    used = start[:-1] + count
+    for one, (_, number) in zip(rows, slacks, strict=True):
+        frame = one.node.frame
+        prices[used[frame] : used[frame] + number] = SOFT if one.node.soft else penalty
+        used[frame] += number
+    P, c = _cost(objective, rows, x, dofs, place, prices, multipliers, stiffness)
     G, lower = _contact_part(rows, kept, slacks, x, dofs, place, start, count, size)
     D, slowest, fastest = _speed_part(x, dofs, place, limits, size, radius)
     least, most = np.zeros(size), np.full(size, np.inf)
@@ -116,20 +122,23 @@ def box(x: Array, limits: Limits, radius: float, dofs: Indices) -> tuple[Array, 
 
 def touched(rows: Sequence[Rows], which: Sequence[Mask]) -> Mask:
     """(nv,) the degrees of freedom that move some of the rows."""
-    found = np.zeros(rows[0].first.shape[1], dtype=bool)
+    found = np.zeros(rows[0].parts[0].shape[1], dtype=bool)
     for one, mask in zip(rows, which, strict=True):
         if mask.any():
-            found |= (one.first[mask] != 0.0).any(axis=0)
-            if one.second is not None:
-                found |= (one.second[mask] != 0.0).any(axis=0)
+            for part in one.parts:
+                moved = np.abs(part[mask])
+                least = LITTLE * moved.max(axis=1, initial=0.0) if one.node.soft else np.zeros(len(moved))
+                found |= (moved > least[:, None]).any(axis=0)
     return found
 
 
 def foreseen(one: Rows, step: Array) -> Array:
     """(r,) gaps of a node's rows after a step (n, nv), to first order."""
     frame = one.node.frame
-    after: Array = one.gap + one.first @ step[frame]
-    return after if one.second is None else after + one.second @ step[frame + 1]
+    after: Array = one.gap.copy()
+    for offset, part in enumerate(one.parts):
+        after += part @ step[frame + offset]
+    return after
 
 
 def active(rows: Sequence[Rows], step: Array) -> list[Mask]:
@@ -139,9 +148,9 @@ def active(rows: Sequence[Rows], step: Array) -> list[Mask]:
 
 def _kept(one: Rows, dofs: Indices, radius: float) -> Mask:
     """Rows that a step within the radius could miss."""
-    reach = np.abs(one.first[:, dofs]).sum(axis=1)
-    if one.second is not None:
-        reach = reach + np.abs(one.second[:, dofs]).sum(axis=1)
+    reach = np.zeros(len(one.gap))
+    for part in one.parts:
+        reach += np.abs(part[:, dofs]).sum(axis=1)
     kept: Mask = (one.gap < radius * reach) & (reach > 0.0)
     return kept
 
@@ -157,16 +166,16 @@ def _slacks(one: Rows, kept: Mask) -> tuple[Indices, int]:
 
 
 def _cost(
-    objective: Objective, rows: Sequence[Rows], x: Array, dofs: Indices, place: Indices, is_slack: Mask,
-    penalty: float, multipliers: Sequence[Array], stiffness: float,
+    objective: Objective, rows: Sequence[Rows], x: Array, dofs: Indices, place: Indices, prices: Array,
+    multipliers: Sequence[Array], stiffness: float,
 ) -> tuple[sp.csc_matrix, Array]:  # fmt: skip
-    size, count = len(is_slack), len(dofs)
-    c = np.where(is_slack, penalty, 0.0)
+    size, count = len(prices), len(dofs)
+    c = prices.copy()
     first, second = np.nonzero(objective.bands)
     values = [np.outer(objective.bands[first, second], objective.weights[dofs]).ravel()]
     at, to = [place[first].ravel()], [place[second].ravel()]
-    slack = np.flatnonzero(is_slack)
-    values.append(np.full(len(slack), SLACK_CURVATURE * penalty))
+    slack = np.flatnonzero(prices)
+    values.append(SLACK_CURVATURE * prices[slack])
     at.append(slack)
     to.append(slack)
     for one, multiplier in zip(rows, multipliers, strict=True):
@@ -194,13 +203,12 @@ def _contact_part(
             continue
         index = np.arange(number, number + many)
         bound = np.minimum(-one.gap[keep], ONE_STEP)
-        for offset, part in enumerate((one.first, one.second)):
-            if part is not None:
-                own = part[np.ix_(keep, dofs)]
-                values.append(own.ravel())
-                at.append(np.repeat(index, count))
-                to.append(np.tile(place[frame + offset], many))
-                bound = bound + own @ x[frame + offset, dofs]
+        for offset, part in enumerate(one.parts):
+            own = part[np.ix_(keep, dofs)]
+            values.append(own.ravel())
+            at.append(np.repeat(index, count))
+            to.append(np.tile(place[frame + offset], many))
+            bound = bound + own @ x[frame + offset, dofs]
         values.append(np.ones(many))
         at.append(index)
         to.append(start[frame] + count + used[frame] + slack)

@@ -21,7 +21,7 @@ from wholebody.arrays import Array, Indices, Mask
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.nodes import Looking, Node, Rows
 from wholebody.motion.trajectory.objective import Objective
-from wholebody.motion.trajectory.program import Limits, active, lay_out, touched
+from wholebody.motion.trajectory.program import SOFT, Limits, active, lay_out, touched
 
 RADIUS = 0.25  # rad, m: first trust region; larger = fewer programs on clear ways, more that are refused
 LARGEST, SMALLEST = 0.5, 1e-4
@@ -43,13 +43,15 @@ class Found(NamedTuple):
 
     Attributes:
         x: (n, nv) deviations.
-        worst: largest shortfall of any row, metres or radians.
+        objective: there, loads beyond their bounds included.
+        worst: largest shortfall of any row but of loads, metres or radians.
         met: whether it is at most `MET`.
         programs: how many programs were solved.
         cancelled: whether the caller ended it.
     """
 
     x: Array
+    objective: float
     worst: float
     met: bool
     programs: int
@@ -92,7 +94,7 @@ class WindowProgram:
         """
         self._looking, self._objective, self._limits = looking, objective, limits
         self._solve, self._iterations = solve, iterations
-        self.nodes = [Node(frame) for frame in range(len(looking.chart))]
+        self.nodes = looking.nodes()
         self._free = (limits.lower < limits.upper).any(axis=0)
 
     def add(self, nodes: Sequence[Node]) -> None:
@@ -109,7 +111,7 @@ class WindowProgram:
         programs = 0
         while programs < self._iterations:
             if cancel(programs, here.worst):
-                return Found(here.x, here.worst, here.worst <= MET, programs, True)
+                return Found(here.x, here.objective, here.worst, here.worst <= MET, programs, True)
             if not counts.any():
                 break
             dofs: Indices = np.flatnonzero(counts).astype(np.intp)
@@ -142,15 +144,16 @@ class WindowProgram:
                         break
                     penalty, radius = min(RAISE * penalty, HIGHEST), 0.1 * RADIUS
                     entries.clear()
-        return Found(here.x, here.worst, here.worst <= MET, programs, False)
+        return Found(here.x, here.objective, here.worst, here.worst <= MET, programs, False)
 
     def _at(self, x: Array) -> _At:
         rows = [self._looking.at(node, x, WITHIN) for node in self.nodes]
-        shortfalls = [np.concatenate([one.shortfalls, np.abs(one.equal)]) for one in rows]
+        shortfalls = [np.concatenate([one.shortfalls, np.abs(one.equal)]) for one in rows if not one.node.soft]
+        beyond = SOFT * float(sum(one.shortfalls.sum() for one in rows if one.node.soft))
         past = self._limits.passed(x)
         total = float(sum(one.sum() for one in shortfalls) + past.sum())
         worst = max(max((float(one.max(initial=0.0)) for one in shortfalls), default=0.0), float(past.max(initial=0.0)))
-        return _At(x, rows, self._objective.value(x), total, worst)
+        return _At(x, rows, self._objective.value(x) + beyond, total, worst)
 
     def _accepted(self, there: _At, here: _At, entries: Sequence[tuple[float, float]], gained: float) -> bool:
         """Whether the filter takes a point."""
@@ -171,7 +174,7 @@ class WindowProgram:
     def _joined(self, here: _At, step: Array, counts: Mask) -> Mask:
         """(nv,) degrees of freedom that move what a step makes active by those that count already."""
         tight = [
-            mask & (np.abs(one.first[:, counts]).sum(axis=1) > 0.0)
+            mask & np.any([(part[:, counts] != 0.0).any(axis=1) for part in one.parts], axis=0)
             for one, mask in zip(here.rows, active(here.rows, step), strict=True)
         ]
         return self._with_equalities(here.rows, touched(here.rows, tight) & self._free)

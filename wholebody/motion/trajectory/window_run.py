@@ -12,6 +12,7 @@ from wholebody.motion.dips import dips, sampled_dips
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.chart import Chart
+from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import Looking, Node
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
@@ -78,7 +79,7 @@ class ClipRun:
 
     def __init__(
         self, settings: Settings, terms: FrameTerms, workspace: Workspace, solve: Callable[[BandedQP], Answer],
-        reference: Array, rate: float = 1.0,
+        reference: Array, rate: float = 1.0, loads: ClipLoads | None = None,
     ) -> None:  # fmt: skip
         """Take what is needed.
 
@@ -89,9 +90,10 @@ class ClipRun:
             solve: solves one program.
             reference: (n, nq) postures that the deviations are from.
             rate: factor of the speed limits, for a clip that will be slowed by as much.
+            loads: of the reference postures, if they are to keep to their bounds.
         """
         self._settings, self._terms, self._workspace, self._solve = settings, terms, workspace, solve
-        self._reference, self._rate = reference, rate
+        self._reference, self._rate, self._loads = reference, rate, loads
         self._carried = Carried(terms, settings.clearance)
         self._programs = 0
         self._weights = np.ones(workspace.model.nv)
@@ -121,7 +123,8 @@ class ClipRun:
         objective = Objective(len(window), self._weights, self._settings.time, terms.dt, seams)
         limits = self._limits(window, chart, seams)
         held = [terms.held(frame) for frame in range(window.first, window.end)]
-        looking = Looking(self._workspace, chart, held, self._settings.clearance)
+        loads = None if self._loads is None else WindowLoads(self._loads, window.first, len(window))
+        looking = Looking(self._workspace, chart, held, self._settings.clearance, loads)
         always = {gap - window.first for gap in gaps}
         best: _Attempt | None = None
         for start in self._starts(window, chart, limits, depths, always):
@@ -181,13 +184,13 @@ class ClipRun:
             if dipping and found.met:
                 dipping += sampled_dips(self._workspace, q, gaps)
             if not dipping or not found.met:
-                return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), objective.value(x))
+                return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), found.objective)
             before = len(program.nodes)
             program.add([Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in dipping])
             if len(program.nodes) == before:
                 break
         assert found is not None
-        return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), objective.value(x))
+        return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), found.objective)
 
     def _limits(self, window: Window, chart: Chart, seams: tuple[bool, bool]) -> Limits:
         """Bounds on deviations and on their changes; at a seam nothing moves."""

@@ -1,0 +1,215 @@
+"""What impacts and contacts conserve, and what they must not create."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.dynamics.rigid_bodies import RigidBodies
+from wholebody.dynamics.step_program import SKIN
+
+G = 9.81
+AWAY = 5.0
+
+
+@pytest.fixture(scope="module")
+def hand() -> wb.Figure:
+    return wb.load("hand")
+
+
+def still(hand: wb.Figure, *things: tuple[wb.Shape, Any, wb.Body]) -> RigidBodies:
+    """Things without weight, named 0, 1, ..."""
+    scene = wb.Scene(hand)
+    for k, (shape, at, body) in enumerate(things):
+        scene.add(shape, name=str(k), at=at, body=body)
+    return RigidBodies(scene, gravity=(0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_free_collisions_conserve_momentum(hand: wb.Figure, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shapes = (wb.Box((0.2, 0.3, 0.1)), wb.Sphere(0.1), wb.Capsule(0.05, 0.2), wb.Box((0.1, 0.1, 0.3)))
+    things = []
+    for k, shape in enumerate(shapes):
+        place = AWAY + 0.5 * np.array([k % 2, k // 2, 0.0])
+        speed = -2.0 * (place - AWAY - 0.25) + 0.2 * rng.normal(size=3)
+        body = wb.Body(velocity=tuple(speed), angular_velocity=tuple(rng.normal(size=3)))
+        things.append((shape, place, body))
+    engine = still(hand, *things)
+    momentum, energy, events = engine.momentum(), engine.energy(), 0
+    for _ in range(22):  # until two of them stay together, and are parted by displacements
+        frame = engine.advance(1 / 60)
+        events += len(frame.events)
+        assert frame.energy <= energy + 1e-9
+        energy = frame.energy
+    assert events > 0
+    assert engine.momentum() == pytest.approx(momentum, abs=1e-10)
+    assert engine.momentum()[:3] == pytest.approx(momentum[:3], abs=1e-10)
+
+
+def test_one_ball_of_newtons_cradle_leaves_as_fast_as_one_came(hand: wb.Figure) -> None:
+    steel = wb.Material("steel", others=(1.0, 0.0))
+    pitch = 0.1 + SKIN
+    row = [(wb.Sphere(0.05), (AWAY + pitch * k, 0, 0), wb.Body(8e3, material=steel)) for k in range(1, 5)]
+    engine = still(
+        hand, (wb.Sphere(0.05), (AWAY - 0.2, 0, 0), wb.Body(8e3, material=steel, velocity=(1.5, 0.0, 0.0))), *row
+    )
+    for _ in range(60):
+        engine.advance(1 / 60)
+    speeds = [engine.twist(str(k))[0] for k in range(5)]
+    assert speeds == pytest.approx([0.0, 0.0, 0.0, 0.0, 1.5], abs=1e-9)
+
+
+def test_an_oblique_impact_is_that_of_the_papers_equations(hand: wb.Figure) -> None:
+    """A spinning rod strikes a ball off its centre, with sliding friction: eqs. 8 to 10 by hand."""
+    e, mu = 0.4, 0.05
+    stuff = wb.Material("stuff", others=(e, mu))
+    v, w = np.array([-3.0, 1.0, 0.0]), np.array([0.0, 0.0, 2.0])
+    ball = wb.Body(mass=0.5, material=stuff, velocity=tuple(v), angular_velocity=tuple(w))
+    start = AWAY + 0.2 + 0.05
+    engine = still(
+        hand,
+        (wb.Box((0.4, 0.1, 0.1)), (AWAY, 0.0, 0.0), wb.Body(mass=2.0, material=stuff)),
+        (wb.Sphere(0.05), (start + 0.03, 0.0 + 0.0, 0.0), ball),
+    )
+    event = None
+    while event is None:
+        found = engine.advance(1 / 60).events
+        event = found[0] if found else None
+    n = np.array([1.0, 0.0, 0.0])  # from the box to the ball
+    a = np.array([AWAY, 0.0, 0.0])
+    time = (0.03 - SKIN) / 3.0
+    b = np.array([start + 0.03, 0.0, 0.0]) + v * time
+    point = b - 0.05 * n
+    inertia_a = np.diag([2.0 / 12 * (0.01 + 0.01), 2.0 / 12 * (0.16 + 0.01), 2.0 / 12 * (0.16 + 0.01)])
+    inertia_b = 0.4 * 0.5 * 0.05**2 * np.eye(3)
+    ra, rb = point - a, point - b
+    u = v + np.cross(w, rb)
+    arm = sum(
+        float(n @ np.cross(np.linalg.inv(inertia) @ np.cross(r, n), r))
+        for inertia, r in ((inertia_a, ra), (inertia_b, rb))
+    )
+    j = -(1 + e) * float(n @ u) / (1 / 2.0 + 1 / 0.5 + arm)
+    sliding = u - (n @ u) * n
+    impulse = j * n - mu * j * sliding / np.linalg.norm(sliding)
+    assert event.speed == pytest.approx(3.0, abs=1e-6)
+    assert event.impulse == pytest.approx(impulse, abs=2e-4)
+    assert engine.twist("1")[:3] == pytest.approx(v + impulse / 0.5, abs=2e-3)
+
+
+@pytest.mark.parametrize(("share", "friction"), [(0.0, 0.0), (0.5, 0.5), (1.0, 0.0), (1.0, 1.0)])
+def test_a_heap_never_gains_energy_and_stays_apart(hand: wb.Figure, share: float, friction: float) -> None:
+    stuff = wb.Material("stuff", others=(share, friction))
+    scene = wb.Scene(hand).add(wb.HalfSpace(offset=-2.0), name="floor")
+    rng = np.random.default_rng(3)
+    for k in range(8):
+        shape = (wb.Box((0.2, 0.15, 0.1)), wb.Sphere(0.08))[k % 2]
+        turned = pin.SE3(
+            pin.exp3(rng.normal(size=3)), np.array([3.0 + 0.25 * (k % 2), 0.25 * (k // 2 % 2), -1.7 + 0.1 * k])
+        )
+        scene.add(shape, name=f"thing {k}", at=turned, body=wb.Body(material=stuff))
+    engine = RigidBodies(scene)
+    before = engine.energy()
+    for _ in range(60):
+        frame = engine.advance(1 / 60)
+        weight = G * 8 * 3.0
+        assert frame.energy <= before + weight * 2e-5
+        assert frame.deepest <= 1e-4
+        before = frame.energy
+
+
+def test_a_rod_on_its_tip_ends_though_its_friction_is_painleves(hand: wb.Figure) -> None:
+    """A thin rod slides on its tip with mu above 4/3, where a rigid rod has no acceleration at all."""
+    rough = wb.Material("rough", others=(0.0, 2.0))
+    scene = wb.Scene(hand).add(wb.HalfSpace(offset=-2.0), name="floor")
+    turned = pin.utils.rotate("y", -0.6)
+    half = 0.5
+    low = turned @ np.array([0.0, 0.0, -half])
+    start = np.array([3.0, 0.0, -2.0 + 0.01 + SKIN]) - low
+    body = wb.Body(mass=1.0, material=rough, velocity=(-3.0, 0.0, 0.0))
+    scene.add(wb.Capsule(0.01, 2 * half), name="rod", at=pin.SE3(turned, start), body=body)
+    engine = RigidBodies(scene)
+    energy = engine.energy()
+    for _ in range(120):
+        frame = engine.advance(1 / 60)
+        assert frame.energy <= energy + 1e-3
+        assert frame.deepest <= 1e-4
+        energy = frame.energy
+    assert np.isfinite(engine.twist("rod")).all()
+
+
+def test_a_rattleback_ends(hand: wb.Figure) -> None:
+    scene = wb.Scene(hand).add(wb.HalfSpace(offset=-2.0), name="floor")
+    turned = pin.SE3(pin.utils.rotate("z", 0.1), np.array([3.0, 0.0, -1.99 + 1e-4]))
+    body = wb.Body(mass=0.1, angular_velocity=(0.0, 0.3, -5.0))
+    scene.add(wb.Ellipsoid((0.1, 0.02, 0.01)), name="stone", at=turned, body=body)
+    engine = RigidBodies(scene)
+    energy = engine.energy()
+    for _ in range(60):
+        frame = engine.advance(1 / 60)
+        assert frame.energy <= energy + 1e-4
+        energy = frame.energy
+    assert np.isfinite(engine.twist("stone")).all()
+
+
+def test_a_ball_rolls_down_a_slope_by_five_sevenths(hand: wb.Figure) -> None:
+    angle = 0.2
+    normal = np.array([np.sin(angle), 0.0, np.cos(angle)])
+    rough = wb.Material("rough", others=(0.0, 0.5))
+    scene = wb.Scene(hand).add(wb.HalfSpace(tuple(normal), -2.0), name="slope")
+    start = normal * (-2.0 + 0.1 + SKIN)
+    scene.add(wb.Sphere(0.1), name="ball", at=start, body=wb.Body(material=rough))
+    engine = RigidBodies(scene)
+    for _ in range(60):
+        engine.advance(1 / 60)
+    down = np.array([np.cos(angle), 0.0, -np.sin(angle)])
+    # friction acts half way between the surfaces: 5/7 where the skin is left out
+    speed = G * np.sin(angle) / (1.0 + 0.4 * (0.1 / (0.1 + 0.5 * SKIN)) ** 2)
+    assert engine.twist("ball")[:3] @ down == pytest.approx(speed, rel=1e-6)
+    assert engine.twist("ball")[4] == pytest.approx(speed / (0.1 + 0.5 * SKIN), rel=1e-6)
+
+
+@pytest.mark.parametrize("speed", [5.0, 20.0])
+def test_a_fast_ball_does_not_pass_a_thin_plate(hand: wb.Figure, speed: float) -> None:
+    scene = wb.Scene(hand).add(wb.Box((0.001, 1.0, 1.0)), name="plate", at=(5.0, 0.0, 0.0))
+    scene.add(wb.Sphere(0.02), name="ball", at=(4.5, 0.0, 0.0), body=wb.Body(velocity=(speed, 0.0, 0.0)))
+    engine = RigidBodies(scene)
+    frames = [engine.advance(1 / 60) for _ in range(12)]
+    assert engine.placement("ball").translation[0] < 5.0
+    assert sum(len(frame.events) for frame in frames) == 1
+    assert max(frame.deepest for frame in frames) <= 1e-4
+
+
+def test_a_plate_that_is_moved_pushes_a_ball_and_a_sleeping_ball_wakes(hand: wb.Figure) -> None:
+    scene = wb.Scene(hand).add(wb.HalfSpace(offset=-2.0), name="floor")
+    scene.add(wb.Box((0.1, 1.0, 0.5)), name="board", at=(3.0, 0.0, -1.7))
+    scene.add(wb.Sphere(0.1), name="ball", at=(3.5, 0.0, -1.9 + SKIN), body=wb.Body())
+    engine = RigidBodies(scene)
+    for _ in range(60):
+        frame = engine.advance(1 / 60)
+    assert frame.sleeping == 1
+    for k in range(60):
+        ways = [pin.SE3(np.eye(3), np.array([3.0 + s / 60, 0.0, -1.7])) for s in (k, k + 1)]
+        frame = engine.advance(1 / 60, {"board": (ways[0], ways[1])})
+        assert frame.deepest <= 1e-4
+    assert engine.placement("ball").translation[0] > 4.0 + 0.05 + 0.1 - 1e-4
+    assert engine.twist("ball")[0] >= 1.0 - 1e-6
+
+
+def test_the_same_scene_moves_the_same(hand: wb.Figure) -> None:
+    def end() -> list[float]:
+        scene = wb.Scene(hand).add(wb.HalfSpace(offset=-2.0), name="floor")
+        for k in range(4):
+            scene.add(
+                wb.Box((0.2, 0.15, 0.1)), name=f"box {k}", at=(3 + 0.03 * k, 0.01 * k, -1.8 + 0.15 * k), body=wb.Body()
+            )
+        engine = RigidBodies(scene)
+        for _ in range(30):
+            engine.advance(1 / 60)
+        return [float(x) for k in range(4) for x in engine.twist(f"box {k}")]
+
+    assert end() == end()

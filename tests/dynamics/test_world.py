@@ -1,0 +1,162 @@
+"""A figure among things that move by themselves: impulses against closed forms, and nothing in each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.dynamics.driven_impulses import contact_impulse
+from wholebody.dynamics.overlaps import overlaps
+from wholebody.matter.materials import Surface
+
+DT = 1.0 / 60.0
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1, 1e6])
+def test_an_impulse_is_that_of_equations_8_to_10(friction: float) -> None:
+    """Two balls that meet off centre: restitution along the normal, momentum, friction's cone, energy."""
+    masses, radius = (2.0, 0.5), 0.1
+    inertia = [0.4 * mass * radius**2 for mass in masses]
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        normal = rng.normal(size=3)
+        normal /= np.linalg.norm(normal)
+        velocity, spin = rng.normal(size=(2, 3)), 5.0 * rng.normal(size=(2, 3))
+        arms = (radius * normal, -radius * normal)
+        mobility = sum(
+            np.eye(3) / mass - pin.skew(arm) @ pin.skew(arm) / own
+            for mass, own, arm in zip(masses, inertia, arms, strict=True)
+        )
+
+        def relative(velocity=velocity, spin=spin, arms=arms) -> np.ndarray:
+            return velocity[1] + np.cross(spin[1], arms[1]) - velocity[0] - np.cross(spin[0], arms[0])
+
+        def energy(velocity=velocity, spin=spin) -> float:
+            linear = sum(m * v @ v for m, v in zip(masses, velocity, strict=True))
+            return 0.5 * float(linear + sum(i * w @ w for i, w in zip(inertia, spin, strict=True)))
+
+        before, began = relative(), energy()
+        impulse = contact_impulse(before, normal, mobility, Surface(0.4, friction))
+        if normal @ before >= 0.0:
+            assert impulse is None
+            continue
+        for k, sign in ((0, -1.0), (1, 1.0)):
+            velocity[k] += sign * impulse / masses[k]
+            spin[k] += sign * np.cross(arms[k], impulse) / inertia[k]
+        after = relative()
+        bounce = 0.4 if normal @ before < -0.05 else 0.0  # what comes slowly does not bounce
+        assert normal @ after == pytest.approx(-bounce * (normal @ before), abs=1e-9)
+        along = impulse - (normal @ impulse) * normal
+        assert np.linalg.norm(along) <= friction * (normal @ impulse) + 1e-12
+        assert energy() <= began + 1e-12
+        slid = after - (normal @ after) * normal
+        if friction == 1e6:
+            assert np.linalg.norm(slid) == pytest.approx(0.0, abs=1e-9)  # it sticks, and does not slide back
+
+
+def arm_world(planar_arm, **more: object) -> tuple[wb.World, wb.Scene]:
+    """An arm that turns in the plane of a table without friction of its own, and a ball that it pushes."""
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3)))
+    scene.add(wb.Box((3.0, 3.0, 0.1)), name="table", at=(0.0, 0.0, -0.2501))
+    scene.add(wb.Sphere(0.2), name="ball", at=(0.9, 0.35, 0.0), body=wb.Body(mass=0.5))
+    return wb.World(scene, np.zeros(3), **more), scene
+
+
+@pytest.mark.parametrize("overlap", ["qp", "ccd"])
+def test_an_arm_pushes_a_ball_and_never_is_in_it(planar_arm, overlap: str) -> None:
+    world, scene = arm_world(planar_arm, overlap=overlap)
+    pushed, ball = 0, []
+    for frame in range(90):
+        made = world.step(np.array([min(0.6, 0.01 * frame), 0.0, 0.0]))
+        assert made.deepest <= 1e-4
+        assert not made.collisions
+        assert not made.overlaps
+        assert -scene.contacts(made.q, 0.0).distance.min(initial=0.0) == pytest.approx(made.deepest, abs=1e-9)
+        place = made.placements["ball"]
+        assert scene.objects["ball"].placement == place
+        pushed += bool(made.impulses)
+        ball.append(place.translation.copy())
+    assert pushed
+    assert ball[-1][1] > 0.45  # away, the way the arm turned
+    assert made.time == pytest.approx(1.5)
+
+
+def test_the_same_seed_gives_the_same_motion(planar_arm) -> None:
+    runs = []
+    for _ in range(2):
+        world, _ = arm_world(planar_arm, seed=3)
+        frames = [world.step(np.array([0.015 * k, 0.0, 0.1])) for k in range(40)]
+        runs.append([(frame.q, frame.placements["ball"].homogeneous) for frame in frames])
+    for (q, place), (other, placed) in zip(*runs, strict=True):
+        assert (q == other).all()
+        assert (place == placed).all()
+
+
+def test_a_free_figure_follows_its_tracker(planar_arm) -> None:
+    world = wb.World(wb.Scene(planar_arm((0.5, 0.4, 0.3))), np.zeros(3))
+    assert world.engine is None
+    for frame in range(40):
+        tracked = np.array([0.01 * frame, 0.0, 0.0])
+        made = world.step(tracked)
+    assert made.q == pytest.approx(tracked, abs=2e-3)
+    assert made.wanted == pytest.approx(tracked, abs=2e-3)
+    made = world.step(np.array([np.nan, 0.0, 0.0]))
+    assert "the one before counts" in made.note
+    for _ in range(30):
+        made = world.step()
+    assert made.q == pytest.approx(tracked, abs=1e-3)
+
+
+def test_what_the_user_moves_pushes_what_moves_by_itself_and_is_kept_off_the_figure(planar_arm) -> None:
+    world, scene = arm_world(planar_arm)
+    scene.remove("ball").add(wb.Sphere(0.1), name="ball", at=(0.6, 0.6, -0.1), body=wb.Body(mass=0.5))
+    scene.add(wb.Box((0.3, 0.05, 0.3)), name="board", at=(0.6, 0.8, 0.0))
+    with pytest.raises(wb.InputError, match="after the world was made"):
+        world.step()
+    world, y = wb.World(scene, np.zeros(3)), 0.8
+    for _ in range(20):
+        y -= 1.0 / 60.0
+        scene.move("board", at=(0.6, y, 0.0), over=world.dt)
+        made = world.step(np.zeros(3))
+        assert made.deepest <= 1e-4
+    assert made.placements["ball"].translation[1] < 0.45
+
+
+def test_overlaps_are_of_objects_and_are_shared_where_both_may_move(planar_arm) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3)))
+    scene.add(wb.Box((0.5, 0.2, 0.2)), name="wall", at=(0.5, 0.1, 0.0))
+    scene.add(wb.Sphere(0.1), name="ball", at=(1.05, 0.11, 0.0), body=wb.Body())
+    found = {one.second: one for one in overlaps(scene, np.zeros(3))}
+    assert set(found) == {"wall", "ball"}
+    assert {one.first for one in found.values()} == {scene.figure.name}
+    wall, ball = found["wall"], found["ball"]
+    assert wall.pairs == 2  # two links, one object
+    assert wall.depth[1] < 0.0  # out of the wall
+    assert wall.moves_first == pytest.approx(wall.depth)
+    assert wall.moves_second == pytest.approx(np.zeros(3))
+    assert ball.moves_first == pytest.approx(0.5 * ball.depth)
+    assert ball.moves_second == pytest.approx(-0.5 * ball.depth)
+    pairs = [
+        k
+        for k, names in enumerate(scene.contacts(np.zeros(3), 0.0).pair)
+        if "wall" in {scene.piece_owner[i] for i in names}
+    ]
+    near = scene.contacts(np.zeros(3), 0.0)
+    depths = -near.distance[pairs]
+    assert np.linalg.norm(wall.depth) == pytest.approx(float((depths**2).sum() / depths.sum()), rel=1e-6)
+
+
+def test_wrong_worlds_are_one_sentence(planar_arm) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3)))
+    with pytest.raises(wb.InputError, match="scene"):
+        wb.World(scene.figure)
+    with pytest.raises(wb.UnknownNameError, match="overlap"):
+        wb.World(scene, overlap="pq")
+    with pytest.raises(wb.InputError, match="dt"):
+        wb.World(scene, dt=0.0)
+    with pytest.raises(wb.InputError, match="spring"):
+        wb.World(scene, spring=3.0)
+    with pytest.raises(wb.InputError, match="tracked"):
+        wb.World(scene).step("q")

@@ -1,0 +1,78 @@
+"""Clips that keep to strength: a flywheel by hand, a person who leans by finite differences, and recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.motion.load_change import LoadChange
+
+WHEEL = """<robot name="wheel"><link name="base"/>
+<link name="wheel"><inertial><mass value="2"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.5" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><sphere radius="0.05"/></geometry></collision></link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="wheel"/><axis xyz="0 0 1"/>
+<limit lower="-6" upper="6" effort="{effort}" velocity="50"/></joint></robot>"""
+INERTIA = 0.5
+
+
+def wheel(folder: Path, effort: float) -> wb.Clip:
+    """A wheel on an upright axis that turns to and fro: its torque is its inertia times its acceleration."""
+    (folder / "wheel.urdf").write_text(WHEEL.format(effort=effort))
+    t = np.arange(61) / 30.0
+    return wb.Clip(wb.load(folder / "wheel.urdf"), np.sin(2.0 * t)[:, None] * 1.5, 1.0 / 30.0, "wheel")
+
+
+def torque(clip: wb.Clip) -> np.ndarray:
+    """By second differences."""
+    return INERTIA * np.diff(clip.q[:, 0], n=2) / clip.dt**2
+
+
+def test_a_wheel_is_slowed_until_its_motor_is_strong_enough(tmp_path: Path) -> None:
+    clip = wheel(tmp_path, 2.0)
+    assert np.abs(torque(clip)).max() > 2.9
+    found = wb.avoid(clip, dynamics=True, method=wb.Trajectory(stretch=2.0))
+    assert found.report.solved, found.report.message
+    assert "slowed" in found.report.message
+    slower = wb.torques(found.clip).torque[2:-2, 0]
+    assert np.abs(slower).max() < 2.0 * 1.03  # what resampling changes
+    assert 1.15 < found.report.stretch <= 2.0
+    kept = wb.avoid(clip, dynamics=True)  # without slowing it is as strong as before
+    assert kept.report.solved, kept.report.message
+    np.testing.assert_array_equal(kept.clip.q, clip.q)
+
+
+def test_a_strong_motor_keeps_its_timing(tmp_path: Path) -> None:
+    clip = wheel(tmp_path, 4.0)
+    found = wb.avoid(clip, dynamics=True, method=wb.Trajectory(stretch=2.0))
+    assert found.report.stretch == 1.0
+    np.testing.assert_array_equal(found.clip.q, clip.q)
+
+
+def test_other_methods_do_not_take_dynamics(tmp_path: Path) -> None:
+    clip = wheel(tmp_path, 2.0)
+    with pytest.raises(wb.InputError, match="trajectory"):
+        wb.avoid(clip, dynamics=True, method="fade")
+    with pytest.raises(wb.InputError, match="dynamics"):
+        wb.avoid(clip, dynamics="strong")  # type: ignore[arg-type]
+    with pytest.raises(wb.InputError, match="dynamics"):
+        wb.Trajectory(dynamics=True)  # type: ignore[arg-type]
+
+
+def test_a_recording_that_picks_up_stays_within_strength(shared_data: Path) -> None:
+    """Both feet of the recording overlap by 6 cm; freeing them changes what the hips bear and how the person leans."""
+    human = wb.load("human")
+    clip = wb.read_clip(shared_data / "mocap" / "cmu_02_04.bvh", human).resampled(1.0 / 30.0)[:45]
+    found = wb.avoid(clip, dynamics=True)
+    assert found.report.before.colliding
+    assert found.report.solved, found.report.message
+    loads = found.report.loads
+    assert isinstance(loads, LoadChange)
+    assert loads.kept
+    lower, upper = loads.bounds
+    assert (loads.after.torque[:, 6:] <= upper[6:] * 1.02 + 1e-6).all()
+    assert (loads.after.torque[:, 6:] >= lower[6:] * 1.02 - 1e-6).all()
+    assert (loads.after.outside <= loads.before.outside + 2e-3).all()

@@ -1,0 +1,1 @@
+"""The same drops in wholebody, MuJoCo and Rapier: penetration, energy, time."""

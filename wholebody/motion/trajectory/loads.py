@@ -1,0 +1,260 @@
+"""Loads of a trajectory: rows that keep torques within strength, and the zero moment point within the support.
+
+A clip may need more than the strength of a joint already, and may lean farther than its feet reach. So the bounds are:
+no joint more than its strength or than the largest torque that the original clip needs of it in this direction; and the
+zero moment point in no frame farther outside of an edge of its support than it is there in the original. A clip that
+may be slowed keeps to the strength of a joint if the original slowed as far as may be does.
+
+Differences of postures amplify noise, so recordings are filtered first (`wholebody.motion.torques.smoothed`). Rows are
+those of the filtered original with the deviation on it, which is smooth itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.motion.clip import Clip
+from wholebody.motion.frame_terms import FrameTerms
+from wholebody.motion.inverse_dynamics import LIGHT, Derivatives, InverseDynamics, Loads, Stand, zero_moment_point
+from wholebody.motion.load_change import soles_of
+from wholebody.motion.strength import Strength, torque_limits
+from wholebody.motion.torques import CUTOFF, smoothed
+from wholebody.motion.trajectory.chart import Chart
+from wholebody.motion.trajectory.retiming import TimedRows
+
+FRICTION = 0.8
+"""Coefficient of friction of the ground, as that of `wb.torques`."""
+
+LENGTH = 0.1
+"""Metres that stand for a whole strength: one hundredth of it is weighed like a millimetre of the support."""
+
+NEAR = 0.05
+"""Metres: a load that is farther from its bound has no row; what passes unseen has one in the next step."""
+
+
+class LoadBounds(NamedTuple):
+    """What loads keep to.
+
+    Attributes:
+        lower: (nv,) least torques, N m; -inf for none.
+        upper: (nv,) largest torques.
+        slowed: (2, nv) least and largest torques of a clip that may be slowed: strength, if the original slowed by as
+            much as can be keeps to it, or else `lower` and `upper`.
+        outside: for each frame (e,) by how far it may lean outside of each edge of its support, metres.
+    """
+
+    lower: Array
+    upper: Array
+    slowed: Array
+    outside: tuple[Array, ...]
+
+
+class ClipLoads:
+    """Loads of the frames of a clip and of deviations from it.
+
+    Attributes:
+        bounds: that the loads keep to.
+        base: (n, nq) the filtered postures.
+    """
+
+    def __init__(self, clip: Clip, dynamics: InverseDynamics, stands: Sequence[Stand], bounds: LoadBounds) -> None:
+        """Look at a clip.
+
+        Args:
+            clip: the postures.
+            dynamics: of the figure.
+            stands: where each frame stands.
+            bounds: of the loads.
+        """
+        self.figure, self.dt, self.bounds = clip.figure, clip.dt, bounds
+        self.base = smoothed(clip, CUTOFF).q
+        self.dynamics, self.stands = dynamics, stands
+
+    @classmethod
+    def original(
+        cls, clip: Clip, feet: Mapping[str, Mask], strength: Strength, terms: FrameTerms, stretch: float = 1.0
+    ) -> ClipLoads:
+        """Those of an original clip, whose own loads are among the bounds.
+
+        Args:
+            clip: the original.
+            feet: foot -> (n,) frames in which it stands.
+            strength: of the person.
+            terms: what is held.
+            stretch: by which factor the clip may be slowed.
+        """
+        dynamics = InverseDynamics(clip.figure, tuple(feet), FRICTION)
+        base = smoothed(clip, CUTOFF).q
+        lower, upper = torque_limits(clip.figure, strength)
+        # Where a foot is held beside its place, the original stands in its own.
+        own, stands = soles_of(dynamics, base, feet, terms)
+        inside = tuple(np.zeros(len(each.normals)) for each in own)
+        found = cls(clip, dynamics, own, LoadBounds(lower, upper, np.array([lower, upper]), inside))
+        bounds = found._widened(stretch)
+        outside = [
+            far if here is stand else np.full(len(stand.normals), far.max(initial=0.0))
+            for far, here, stand in zip(bounds.outside, own, stands, strict=True)
+        ]
+        return cls(clip, dynamics, stands, bounds._replace(outside=tuple(outside)))
+
+    def motion(self, before: Array, here: Array, after: Array) -> tuple[Array, Array]:
+        """Velocity and acceleration (nv,) of the middle one of three postures (nq,), by central differences."""
+        model = self.figure.model
+        ahead, back = pin.difference(model, here, after), pin.difference(model, here, before)
+        return (ahead - back) / (2.0 * self.dt), (ahead + back) / self.dt**2
+
+    def gaps(self, frame: int, loads: Loads) -> tuple[Array, Array]:
+        """Gaps of torques to their bounds (2 nv,), and of the zero moment point to its (e,); metres, see `LENGTH`."""
+        bounds, stand = self.bounds, self.stands[frame]
+        with np.errstate(invalid="ignore"):
+            high = LENGTH * (bounds.upper - loads.torque) / bounds.upper
+            low = LENGTH * (loads.torque - bounds.lower) / -bounds.lower
+        torque = np.concatenate([high, low])
+        torque[np.isnan(torque)] = np.inf
+        leaning = self.leaning(stand, loads)
+        return torque, leaning + bounds.outside[frame] if len(leaning) else leaning
+
+    def leaning(self, stand: Stand, loads: Loads) -> Array:
+        """(e,) distances of the zero moment point from the edges of the support; none where it says little."""
+        if not len(stand.normals) or loads.wrench[2] < LIGHT * self.dynamics.weight:
+            return np.zeros(0)
+        return stand.margins(zero_moment_point(loads.wrench, stand.height))
+
+    def of(self, q: Array, times: Array | None = None) -> ClipLoads:
+        """The same for other postures (m, nq), with these bounds.
+
+        Args:
+            q: as many as before, or at other times of the clip.
+            times: (m,) these times, seconds; None for those of the frames.
+        """
+        clip = Clip(self.figure, q, self.dt)
+        if times is None:
+            return ClipLoads(clip, self.dynamics, self.stands, self.bounds)
+        nearest = np.clip(np.rint(times / self.dt).astype(int), 0, len(self.base) - 1)
+        bounds = self.bounds._replace(outside=tuple(self.bounds.outside[frame] for frame in nearest))
+        return ClipLoads(clip, self.dynamics, [self.stands[frame] for frame in nearest], bounds)
+
+    def timed(self, b: Array) -> TimedRows:
+        """Rows of the loads of these postures, when they are passed at rates whose squares are b (n,) or about that.
+
+        Torques and wrenches are linear in b and its derivative; the split over the soles is that at b.
+        """
+        changes = np.gradient(b, self.dt)
+        parts = [self._timed(frame, float(b[frame]), float(changes[frame])) for frame in range(1, len(b) - 1)]
+        parts = [part for part in parts if len(part.gap)]
+        if not parts:
+            return TimedRows(np.zeros(0, dtype=np.intp), *(np.zeros(0) for _ in range(3)))
+        return TimedRows(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+    def _timed(self, frame: int, b: float, change: float) -> TimedRows:
+        dynamics, stand = self.dynamics, self.stands[frame]
+        now = np.array([1.0, b, change])
+        torques, wrenches = self._parts(frame, now)
+        gaps = [[], [], []]  # type: list[list[Array]]
+        for number, torque in enumerate(torques):
+            for bound, sign in zip(self.bounds.slowed, (1.0, -1.0), strict=True):
+                limit = np.where(np.isfinite(bound), np.abs(bound), np.inf)
+                gaps[number].append(LENGTH * (sign * torque / limit + (1.0 if number == 0 else 0.0)))
+        if len(stand.normals) and now @ wrenches[:, 2] >= LIGHT * dynamics.weight:
+            for number, wrench in enumerate(wrenches):
+                place = zero_moment_point(np.concatenate([wrench[:2], [1.0], wrench[3:]]), stand.height)
+                far = stand.normals @ place - (stand.offsets - self.bounds.outside[frame]) * wrench[2]
+                gaps[number].append(far / dynamics.weight)
+        rows = np.array([np.concatenate(each) for each in gaps])
+        near = now @ rows < NEAR
+        return TimedRows(np.full(int(near.sum()), frame, dtype=np.intp), rows[0, near], rows[1, near], rows[2, near])
+
+    def _parts(self, frame: int, shares: Array) -> tuple[Array, Array]:
+        """Torques (3, nv) and wrenches (3, 6): constant, and factors of b and of its derivative; see `timed`."""
+        q, none = self.base[frame], np.zeros(self.figure.model.nv)
+        v, a = self.motion(*self.base[frame - 1 : frame + 2])
+        still = self.dynamics.free_torque(q, none, none)
+        moved = self.dynamics.free_torque(q, v, a) - still
+        pushed = 0.5 * (self.dynamics.free_torque(q, none, v) - still)
+        return self.dynamics.grounded(q, np.array([still, moved, pushed]), shares, self.stands[frame])
+
+    def _widened(self, stretch: float) -> LoadBounds:
+        """The bounds, and the loads of these postures where they are beyond them."""
+        least, most = self.bounds.slowed
+        slow = np.array([1.0, 1.0 / stretch**2, 0.0])
+        lower, upper, outside = self.bounds.lower, self.bounds.upper, list(self.bounds.outside)
+        for frame in range(1, len(self.base) - 1):
+            v, a = self.motion(*self.base[frame - 1 : frame + 2])
+            found = self.dynamics.loads(self.base[frame], v, a, self.stands[frame])
+            lower, upper = np.minimum(lower, found.torque), np.maximum(upper, found.torque)
+            torque = slow @ self._parts(frame, slow)[0]
+            least, most = np.minimum(least, torque), np.maximum(most, torque)
+            leaning = self.leaning(self.stands[frame], found)
+            outside[frame] = np.maximum(outside[frame], -leaning) if len(leaning) else outside[frame]
+        limits = self.bounds.slowed
+        slowed = [np.where(least < limits[0], lower, limits[0]), np.where(most > limits[1], upper, limits[1])]
+        return LoadBounds(lower, upper, np.array(slowed), tuple(outside))
+
+
+class WindowLoads:
+    """Loads of the frames of a window, with their derivatives with respect to deviations.
+
+    Attributes:
+        frames: those of the window whose loads are known; all but the ends of the clip.
+    """
+
+    def __init__(self, loads: ClipLoads, first: int, count: int) -> None:
+        """Take the frames from `first` on."""
+        self._loads, self._first = loads, first
+        self._chart = Chart(loads.figure.model, loads.base[first : first + count])
+        self.frames = [k for k in range(count) if 0 < first + k < len(loads.base) - 1]
+
+    def postures(self, frame: int, x: Array) -> tuple[Array, Array, Array]:
+        """The postures before, at and after a frame of the window; beyond it nothing deviates."""
+        base, chart = self._loads.base, self._chart
+        near = (frame - 1, frame, frame + 1)
+        found = [chart.posture(k, x[k]) if 0 <= k < len(chart) else base[self._first + k] for k in near]
+        return found[0], found[1], found[2]
+
+    def rows(self, frame: int, x: Array) -> tuple[Array, tuple[Array, ...]]:
+        """Gaps (r,) of what is near its bound, and derivatives (r, nv) for the frames before, at and after.
+
+        Those of frames beyond the window are left out.
+
+        Args:
+            frame: of the window.
+            x: (n, nv) deviations.
+        """
+        loads, number = self._loads, self._first + frame
+        stand = loads.stands[number]
+        before, here, after = self.postures(frame, x)
+        v, a = loads.motion(before, here, after)
+        torque, places = loads.gaps(number, loads.dynamics.loads(here, v, a, stand))
+        tight, leaning = (np.flatnonzero(each < NEAR).astype(np.intp) for each in (torque, places))
+        gap = np.concatenate([torque[tight], places[leaning]])
+        near = [k for k in (frame - 1, frame, frame + 1) if 0 <= k < len(self._chart)]
+        if not len(gap):
+            return gap, tuple(np.zeros((0, len(v))) for _ in near)
+        slopes = self._slopes(loads.dynamics.derivatives(here, v, a, stand), stand, tight, leaning)
+        moved = self._moved(before, here, after, slopes)
+        parts = (self._chart.carried(k, x[k], moved[k - frame + 1]) for k in near)
+        return gap, tuple(parts)
+
+    def _slopes(self, found: Derivatives, stand: Stand, tight: Indices, leaning: Indices) -> list[Array]:
+        """Derivatives (r, nv) of the gaps with respect to posture, velocity and acceleration."""
+        bounds, nv = self._loads.bounds, self._loads.figure.model.nv
+        column, low = tight % nv, tight >= nv
+        scale = np.where(low, LENGTH / -bounds.lower[column], -LENGTH / bounds.upper[column])
+        return [
+            np.vstack([scale[:, None] * torque[column], stand.normals[leaning] @ place])
+            for torque, place in zip(found.torque, found.place, strict=True)
+        ]
+
+    def _moved(self, before: Array, here: Array, after: Array, slopes: list[Array]) -> list[Array]:
+        """The derivatives with respect to the tangents of the postures before, here and after."""
+        model, dt = self._loads.figure.model, self._loads.dt
+        at, speed, push = slopes
+        ahead = [np.asarray(pin.dDifference(model, here, after, arg)) for arg in (pin.ARG0, pin.ARG1)]
+        back = [np.asarray(pin.dDifference(model, here, before, arg)) for arg in (pin.ARG0, pin.ARG1)]
+        forward, backward = speed / (2.0 * dt) + push / dt**2, -speed / (2.0 * dt) + push / dt**2
+        return [backward @ back[1], at + forward @ ahead[0] + backward @ back[0], forward @ ahead[1]]
