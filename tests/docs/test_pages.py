@@ -10,7 +10,16 @@ import pytest
 
 
 @pytest.mark.parametrize(
-    "page", ["README.md", "docs/quickstart.md", "docs/guide.md", "docs/interaction.md", "docs/motion.md"]
+    "page",
+    [
+        "README.md",
+        "docs/quickstart.md",
+        "docs/guide.md",
+        "docs/interaction.md",
+        "docs/motion.md",
+        "docs/world.md",
+        "docs/frames.md",
+    ],
 )
 def test_code_on_the_page_runs(page: str, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
