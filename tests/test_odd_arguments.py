@@ -603,6 +603,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done: None}
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
     avoided = {"clip": clip, "scene": wb.Scene(arm), "constraints": [], "progress": lambda told: None}
+    yield "avoid", Call(wb.avoid, {**avoided, "method": "frames", "hold_feet": False, "dynamics": False})
     yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
     many = {"clips": [], "folder": path / "many", "equipment": ["nothing"], "methods": ["frames"], "jobs": 1}
     yield "avoid_many", Call(wb.avoid_many, {**many, "hold_feet": True, "progress": print})
@@ -615,6 +616,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     for method in (wb.Trajectory, wb.PerFrame, wb.Fade, wb.Bisection):
         yield f"{method.__name__}.avoid", Call(method().avoid, avoided)
     settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "solver": "osqp", "iterations": 10}
+    settings |= {"stretch": 1.5, "dynamics": wb.Strength()}
     yield "Trajectory", Call(wb.Trajectory, settings)
     yield "PerFrame", Call(wb.PerFrame, {"clearance": 0.01, "backward": True})
     yield "Fade", Call(wb.Fade, {"clearance": 0.01, "fade": 0.2, "rounds": 2})

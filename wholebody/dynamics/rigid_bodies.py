@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -323,8 +324,8 @@ def _ways(ways: object, name: str) -> tuple[pin.SE3, pin.SE3]:
 
 
 @lru_cache(maxsize=1)
-def compiled_kernel() -> None:
-    """Compile the loops or read them back: not in the middle of a frame."""
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back with three others: not in the middle of a frame."""
     one, none, mask = np.zeros((1, 3)), np.zeros(0, dtype=np.intp), np.ones(1, dtype=bool)
     unit, vectors, turned, twist = np.eye(3)[None].copy(), np.zeros((0, 3)), np.zeros((1, 4, 3)), np.zeros((1, 6))
     some, mass, pairs = np.zeros(0), np.zeros(1), np.zeros((0, 2), dtype=np.intp)
@@ -345,3 +346,4 @@ def compiled_kernel() -> None:
         none, none, some, vectors, np.zeros((0, 4)),
     )  # fmt: skip
     passing_kernel.join(none, none, none, none)
+    return motion_kernel
