@@ -18,6 +18,7 @@ import pinocchio as pin
 
 from wholebody import checks
 from wholebody.arrays import Array, Mask
+from wholebody.checks import TIME_STEP
 from wholebody.dynamics import contact_kernel, impact_kernel, motion_kernel, passing_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
@@ -32,6 +33,7 @@ from wholebody.scene import Scene
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s2
 SUBSTEP = 1.0 / 240.0  # s: longest step; smaller is more accurate and slower
+LONGEST = 10.0  # s: of a frame, which is 2,400 steps
 SHORTEST = 1e-6  # s: of a step that ends with an impact
 INSIDE = 1e-4  # m: a step that leaves pieces deeper in each other is made again with half the time
 LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
@@ -164,10 +166,10 @@ class RigidBodies:
                 the frame, between which it moves with constant velocity and angular velocity. What is not named stands.
 
         Raises:
-            InputError: dt is no time step, or a thing that moves by itself is named.
+            InputError: dt is no time step of at most 10 s, or a thing that moves by itself is named.
             UnknownNameError: there is no such segment or thing.
         """
-        dt = checks.time_step(dt, "dt")
+        dt = checks.number(dt, "dt", TIME_STEP[0], LONGEST, "s, such as 1/60")
         state, given = self.state, {self._number(name): _ways(ways, name) for name, ways in _given(kinematic).items()}
         for number, (before, after) in given.items():
             if self._pieces.dynamic[number]:
