@@ -182,6 +182,16 @@ def solvable(path: Path, term: Any) -> None:
     wb.solve(problem(path, **{key: [term]}), wb.QP(budget=0, restarts=0))
 
 
+def falling(path: Path, body: wb.Body) -> wb.Scene:
+    """A scene with a ball that moves by itself, far from everything."""
+    made = wb.Scene(figure(path))
+    return made.add(wb.Sphere(0.1), name="faller", at=(9.0, 0.0, 0.0), body=body)
+
+
+def fall(path: Path, body: wb.Body) -> None:
+    RigidBodies(falling(path, body)).advance(0.001)
+
+
 class Level(wb.AssemblyConstraint):
     """A body at the height of another."""
 
@@ -300,6 +310,19 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
 
     yield "Box", Call(wb.Box, {"size": (1.0, 1.0, 1.0)}, put)
     yield "Sphere", Call(wb.Sphere, {"radius": 1.0}, put)
+    falls = {"density": 700.0, "material": "metal", "velocity": (0.1, 0.0, 0.0), "angular_velocity": (0.0, 1.0, 0.0)}
+    yield "Body", Call(wb.Body, falls, lambda made: fall(path, made))
+    yield "Body(mass)", Call(wb.Body, {"mass": 1.0}, lambda made: fall(path, made))
+    against = {"name": "rubber", "against": {"wood": (0.8, 0.9)}, "others": (0.5, 0.5)}
+    yield "Material", Call(wb.Material, against, lambda made: fall(path, wb.Body(material=made)))
+    moved = {**thing, "body": wb.Body()}
+    yield "Scene.add(body)", Call(lambda **given: scene(path).add(**given), moved)
+    yield "Scene.add(material)", Call(lambda **given: scene(path).add(**given), {**thing, "material": "metal"})
+    yield "RigidBodies", Call(RigidBodies, {"scene": falling(path, wb.Body()), "gravity": (0.0, 0.0, -9.81)})
+    engine = RigidBodies(falling(path, wb.Body()))
+    yield "RigidBodies.advance", Call(engine.advance, {"dt": 0.01, "kinematic": {}})
+    yield "RigidBodies.placement", Call(engine.placement, {"name": "faller"})
+    yield "RigidBodies.twist", Call(engine.twist, {"name": "faller"})
     yield "Capsule", Call(wb.Capsule, {"radius": 1.0, "length": 1.0}, put)
     yield "Ellipsoid", Call(wb.Ellipsoid, {"semi_axes": (1.0, 1.0, 1.0)}, put)
     yield "HalfSpace", Call(wb.HalfSpace, {"normal": (0.0, 0.0, 1.0), "offset": 0.0}, put)
@@ -580,6 +603,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     checked = {"clip": clip, "scene": wb.Scene(arm), "depth": 1e-3, "progress": lambda done: None}
     yield "check", Call(wb.check, checked, lambda found: found.as_dict())
     avoided = {"clip": clip, "scene": wb.Scene(arm), "constraints": [], "progress": lambda told: None}
+    yield "avoid", Call(wb.avoid, {**avoided, "method": "frames", "hold_feet": False, "dynamics": False})
     yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
     many = {"clips": [], "folder": path / "many", "equipment": ["nothing"], "methods": ["frames"], "jobs": 1}
     yield "avoid_many", Call(wb.avoid_many, {**many, "hold_feet": True, "progress": print})
@@ -592,6 +616,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     for method in (wb.Trajectory, wb.PerFrame, wb.Fade, wb.Bisection):
         yield f"{method.__name__}.avoid", Call(method().avoid, avoided)
     settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "solver": "osqp", "iterations": 10}
+    settings |= {"stretch": 1.5, "dynamics": wb.Strength()}
     yield "Trajectory", Call(wb.Trajectory, settings)
     yield "PerFrame", Call(wb.PerFrame, {"clearance": 0.01, "backward": True})
     yield "Fade", Call(wb.Fade, {"clearance": 0.01, "fade": 0.2, "rounds": 2})

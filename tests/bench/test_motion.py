@@ -11,6 +11,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.motion import cases, figures, measuring, report
+from wholebody.bench.motion.loads import WAYS, LoadRow
 from wholebody.bench.motion.measuring import CHECKED, MotionRow
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
@@ -132,3 +133,13 @@ def test_a_weapon_is_in_both_hands() -> None:
         across, along = np.linalg.norm(place.actInv(hand)[:2]), abs(place.actInv(hand)[2])
         assert across < 1e-6
         assert along < 0.5 * 0.75
+
+
+def test_loads_of_a_freed_clip_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["bench", "loads", "--only", "squat", "--longest", "0.4", "--out", str(tmp_path)]
+    assert main(words) == 0
+    assert "avoided with dynamics" in capsys.readouterr().out
+    rows = read_rows(tmp_path / "loads.csv", LoadRow)[1]
+    assert [row.way for row in rows] == list(WAYS)
+    assert rows[0].beyond == rows[0].farther_mm == 0.0
+    assert all(row.frames == 13 for row in rows)

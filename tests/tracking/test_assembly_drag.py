@@ -104,3 +104,22 @@ def test_a_plate_through_a_body_that_cannot_give_way_is_named() -> None:
     made.move("plate", at=(0.1, 0, 0), over=1.0 / 60.0)
     frame = drag.to((0, 0, 0))
     assert [{one.first, one.second} for one in frame.collisions] == [{"ball", "plate"}]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bodies_that_are_pushed_about_are_in_nothing_and_pass_through_nothing(seed: int) -> None:
+    made = (
+        wb.Assembly().add(wb.HalfSpace(), name="floor").add(wb.Box((0.3, 0.3, 0.3)), name="block", at=(0.5, 0.1, 0.15))
+    )
+    shapes = (wb.Sphere(0.08), wb.Box((0.2, 0.1, 0.1)), wb.Capsule(0.05, 0.2))
+    for k in range(5):
+        made.body(f"b{k}", (0.35 * k - 0.9, -0.4, 0.3), shape=shapes[k % 3])
+    made.spherical("b0", "b1", at=made.placement("b0").translation + (0.15, 0, 0))
+    drag, scene, before = wb.Drag(made.frame_goal("b0", made.placement("b0"))), made.scene, made.q
+    for k in range(50):
+        t = 0.02 * k
+        y, z = 0.5 * np.sin(3 * t + seed) ** 2 - 0.4, 0.2 * np.sin(7 * t + seed) + 0.25
+        frame = drag.to((1.6 * k / 60 + 0.1 * np.sin(5 * t + seed) - 0.9, y, z, 0, 0, np.sin(t), np.cos(t)))
+        assert scene.contacts(frame.q, 0.0).distance.min(initial=0.0) > -1e-5
+        assert np.array_equal(before, frame.q) or scene.sweep(before, frame.q, 5e-4) is None
+        before = frame.q

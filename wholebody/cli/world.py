@@ -14,15 +14,18 @@ if TYPE_CHECKING:
 HELP = "let a hand or an avatar meet balls, boxes and dominoes that move by themselves"
 DESCRIPTION = """\
 Run a scene: a scripted tracker moves a hand or an avatar, and the things that it meets fall, roll, slide and bounce.
-Print a table of frame times, impacts and overlap. Write the numbers of every frame (CSV), a chart of the energy and the
-frame times (PNG, SVG) and the animation (HTML, opens without a network)."""
+With a task file the figure stands as the file starts. Print a table of frame times, impacts and overlap. Write the
+numbers of every frame (CSV), a chart of the energy and the frame times (PNG, SVG) and the animation (HTML, opens
+without a network)."""
 EPILOG = """\
 examples:
   wholebody world --list
   wholebody world flick
+  wholebody world my_task.toml --frames 300
   wholebody world all --out out/world
 exit code: 1 if pieces were deeper in each other than 0.1 mm after a frame, or a collision could not be avoided"""
 DEEPEST = 0.1  # mm
+STANDING = 180  # frames of a task file
 FILM = (460, 420)  # pixels of a moment
 
 
@@ -30,7 +33,12 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("world", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
-    parser.add_argument("scene", nargs="?", metavar="SCENE", help="name of the scene, or all")
+    parser.add_argument(
+        "scene",
+        nargs="?",
+        metavar="SCENE",
+        help="name of the scene, or all; or a task file whose objects have a density or a mass",
+    )
     parser.add_argument("--list", action="store_true", help="list the scenes")
     parser.add_argument("--overlap", default="qp", metavar="METHOD", help="qp or ccd (default: qp)")
     parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the whole script, once)")
@@ -58,31 +66,41 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"name a scene: {', '.join(WORLD_SCENES)}, or all; see wholebody world --list")
     names = list(WORLD_SCENES) if arguments.scene == "all" else [arguments.scene]
     for name in names:
-        if name not in WORLD_SCENES:
+        if name not in WORLD_SCENES and not name.endswith(".toml"):
             raise UnknownNameError("scene", name, WORLD_SCENES)
     if arguments.overlap not in OVERLAPS:
         raise UnknownNameError("way to remove overlap", arguments.overlap, OVERLAPS, "--overlap")
     if arguments.seed < 0:
         raise InputError(f"--seed is {arguments.seed}; give 0 or more")
     make_folder(arguments.out)
-    check_writable(arguments.out / f"{names[0]}.csv")
+    check_writable(arguments.out / f"{Path(names[0]).stem}.csv")
     facts = machine()
-    rows = [_run_one(name, arguments, facts) for name in names]
+    rows = [_run_one(_scene(name, arguments), arguments, facts) for name in names]
     _print(rows)
     print(f"wrote {arguments.out}")
     return 0 if all(row.deepest_mm <= DEEPEST and not row.unavoided for row in rows) else 1
 
 
-def _run_one(name: str, arguments: argparse.Namespace, facts: dict[str, str]) -> WorldRow:
+def _scene(name: str, arguments: argparse.Namespace) -> WorldScene:
+    """The scene of a name, or that of a task file, whose figure stands as the file starts."""
+    from wholebody.dynamics.scenes import build_world_scene, standing_scene
+    from wholebody.taskfile import read_task
+
+    if name.endswith(".toml"):
+        problem = read_task(name).problem
+        return standing_scene(Path(name).stem, problem.scene, problem.start, frames=arguments.frames or STANDING)
+    return build_world_scene(name, frames=arguments.frames, seed=arguments.seed)
+
+
+def _run_one(scene: WorldScene, arguments: argparse.Namespace, facts: dict[str, str]) -> WorldRow:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from wholebody.bench.tables import write_rows
     from wholebody.bench.world_runs import chart, frame_rows, summary
-    from wholebody.dynamics.scenes import build_world_scene
     from wholebody.dynamics.world import World
 
-    scene = build_world_scene(name, frames=arguments.frames, seed=arguments.seed)
+    name = scene.name
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     frames: list[WorldFrame] = []
     with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
@@ -111,7 +129,8 @@ def _animation(scene: WorldScene, frames: list[WorldFrame], out: Path, picture: 
     viewed = ViewedWorld(scene.scene, frames[-1].placements)
     postures = [viewed.configuration(frame.q, frame.placements) for frame in frames]
     with Viewer(viewed, contact_distance=0.0, see_through=scene.see_through, title=scene.name) as viewer:
-        viewer.look(eye=scene.eye, target=scene.target)
+        if scene.eye is not None and scene.target is not None:
+            viewer.look(eye=scene.eye, target=scene.target)
         viewer.play(postures, scene.track.dt, repeat=float("inf"))
         viewer.save(out / f"{scene.name}.html")
         if picture:

@@ -10,8 +10,11 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from wholebody.arrays import Array
-from wholebody.checks import known, number, whole
+from wholebody.checks import known, number, posture, whole
+from wholebody.errors import InputError
 from wholebody.figures import load
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box, HalfSpace, Sphere
@@ -47,7 +50,7 @@ class WorldScene:
         about: one sentence.
         scene: figure and things; those with a `wb.Body` move by themselves.
         track: the tracked postures.
-        eye: position of the camera, metres.
+        eye: position of the camera, metres; None for one that sees the figure.
         target: the point in the middle of the picture, metres.
         see_through: things to draw transparent.
     """
@@ -56,8 +59,8 @@ class WorldScene:
     about: str
     scene: Scene
     track: Track
-    eye: Place
-    target: Place
+    eye: Place | None = None
+    target: Place | None = None
     see_through: tuple[str, ...] = ()
 
 
@@ -97,6 +100,26 @@ def build_world_scene(name: str, *, frames: int | None = None, seed: int = 0, dt
     scene = Scene(figure).add(HalfSpace(), name="floor")
     plan.put(scene)
     return WorldScene(name, plan.about, scene, track, plan.eye, plan.target)
+
+
+def standing_scene(name: str, scene: Scene, q: Array, *, frames: int, dt: float = FRAME) -> WorldScene:
+    """A scene of one's own, in which the figure keeps a posture.
+
+    Args:
+        name: of files that are written.
+        scene: figure and things; at least one has a `wb.Body`.
+        q: (nq,) the posture.
+        frames: number of frames.
+        dt: seconds from frame to frame.
+
+    Raises:
+        InputError: nothing in the scene moves by itself, or a value of the wrong kind, shape or range.
+    """
+    whole(frames, "frames", 1, MOST_FRAMES)
+    if not any(thing.body is not None for thing in scene.objects.values()):
+        raise InputError(f"{name}: nothing moves by itself; give an object a density or a mass")
+    track = Track.of(scene.figure, np.tile(posture(q, scene.model.nq), (frames, 1)), dt, name)
+    return WorldScene(name, "things move around a figure that stands", scene, track)
 
 
 # ---- things

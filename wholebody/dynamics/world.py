@@ -114,7 +114,8 @@ class World:
         self._tracked: Array = self._loop.shown
         self._workspace, self.time = scene.workspace(), 0.0
         self._revision = scene.revision
-        self._before = segment_placements(scene, self._loop.shown)
+        self._frames = {name: scene.frame_id(name) for name in segment_placements(scene, self._loop.shown)}
+        self._before = self._segments(self._loop.shown)
         self._placed = {name: thing.placement for name, thing in scene.objects.items() if thing.segment is None}
         owners = self._workspace.owners
         self._owner_of = {piece: name for piece, name in enumerate(owners) if name in self._bodies}
@@ -151,12 +152,14 @@ class World:
         engine = None
         if self.engine is not None:
             impulses = self._push(frame.q)
-            after = segment_placements(self.scene, frame.q)
+            after = self._segments(frame.q)
             given = {name: (self._before[name], place) for name, place in after.items()}
             engine = self.engine.advance(self.dt, {**given, **moved})
             self._before = after
             for name in self._bodies:
-                self.scene.move(name, at=self.engine.placement(name))
+                place = self.engine.placement(name)
+                if place != self._placed[name]:
+                    self.scene.move(name, at=place)
         self._coupling.stopped(frame.q, wanted, self.dt)
         self.time += self.dt
         for name in self._placed:
@@ -168,6 +171,11 @@ class World:
             self.time, frame.q, wanted, {name: self._placed[name] for name in self._bodies}, impulses, engine,
             frame.collisions, found, deepest, time.perf_counter() - began, note,
         )  # fmt: skip
+
+    def _segments(self, q: Array) -> dict[str, pin.SE3]:
+        """Where every segment is at a posture (nq,)."""
+        state = self._workspace.state.update(q)
+        return {name: pin.SE3(state.frame(number)) for name, number in self._frames.items()}
 
     def _push(self, q: Array) -> dict[str, Array]:
         """Give things the impulses of the figure that was stopped at the posture q (nq,)."""

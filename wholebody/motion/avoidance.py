@@ -218,20 +218,26 @@ def _report(
     was, now = check(before, scene, depth=COLLISION), check(after, scene, depth=COLLISION)
     times = before.times if result.times is None else result.times
     timed = terms if result.times is None else terms.at(times)
-    missed = 0.0
+    missed, at = 0.0, 0
     if timed.holds:
         state = scene.state(after.q[0])
-        missed = max(timed.missed(frame, state.update(q)) for frame, q in enumerate(after.q))
+        misses = [timed.missed(frame, state.update(q)) for frame, q in enumerate(after.q)]
+        missed, at = max(misses), int(np.argmax(misses))
     beyond = limit_violation(scene.figure, after.q)
     left = [] if not result.message else [result.message]
     if now.colliding:
-        left.append(f"{now.colliding} frames collide, {1e3 * now.deepest:.3g} mm deep at most")
+        frame = int(np.argmax(now.depth))
+        where = f"{_deepest_pair(now, frame, between=False)} at {frame * after.dt:.2f} s"
+        left.append(f"{now.colliding} frames collide, {1e3 * now.deepest:.3g} mm deep at most: {where}")
     if now.dips:
-        left.append(f"{now.dips} motions between frames dip, {1e3 * now.deepest_between:.3g} mm deep at most")
+        ends = np.maximum(now.depth[:-1], now.depth[1:])
+        gap = int(np.argmax(np.where(ends <= now.tolerance, now.between, 0.0)))
+        where = f"{_deepest_pair(now, gap, between=True)} from {gap * after.dt:.2f} s on"
+        left.append(f"{now.dips} motions between frames dip, {1e3 * now.between[gap]:.3g} mm deep at most: {where}")
     if beyond > ROUNDING:
         left.append(f"a joint limit is missed by {beyond:.3g} rad or m")
     if missed > HELD:
-        left.append(f"what is to hold is missed by {missed:.3g} m or rad")
+        left.append(f"what is to hold is missed by {missed:.3g} m or rad, at {at * after.dt:.2f} s")
     solved = now.free and beyond <= ROUNDING and missed <= HELD and (loads is None or loads.kept)
     if loads is not None and not loads.kept:
         left.append("loads are beyond their bounds")
@@ -250,3 +256,8 @@ def _report(
         solved, message, method, seconds, result.posture_solves, result.programs, changed, missed, result.stretch,
         after.duration, times, was, now, loads,
     )  # fmt: skip
+
+
+def _deepest_pair(found: ClipCheck, place: int, *, between: bool) -> str:
+    """The pair that is deepest in a frame, or in the gap after it."""
+    return max(found.contacts, key=lambda each: (each.between if between else each.depth)[place]).names

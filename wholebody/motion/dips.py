@@ -44,6 +44,13 @@ def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, in
     return found
 
 
+def dip_depth(workspace: Workspace, before: Array, after: Array) -> float:
+    """How deep the motion between two postures (nq,) dips, metres; see `SweptDepth.advance`."""
+    swept = SweptDepth(workspace.table, workspace.geometry, DIP)
+    swept.start(before)
+    return float(swept.advance(after)[1].depth.max(initial=0.0))
+
+
 def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float]:
     """Gaps that dip, and the share of each at which it is deepest; see `dipping`."""
     found = dipping(workspace, q, gaps)

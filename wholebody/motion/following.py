@@ -8,8 +8,8 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.methods.qp.method import QP
-from wholebody.motion.dips import dipping
-from wholebody.motion.faults import DEPTH, depth
+from wholebody.motion.dips import dip_depth
+from wholebody.motion.faults import depth
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.problem import Problem
 from wholebody.tasks import Posture
@@ -18,6 +18,7 @@ from wholebody.workspace import Workspace
 
 BACK = 1e-4  # rad, m: a posture this near to the original one is the original one
 MOST = 3  # steps of one frame; more = nearer to the original where much is in the way, dearer frames
+SHALLOW = 2e-3  # m: a deeper dip passes through something; others are arcs between postures in contact
 STEP = 1e-3  # rad, m: a step no longer than this ends a frame
 
 
@@ -107,16 +108,16 @@ def _beside(
     """Frames (k, nq) on the one side of what a motion between two frames passes, as far as they were on the other.
 
     They follow the original motion from one end of the gap, in contact with what is in the way, until the way from
-    there to the next one of q is free. For `side` 1 it is frames after the gap, for -1 frames before it.
+    there to the next one of q passes nothing. For `side` 1 it is frames after the gap, for -1 frames before it.
     """
     here, frame = (q[gap], gap + 1) if side > 0 else (q[gap + 1], gap)
     found: list[Array] = []
     while 0 <= frame < len(q) and len(found) < most:
         there = follower.frame(first + frame, here)
-        if depth(workspace, there) > DEPTH or dipping(workspace, np.array([here, there]), (0,)):
+        if max(depth(workspace, there), dip_depth(workspace, here, there)) > SHALLOW:
             return None
         found.append(there)
         here, frame = there, frame + side
-        if not 0 <= frame < len(q) or not dipping(workspace, np.array([here, q[frame]]), (0,)):
+        if not 0 <= frame < len(q) or dip_depth(workspace, here, q[frame]) <= SHALLOW:
             return np.array(found[::side])
     return None

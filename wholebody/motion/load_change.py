@@ -54,9 +54,14 @@ class LoadChange:
 
     @property
     def farther(self) -> Array:
-        """(m,) by how much farther the zero moment point is outside of the support than it was before, metres."""
-        was = np.interp(self.times, np.arange(len(self.before.outside)), self.before.outside)
-        return np.maximum(self.after.outside - was, 0.0)
+        """(m,) by how much farther the zero moment point is outside of the support than it was before, metres.
+
+        A frame between two of those before is compared with the worse of both.
+        """
+        outside, last = self.before.outside, len(self.before.outside) - 1
+        was = [outside[np.clip(near(self.times).astype(int), 0, last)] for near in (np.floor, np.ceil)]
+        found: Array = np.maximum(self.after.outside - np.maximum(*was), 0.0)
+        return found
 
     @property
     def kept(self) -> bool:

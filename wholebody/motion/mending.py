@@ -16,9 +16,9 @@ import pinocchio as pin
 
 from wholebody.arrays import Array, Mask
 from wholebody.motion.avoider import Watch
-from wholebody.motion.dips import dipping, dips
+from wholebody.motion.dips import dip_depth, dips
 from wholebody.motion.faults import faults
-from wholebody.motion.following import Follower, keep_back
+from wholebody.motion.following import SHALLOW, Follower, keep_back
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.chart import Chart
@@ -120,8 +120,8 @@ class Mender:
 
     def _kept_back(self, q: Array, gap: int) -> bool:
         """Keep frames beside a gap on one side of what it passes, in place; whether that succeeded."""
-        if not dipping(self._workspace, q, (gap,)):
-            return False  # an earlier one changed these frames
+        if dip_depth(self._workspace, q[gap], q[gap + 1]) <= SHALLOW:
+            return False
         if self._follower is None:
             self._follower = Follower(self._terms, self._clearance)
         return keep_back(self._follower, self._workspace, q, gap, max(2, round(LONGEST / self._terms.dt)))

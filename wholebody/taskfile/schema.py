@@ -13,6 +13,13 @@ _THING = (
     Key("color", kinds.Several(Number(0.0, 1.0), 3), "red, green, blue and, if given, alpha"),
 )
 
+_BODY = (
+    Key("density", Number(1e-3, 1e6, "kg/m3"), "of a thing that moves by itself, in `wholebody world`"),
+    Key("mass", Number(1e-9, 1e9, "kg"), "in place of a density"),
+    Key("material", kinds.Choice(("wood", "human", "metal")), "for impacts and friction; wood if left out"),
+    Key("velocity", kinds.Vector(3, Number(-1e3, 1e3, "m/s")), "of a thing that moves by itself; 0 if left out"),
+)
+
 TOP = (
     Key("title", kinds.Text(), "one line of description"),
     Key("clearance", Number(0.0, 0.5, "m"), "least distance between any two pieces; 0 if left out"),
@@ -41,7 +48,7 @@ TABLES = {
     ),
     "object": Table(
         "A thing around the figure.",
-        (Key("name", kinds.Text(), "of the thing", True), *_THING),
+        (Key("name", kinds.Text(), "of the thing", True), *_THING, *_BODY),
         True,
         "shape",
         forms=SHAPES,

@@ -18,6 +18,7 @@ from wholebody.figures import Figure, load
 from wholebody.files import is_file, is_folder
 from wholebody.geometry.placement import placement
 from wholebody.geometry.shapes import Mesh, Shape
+from wholebody.matter.body import Body
 from wholebody.methods.base import Method
 from wholebody.methods.solve import method_named
 from wholebody.problem import Problem
@@ -154,10 +155,27 @@ def _scene(contents: Contents, figure: Figure) -> Scene:
         thing = {name: options.pop(name) for name in ("name", "at", "color", "to") if name in options}
         if "color" in thing:
             thing["color"] = _color(thing["color"], entry.where.at("color"))
+        thing |= _said(entry.where, lambda options=options: _body(options))  # type: ignore[misc]
         shape = _shape(entry, options)
         add: Callable[..., Scene] = scene.attach if "to" in thing else scene.add
         _said(entry.where, lambda add=add, shape=shape, thing=thing: add(shape, **thing))  # type: ignore[misc]
     return scene
+
+
+def _body(options: dict[str, Any]) -> dict[str, Any]:
+    """Take what makes a thing move by itself from the options: its body, or its material alone.
+
+    Raises:
+        InputError: both a density and a mass.
+    """
+    given: dict[str, Any] = {
+        name: options.pop(name) for name in ("density", "mass", "material", "velocity") if name in options
+    }
+    if not given.keys() - {"material"}:
+        return given
+    if "velocity" in given:
+        given["velocity"] = tuple(given["velocity"])
+    return {"body": Body(**given)}
 
 
 def _shape(entry: Entry, options: dict[str, Any]) -> Shape:

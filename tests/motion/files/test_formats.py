@@ -401,3 +401,28 @@ def test_csv_of_other_columns_is_refused_with_its_line(human: Figure, tmp_path: 
     with pytest.raises(wb.InputError, match="two frames or more"):
         swinging(human, 1, 0).write(tmp_path / "b.csv")
     assert not (tmp_path / "b.csv").exists()
+
+
+def test_a_rest_posture_that_turns_some_joints_is_left_out(tmp_path: Path) -> None:
+    """As CMU's converted files have it: some joints turn by whole degrees, and the motion begins with a jump."""
+    pytest.importorskip("pybvh")
+    header = ["HIERARCHY", "ROOT a", "{", "OFFSET 0 0 0"]
+    header += ["CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"]
+    for name in "bcdefg":
+        header += [f"JOINT {name}", "{", "OFFSET 0 0.3 0", "CHANNELS 3 Zrotation Xrotation Yrotation"]
+    header += ["End Site", "{", "OFFSET 0 0.3 0", "}", *["}"] * 7]
+    frame = np.arange(20.0)[:, None]
+    moving = 25.0 + np.arange(18.0) + 4.0 * np.sin(0.3 * frame + np.arange(18.0))
+    rest = np.zeros((1, 18))
+    rest[0, 3] = -21.0
+
+    def frames(angles: np.ndarray) -> int:
+        rows = [" ".join(f"{value:.6f}" for value in (0, 1, 0, 0, 0, 0, *row)) for row in angles]
+        text = "\n".join([*header, "MOTION", f"Frames: {len(rows)}", "Frame Time: 0.0333333", *rows, ""])
+        (tmp_path / "a.bvh").write_text(text)
+        return len(wb.read_skeleton(tmp_path / "a.bvh").positions)
+
+    assert frames(np.vstack([rest, moving])) == 20
+    assert frames(moving) == 20
+    ways_in = rest + np.linspace(0.0, 1.0, 20)[:, None] * (moving[:1] - rest)
+    assert frames(np.vstack([ways_in, moving])) == 40  # it moves out of that posture

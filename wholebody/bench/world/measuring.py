@@ -60,7 +60,7 @@ def measure(drop: Drop, engine: str, frames: int | None = None) -> WorldRow:
     """
     world = ENGINES[engine](drop)
     count = round(drop.seconds / drop.frame) if frames is None else frames
-    judge, times = _Judge(drop), []
+    judge, times = Judge(drop), []
     depths, energies = [], [judge.energy(*world.state())]
     for _ in range(count):
         began = time.process_time()
@@ -77,7 +77,7 @@ def measure(drop: Drop, engine: str, frames: int | None = None) -> WorldRow:
     )  # fmt: skip
 
 
-class _Judge:
+class Judge:
     """Depths and energies of a drop, whatever engine moved it."""
 
     def __init__(self, drop: Drop) -> None:

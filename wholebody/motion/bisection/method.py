@@ -135,8 +135,11 @@ class Bisection:
             q = mender.mend(recursion.q, watch)
             for frame in changed_frames(recursion.q, q):
                 q[frame] = stays.applied(frame, q[frame])
-        programs = recursion.programs + mender.programs
-        return MethodResult(q, recursion.predictions, programs, _message(recursion, missed, watch))
+            stuck = [frame for frame in sorted(recursion.stuck) if not predictor.good(frame, q[frame])]
+            bad = [frame for frame in np.flatnonzero(recursion.bad).tolist() if not predictor.free(q[frame])]
+            missed = [frame for frame in missed if not predictor.holds(frame, q[frame])]
+        said = _message(recursion, stuck, bad, missed, watch)
+        return MethodResult(q, recursion.predictions, recursion.programs + mender.programs, said)
 
     def _points(self, figure: Figure, original: Array, frozen: tuple[str, ...]) -> tuple[int, ...]:
         """The evaluation points of a clip."""
@@ -151,14 +154,12 @@ def _with_frozen(terms: FrameTerms, frozen: tuple[str, ...]) -> FrameTerms:
     return replace(terms, given=(*terms.given, Freeze(*frozen))) if frozen else terms
 
 
-def _message(recursion: Recursion, missed: list[int], watch: Watch) -> str:
+def _message(recursion: Recursion, stuck: list[int], bad: list[int], missed: list[int], watch: Watch) -> str:
     """What did not succeed, in one sentence; empty where all did."""
     said = []
-    bad = np.flatnonzero(recursion.bad).tolist()
-    if recursion.stuck:
-        frame = min(recursion.stuck)
-        others = f" and {len(recursion.stuck) - 1} others" if len(recursion.stuck) > 1 else ""
-        said.append(f"frame {frame}{others} could not be freed ({recursion.stuck[frame]})")
+    if stuck:
+        others = f" and {len(stuck) - 1} others" if len(stuck) > 1 else ""
+        said.append(f"frame {stuck[0]}{others} could not be freed ({recursion.stuck[stuck[0]]})")
     if bad:
         said.append(f"{_frames(bad)} still overlap{'s' if len(bad) == 1 else ''}")
     if missed:

@@ -4,11 +4,13 @@
     subject to  lower <= G z <= upper,   least <= z <= most
 
 PIQP's multistage backend finds the blocks by itself and factorises from block to block, so its time is linear in the
-frames. OSQP takes the same program by its general sparse factorisation.
+frames. OSQP takes the same program by its general sparse factorisation; where it is taken because PIQP is not
+installed, a warning says so before a long run begins.
 """
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from types import MappingProxyType
@@ -20,6 +22,9 @@ from wholebody.arrays import Array
 from wholebody.checks import shown
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
+_log = logging.getLogger(__name__)
+
+LONG = 3000  # unknowns, frames times degrees of freedom, beyond which OSQP may take minutes
 PIQP_ACCURACY = 1e-5  # of the optimality conditions: a tenth of what a step is judged by; smaller costs an iteration
 OSQP_ACCURACY = 1e-6
 OSQP_ITERATIONS = 8000
@@ -102,6 +107,20 @@ SOLVERS: Mapping[str, tuple[str, Callable[[BandedQP], Answer]]] = MappingProxyTy
     {"piqp": ("piqp", solve_by_piqp), "osqp": ("osqp", solve_by_osqp)}
 )
 """Name of a solver -> the module that it needs, and the function that asks it."""
+
+
+def warn_of_osqp(name: str | None, unknowns: int) -> None:
+    """Say that a program will take long where no solver was chosen and PIQP is not installed.
+
+    Args:
+        name: of the solver that was asked for.
+        unknowns: frames times degrees of freedom.
+    """
+    if name is None and unknowns > LONG and find_spec("piqp") is None:
+        _log.warning(
+            "PIQP is not installed: OSQP may take minutes for this clip, 10 to 100 times as long; install it with: "
+            "pip install piqp"
+        )
 
 
 def banded_solver(name: str | None) -> tuple[str, Callable[[BandedQP], Answer]]:

@@ -18,7 +18,7 @@ from wholebody.motion.faults import faults
 from wholebody.motion.frame_terms import FrameTerms, Given, between, frame_terms
 from wholebody.motion.soles import standing_feet, usual_feet
 from wholebody.motion.strength import Strength
-from wholebody.motion.trajectory.banded_qp import Answer, BandedQP, banded_solver
+from wholebody.motion.trajectory.banded_qp import Answer, BandedQP, banded_solver, warn_of_osqp
 from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
 from wholebody.motion.trajectory.window_run import ClipRun
@@ -116,6 +116,7 @@ class Trajectory:
         depths, wrong, gaps = faults(workspace, terms, reference, self.clearance)
         wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
         found = windows(wrong, max(3, round(self.margin / terms.dt)))
+        warn_of_osqp(self.solver, sum(map(len, found)) * terms.scene.model.nv)
         total, done, missed = max(1, sum(map(len, found))), 0, []
         for window in found:
             begun, note = done, f"frames {window.first} to {window.end - 1}"

@@ -13,9 +13,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.motion.dips import dipping
+from wholebody.motion.dips import dip_depth
 from wholebody.motion.fade import freed_posture
-from wholebody.motion.following import BACK, Follower, keep_back
+from wholebody.motion.following import BACK, SHALLOW, Follower, keep_back
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.windows import Window, outwards
 from wholebody.workspace import Workspace
@@ -55,7 +55,7 @@ class Carried:
             self._follower = Follower(self._terms, self._clearance)
         q = np.array(q)
         for gap in sorted(gaps):
-            if 0 <= gap < len(q) - 1 and dipping(workspace, q, (gap,)):
+            if 0 <= gap < len(q) - 1 and dip_depth(workspace, q[gap], q[gap + 1]) > SHALLOW:
                 keep_back(self._follower, workspace, q, gap, len(q) - 1, window.first)
         return q
 

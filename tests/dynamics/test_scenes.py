@@ -1,0 +1,57 @@
+"""The scenes of `wholebody world`: what is to happen in them happens."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.dynamics.scenes import WORLD_SCENES, build_world_scene, standing_scene
+from wholebody.dynamics.world import World, WorldFrame
+from wholebody.errors import InputError, UnknownNameError
+
+
+def played(name: str) -> list[WorldFrame]:
+    """All frames of a scene."""
+    scene = build_world_scene(name)
+    world = World(scene.scene, scene.track.q[0], dt=scene.track.dt)
+    return [world.step(q) for q in scene.track.q]
+
+
+def test_the_finger_flicks_the_ball_off_the_table() -> None:
+    frames = played("flick")
+    first, last = frames[0].placements["ball"].translation, frames[-1].placements["ball"].translation
+    assert first == pytest.approx([0.3, 0.0, 0.77], abs=1e-3)
+    assert last[0] > 0.8  # beyond the edge at 0.4
+    assert last[2] == pytest.approx(0.02, abs=1e-3)  # on the floor
+    given = np.sum([frame.impulses["ball"] for frame in frames if "ball" in frame.impulses], axis=0)
+    assert given[0] > 0.0
+    falling = [frame.placements["ball"].translation for frame in frames]
+    falling = [place for place in falling if 0.1 < place[2] < 0.7]
+    # on its way down the ball's centre falls with g: second differences of its height
+    drops = np.diff([place[2] for place in falling], n=2)
+    assert drops == pytest.approx(-9.81 / 60**2, rel=1e-6)
+    assert max(frame.deepest for frame in frames) <= 1e-4
+
+
+def test_one_domino_fells_all() -> None:
+    frames = played("dominoes")
+    upright = [frame.placements["domino 12"].rotation[2, 2] for frame in frames]
+    assert upright[0] == pytest.approx(1.0, abs=1e-6)
+    for number in range(1, 13):
+        assert frames[-1].placements[f"domino {number}"].rotation[2, 2] < 0.7
+    assert max(frame.deepest for frame in frames) <= 1e-4
+
+
+def test_scenes_are_named_and_unknown_ones_are_not_built() -> None:
+    assert {"flick", "dominoes", "stairs"} <= set(WORLD_SCENES)
+    with pytest.raises(UnknownNameError, match="flick"):
+        build_world_scene("flik")
+    with pytest.raises(InputError):
+        build_world_scene("flick", frames=0)
+
+
+def test_a_scene_of_ones_own_needs_something_that_moves() -> None:
+    scene = wb.Scene(wb.load("hand")).add(wb.Sphere(0.1), name="ball", at=(1.0, 0.0, 0.0))
+    with pytest.raises(InputError, match="density"):
+        standing_scene("mine", scene, scene.figure.neutral, frames=5)
