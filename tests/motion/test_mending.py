@@ -20,7 +20,7 @@ def swing(figure: Figure, frames: int = 40) -> wb.Clip:
 
 
 def mended(clip: wb.Clip, scene: wb.Scene, q: np.ndarray, *terms: wb.Hold) -> tuple[np.ndarray, int]:
-    with scene.lend() as workspace:
+    with scene.borrow() as workspace:
         mender = Mender(frame_terms(scene, clip.q, clip.dt, terms), workspace)
         return mender.mend(q, Watch(None)), mender.programs
 
