@@ -115,5 +115,5 @@ def test_a_scene_without_bodies_is_refused(hand: wb.Figure) -> None:
 @pytest.mark.parametrize("dt", [0.0, 1e5, float("nan")])
 def test_a_frame_that_would_not_end_is_refused(hand: wb.Figure, dt: float) -> None:
     scene = floor(hand).add(wb.Sphere(0.05), name="ball", at=(3, 0, 0), body=wb.Body())
-    with pytest.raises(InputError, match="dt is .*give a"):
+    with pytest.raises(InputError, match=r"dt is .*give a"):
         RigidBodies(scene).advance(dt)
