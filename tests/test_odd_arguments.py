@@ -467,8 +467,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Assembly", Call(wb.Assembly, {"clearance": 0.01})
     third = {"name": "third", "at": at, "shape": wb.Sphere(0.1), "size": 0.1, "color": (1.0, 0.0, 0.0)}
     yield "Assembly.body", Call(assembly().body, third, solve_parts)
-    person = {"name": "arm", "figure": arm, "start": q, "constraints": [], "color": (1.0, 0.0, 0.0)}
-    yield "Assembly.figure", Call(assembly().figure, person, solve_parts)
+    given = {"name": "arm", "figure": arm, "start": q, "constraints": [], "color": (1.0, 0.0, 0.0)}
+    yield "Assembly.figure", Call(assembly().figure, given, solve_parts)
     yield "Assembly.posture", Call(assembly().figure("arm", arm).posture, {"name": "arm"})
     yield "Assembly.add", Call(assembly().add, {"shape": wb.Sphere(0.1), "name": "ball", "at": at}, solve_parts)
     yield "Assembly.add_things", Call(assembly().add_things, {"scene": there}, solve_parts)
