@@ -572,6 +572,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Strength", Call(wb.Strength, {"percentile": 50.0, "sex": "female"}, lambda made: made.limits(arm))
     yield "Strength.limits", Call(wb.Strength().limits, {"figure": arm})
     found = wb.torques(clip)
+    yield "Torques.joint_of", Call(found.joint_of, {"column": 0})
     yield "Torques.largest", Call(found.largest, {})
     yield (
         "torques",

@@ -93,7 +93,12 @@ class Torques:
         return found
 
     def joint_of(self, column: int) -> str:
-        """Name of the joint of a column of `torque`."""
+        """Name of the joint of a column of `torque`.
+
+        Raises:
+            InputError: there is no such column.
+        """
+        column = checks.whole(column, "column", 0, self.figure.model.nv - 1)
         for name in self.figure.joints:
             joint = self.figure.model.joints[self.figure.joint_id(name)]
             if joint.idx_v <= column < joint.idx_v + joint.nv:
