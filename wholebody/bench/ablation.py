@@ -97,7 +97,12 @@ def constants(method: str) -> tuple[list[Constant], list[str]]:
     found: list[Constant] = []
     compiled: list[str] = []
     for name in (*names, *SHARED):
-        module = import_module(name)
+        try:
+            module = import_module(name)
+        except ModuleNotFoundError as missing:
+            if missing.name is not None and missing.name.startswith("wholebody"):
+                raise
+            continue  # of an optional package that is not installed
         mine = [Constant(name, each, getattr(module, each)) for each in _assigned(module)]
         mine = [each for each in mine if _is_number(each.value)]
         if mine and any(hasattr(value, "signatures") for value in vars(module).values()):  # loops of numba

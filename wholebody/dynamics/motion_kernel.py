@@ -189,9 +189,15 @@ def world_inverses(rotation: Array, inverse: Array, moving: Mask, result: Array)
         for i in range(3):
             for j in range(3):
                 result[b, i, j] = 0.0
-        if moving[b]:
-            half = rotation[b] @ inverse[b]
-            result[b] = half @ rotation[b].T
+        if not moving[b]:
+            continue
+        for i in range(3):  # in loops: numba's matrix products load scipy.linalg
+            for k in range(3):
+                half = 0.0
+                for m in range(3):
+                    half += rotation[b, i, m] * inverse[b, m, k]
+                for j in range(3):
+                    result[b, i, j] += half * rotation[b, j, k]
 
 
 @compiled()
