@@ -13,7 +13,7 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.checks import flag, instance, listed, shown
 from wholebody.errors import InputError, UnknownNameError
-from wholebody.motion.avoider import Avoider, MethodResult, Progress, check_input
+from wholebody.motion.avoider import Avoider, MethodResult, Progress, check_input, has_setting
 from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
@@ -21,7 +21,6 @@ from wholebody.motion.load_change import LoadChange, load_change
 from wholebody.motion.soles import standing_feet, usual_feet
 from wholebody.motion.stance import StanceFeet, has_feet
 from wholebody.motion.strength import Strength
-from wholebody.motion.trajectory.method import Trajectory
 from wholebody.motion_assessment import limit_violation
 from wholebody.scene import Scene
 
@@ -186,10 +185,10 @@ def avoid(
         given = (*given, StanceFeet()) if has_feet(scene.figure) else given
     strong = _strength(dynamics)
     if strong is not None:
-        if not isinstance(chosen, Trajectory):
+        if not has_setting(chosen, "dynamics"):
             raise InputError(f"avoid: the method {chosen.name} does not take dynamics; give method='trajectory'")
-        chosen = replace(chosen, dynamics=strong)
-    strong = chosen.dynamics if isinstance(chosen, Trajectory) else None
+        chosen = replace(chosen, dynamics=strong)  # type: ignore[type-var]
+    strong = getattr(chosen, "dynamics", None)
     stands = {} if strong is None else standing_feet(clip, usual_feet(scene.figure, given))
     terms = frame_terms(scene, clip.q, clip.dt, given)
     began = time.perf_counter()

@@ -67,6 +67,11 @@ class Avoider(Protocol):
         """
 
 
+def has_setting(method: Avoider, name: str) -> bool:
+    """Whether a method has a setting of a name, such as "dynamics", so that `dataclasses.replace` changes it."""
+    return name in getattr(method, "__dataclass_fields__", {})
+
+
 def check_input(clip: object, scene: object, progress: object) -> None:
     """Check what a method gets.
 

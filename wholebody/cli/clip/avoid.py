@@ -98,22 +98,23 @@ def _method(name: str, arguments: argparse.Namespace) -> Avoider:
     """The method, which may slow the motion, and keep to the strength of a person of the sex that was asked for.
 
     Raises:
-        WholebodyError: there is no such method, or it does not slow motions.
+        WholebodyError: there is no such method, or it does not slow motions or take dynamics.
     """
     from wholebody.errors import InputError
     from wholebody.motion.avoidance import as_avoider
+    from wholebody.motion.avoider import has_setting
     from wholebody.motion.strength import Strength
-    from wholebody.motion.trajectory.method import Trajectory
 
-    method = as_avoider(name)
-    if not isinstance(method, Trajectory):
-        if arguments.stretch is not None:
+    method, settings = as_avoider(name), {}
+    if arguments.stretch is not None:
+        if not has_setting(method, "stretch"):
             raise InputError(f"--stretch: the method {method.name} does not slow motions; leave out --method")
-        if arguments.dynamics:
+        settings["stretch"] = arguments.stretch
+    if arguments.dynamics:
+        if not has_setting(method, "dynamics"):
             raise InputError(f"--dynamics: the method {method.name} does not take dynamics; leave out --method")
-        return method
-    strength = Strength(sex=arguments.sex or "male") if arguments.dynamics else None
-    return replace(method, stretch=arguments.stretch or method.stretch, dynamics=strength)
+        settings["dynamics"] = Strength(sex=arguments.sex or "male")
+    return replace(method, **settings) if settings else method  # type: ignore[type-var]
 
 
 def _tell(console: Console, avoided: Avoided, written: Path) -> None:

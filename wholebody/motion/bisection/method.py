@@ -13,12 +13,11 @@ from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
-from wholebody.motion.bisection.holds import hold_between
 from wholebody.motion.bisection.interpolation import Kind
 from wholebody.motion.bisection.key_frames import key_frames
 from wholebody.motion.bisection.path_planes import ANKLES, ELBOWS
 from wholebody.motion.bisection.prediction import Predictor
-from wholebody.motion.bisection.recursion import Recursion, changed_frames
+from wholebody.motion.bisection.recursion import Recursion, changed_frames, hold_between
 from wholebody.motion.bisection.stays import Stays
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
