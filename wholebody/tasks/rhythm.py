@@ -16,9 +16,9 @@ from wholebody.tasks import inputs
 from wholebody.tasks.base import Measure, Surroundings, filled
 from wholebody.tasks.distance import LEAST_CURVATURE
 
-CLAVICLE_RISE = math.radians(15.0)
-"""Elevation of the clavicle where the arm is level, and twice that where it is overhead, radians: 15 degrees times
-1 - cos(elevation), which stays within 3 degrees of 0.2 (elevation - 30 degrees). The scapula turns upward by 0.43
+CLAVICLE_RISE = math.radians(13.0)
+"""Elevation of the clavicle where the arm is level, and twice that where it is overhead, radians: 13 degrees times
+1 - cos(elevation), which stays within 4 degrees of 0.2 (elevation - 30 degrees). The scapula turns upward by 0.43
 degrees for each of the arm in its socket (Braman et al. 2009, Journal of Shoulder and Elbow Surgery 18(6)), about half
 of it at the inner end of the clavicle: ESTIMATE."""
 
@@ -62,7 +62,7 @@ class Lumbar(NamedTuple):
 class Rhythm(Measure):
     """Squared distance of clavicles and lumbar spine from their usual share of a motion [rad^2, weighted].
 
-    ``100 sum (c - 15 deg (1 - cos e))^2 + 10 (l - l_0)^2``: c is the elevation of a clavicle and e that of its arm in
+    ``100 sum (c - 13 deg (1 - cos e))^2 + 10 (l - l_0)^2``: c is the elevation of a clavicle and e that of its arm in
     the clavicle (scapulohumeral rhythm); l is the flexion of the lumbar spine beyond its share of the tilt t of the
     pelvis, ``46 deg tanh(2.5 sin t)``, and l_0 the same at the start (lumbar-pelvic rhythm).
 
