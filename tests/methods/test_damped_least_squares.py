@@ -91,6 +91,8 @@ def test_feet_stay_where_a_goal_out_of_reach_pulls(human: wb.Figure) -> None:
         wb.Scene(human),
         goals=[wb.Point("right_index_tip", (2.5, 0.0, 1.5))],
         constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")],
+        range_of_motion=False,  # inequalities, which this method does not take
+        balance=False,
     )
     solution = DampedLeastSquares().solve(problem)
     judgement = judged(problem, solution)

@@ -139,7 +139,9 @@ class AssemblyBodies:
         self._check_new(text(name, "the name of a figure"), "figure")
         instance(figure, Figure, f"figure {name!r}", "load one with wb.load('human')")
         painted = None if color is None else checked_color(color, f"figure {name!r}: color")
-        part = AssemblyFigure(name, Problem(Scene(figure), start, constraints=constraints), len(self._places))
+        # The other bodies may carry it, so it is not taken for one that stands; its ranges have no equations of bodies.
+        problem = Problem(Scene(figure), start, constraints=constraints, range_of_motion=False, balance=False)
+        part = AssemblyFigure(name, problem, len(self._places))
         part.batches(0)  # refuses what has no equations here
         self._parts.append(name)
         self._figures[name] = part

@@ -3,7 +3,7 @@
 A measure f with gradient g and diagonal second derivative h at angles theta is, to second order, a sum of squares of
 angles from theta - g / h, with the factors h / 2. For `Effort` and `Displacement` that is exact. This applies to every
 measure of the revolute joints. A measure that depends on the root's position or on other joints is only reported, and
-the solution's message names it.
+the solution's message names it. Of `Effort` and `Rhythm` the part of a free root is not minimised.
 """
 
 from __future__ import annotations
