@@ -45,7 +45,7 @@ _ENDS = {
 _EXPECTED_MASS = {"M": (27.41, 1.999), "F": (23.00, 2.192)}
 
 
-_FOLDER = Path(__file__).parent / "data"
+FOLDER = Path(__file__).parent / "data"
 
 Row = dict[str, str]
 
@@ -210,9 +210,9 @@ def table(name: str) -> tuple[Row, ...]:
     Raises:
         UnknownNameError: there is no such table.
     """
-    path = _FOLDER / f"{name}.csv"
+    path = FOLDER / f"{name}.csv"
     if not path.is_file():
-        raise UnknownNameError("table", name, [file.stem for file in _FOLDER.glob("*.csv")])
+        raise UnknownNameError("table", name, [file.stem for file in FOLDER.glob("*.csv")])
     with path.open(encoding="utf-8", newline="") as file:
         return tuple(csv.DictReader(line for line in file if not line.startswith("#")))
 
