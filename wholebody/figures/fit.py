@@ -58,7 +58,9 @@ PRIORS: Mapping[str, Prior] = {
     "upper_arm": Prior(0.1618, 0.1586, 0.010, False, "shoulder to elbow centre; de Leva 1996"),
     "forearm": Prior(0.1525, 0.1482, 0.006, False, "elbow to wrist centre; radiale-stylion length (ANSUR II)"),
     "shoulder_x": Prior(-0.020, -0.020, 0.010, False, "shoulder centre forward of the clavicle's inner end; estimate"),
-    "shoulder_y": Prior(0.0869, 0.0807, 0.006, False, "shoulder centre lateral of the clavicle's inner end; biacromial"),
+    "shoulder_y": Prior(
+        0.0869, 0.0807, 0.006, False, "shoulder centre lateral of the clavicle's inner end; biacromial"
+    ),
     "shoulder_z": Prior(-0.0167, -0.0146, 0.006, False, "shoulder centre above the clavicle's inner end; acromion"),
     "shoulder_top": Prior(0.020, 0.020, 0.010, False, "acromion above the shoulder centre; de Leva 1996b"),
     "deltoid": Prior(0.0117, 0.0117, 0.030, True, "skin lateral of the shoulder centre; estimate"),

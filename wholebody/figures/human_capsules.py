@@ -16,6 +16,10 @@ from wholebody.figures.dimensions import RELAXED, Dimensions
 FACE = 0.75
 """Radius of the face and jaw in half breadths of the head (estimate)."""
 
+YIELD = 0.4
+"""Share of the thigh's radius by which thigh and belly give way together where they press on each other (estimate: 29 to
+41 mm from the small woman to the large man). The core that is left is what the belly is tested against."""
+
 CLAVICLE = 0.017
 """Radius of the shoulder girdle as a fraction of stature (estimate)."""
 
@@ -77,6 +81,8 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     front, out = high - person.fitted("seat"), sign * (person.fitted("hip_side") - high)
     name = f"{side}_thigh"
     yield _between(f"{name}:0", name, high, (front, out, -0.12 * thigh), (front, 0.3 * out, -0.42 * thigh))
+    core = (1.0 - YIELD) * high
+    yield _between(f"{name}:2", name, core, (front, 0.3 * out, -0.3 * thigh), (front, 0.3 * out, -0.42 * thigh))
     knee = person.fitted("knee_front")
     yield _down(f"{name}:1", name, knee, 0.6 * thigh, 0.98 * thigh)
     calf, ankle = 0.96 * radius("calf"), 1.04 * radius("ankle")
@@ -90,7 +96,9 @@ def clavicle(size: Dimensions, side: str) -> Solid:
     x, y, z = size.joint(f"{side}_shoulder_flexion")
     radius = CLAVICLE * size.stature
     height = z + size.body.fitted("shoulder_top") - radius
-    return _between(f"{side}_clavicle", f"{side}_clavicle", radius, (0.25 * x, 0.25 * y, height), (0.9 * x, 0.9 * y, height))
+    return _between(
+        f"{side}_clavicle", f"{side}_clavicle", radius, (0.25 * x, 0.25 * y, height), (0.9 * x, 0.9 * y, height)
+    )
 
 
 def hand(size: Dimensions, side: str) -> Iterator[Solid]:
