@@ -2,8 +2,8 @@
 
 Masses are fractions (de Leva 1996). Radii are linear fits to ANSUR II, ``c0 + cq sqrt(mass / stature) + cH stature``.
 Lengths of limbs, joint centres and some thicknesses are of the same form; `wholebody.figures.fit` chooses their
-coefficients so that the dimensions of the model are those of ANSUR II. The tables in ``figures/data`` name the source of
-every column.
+coefficients so that the dimensions of the model are those of ANSUR II. The tables in ``figures/data`` name the source
+of every column.
 """
 
 from __future__ import annotations

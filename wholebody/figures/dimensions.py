@@ -18,7 +18,8 @@ CHIN_HEIGHT = 0.870
 
 
 THUMB_TIP = 0.675
-"""End of the thumb beside the index finger, in hand lengths from the wrist (estimate: 0.26 behind the index finger's)."""
+"""End of the thumb, which lies beside the index finger, in hand lengths from the wrist: 0.26 behind that finger's
+(estimate)."""
 
 MIDDLE_TIP = 0.991
 """End of the stretched middle finger, in hand lengths from the wrist: the sum of its parts in the table "hand"."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
@@ -201,7 +202,7 @@ def main(folder: Path = FOLDER) -> None:
     write(folder / "residuals.csv", _text(residuals, "Written by wholebody.figures.fit; model less ANSUR II, metres."))
     for name, *numbers in residuals:
         shown = numbers if name == "name" else [f"{1e3 * float(number):.0f}" for number in numbers]
-        print(f"{name:24s}", *(f"{text:>5s}" for text in shown))
+        sys.stdout.write(f"{name:24s} {' '.join(f'{text:>5s}' for text in shown)}\n")
 
 
 if __name__ == "__main__":
