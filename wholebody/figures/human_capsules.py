@@ -17,8 +17,8 @@ FACE = 0.75
 """Radius of the face and jaw in half breadths of the head (estimate)."""
 
 YIELD = 0.4
-"""Share of the thigh's radius by which flesh gives way where the thigh presses on the belly or the other thigh (estimate:
-29 to 41 mm from the small woman to the large man). These are tested against the core that is left."""
+"""Share of the thigh's radius by which flesh gives way where the thigh presses on the belly or the other thigh: 29 to
+41 mm from the small woman to the large man (estimate). These are tested against the core that is left."""
 
 CLAVICLE = 0.017
 """Radius of the shoulder girdle as a fraction of stature (estimate)."""
