@@ -84,7 +84,10 @@ def read(problem: Problem) -> Request:
     moving = _dofs(figure, joints)
     state = State(problem.scene.model).update(problem.start)
     support = joint_support(problem.scene.model)
+    left_out = {id(term) for term in problem.defaults if not isinstance(term, ReachCones)}
     for number, term in enumerate(problem.constraints):
+        if id(term) in left_out:
+            continue
         where = f"constraints[{number}], {type(term).__name__}"
         if isinstance(term, ReachCones):
             cones.update(dict.fromkeys(figure.cones if term.names is None else term.names))
