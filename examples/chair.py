@@ -16,7 +16,7 @@ import wholebody as wb
 BACKWARDS = (0.0, 0.0, 1.0, 0.0)  # half a turn about z: the mesh has its backrest in front
 SCALE = 0.852  # of the mesh: the seat is as high as the thighs of a man who sits with his soles on the floor
 HIPS = 0.024  # m: in front of the middle of the chair, so that the back is close to the backrest
-PALM = (0.067, 0.0, -0.32)  # m: on the thigh, in its axes
+PALM = (0.067, 0.0, -0.34)  # m: on the thigh, in its axes
 
 
 def mesh() -> Path | None:
