@@ -31,18 +31,18 @@ class Problem:
     """Scene, start, goals, constraints and measures, in the same form for every method.
 
     Joint limits and non-penetration are part of every problem. A person keeps its `RangeOfMotion` and `ReachCones`, and
-    `Balance` if it stands: both feet are held in the world where they are at the start, and nothing else carries it, that
-    is, no other frame is held in the world and the root is not frozen. What is stated takes the place of a default.
+    its `Balance` if it stands: both feet are held in the world where they are at the start, and nothing else carries
+    it, that is, no other frame is held in the world and the root is not frozen. What is stated takes the place of a
+    default.
 
-    A pair that is nearer than the clearance at the start,
-    but does not penetrate (soles on a floor, a hand on a table), must keep its distance. A pair that penetrates at the
-    start must reach the full clearance.
+    A pair that is nearer than the clearance at the start, but does not penetrate (soles on a floor, a hand on a table),
+    must keep its distance. A pair that penetrates at the start must reach the full clearance.
 
     Attributes:
         scene: figure and things.
         start: (nq,) the start posture.
         goals, constraints, bounds, measures: the terms, resolved on this scene and start.
-        defaults: those of the constraints that were not stated; methods that cannot take one leave it to the assessment.
+        defaults: the constraints that were not stated; methods that cannot take one leave it to the assessment.
         measures_given: whether the caller gave measures; false if they are the default.
         clearance: least distance of every pair, metres.
         clearances: (pairs,) least distance of each collision pair of the scene; may be changed between runs.
