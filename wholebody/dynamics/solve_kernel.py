@@ -20,84 +20,107 @@ from wholebody.compiled import compiled
 EXACTER = 1e4  # joints are solved to the tolerance over this: they close in every step, contacts only may open
 NEARLY = 0.01  # m/s: points without impulse that are nearer to their target than this are visited in every sweep
 EVERY = 8  # sweeps over the points that bear something between sweeps over all
+ROUGH = 10.0  # tolerances: while a sweep changes more, visits are not counted as used up ...
+MORE = 6  # ... until they are so many times as many
 FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the same in each run
 
 
-@compiled(error_model="numpy", fastmath=FAST)
-def _rate(rows: Array, c: int, row: int, v: Array) -> float:
-    """Relative velocity along an axis of a point, from the velocities (12,) of A and B."""
-    total = 0.0
-    for k in range(12):
-        total += rows[c, row, k] * v[k]
-    return total
+@compiled(error_model="numpy", fastmath=FAST, inline="always")
+def _rates(c: int, bodies: Indices, rows: Array, twist: Array) -> tuple[float, float, float]:
+    """Velocities of B's point relative to A's along the three axes of a point."""
+    one, two, three = 0.0, 0.0, 0.0
+    a, b = bodies[c, 0], bodies[c, 1]
+    for k in range(6):
+        first, second = twist[a, k], twist[b, k]
+        one += rows[c, 0, k] * first + rows[c, 0, 6 + k] * second
+        two += rows[c, 1, k] * first + rows[c, 1, 6 + k] * second
+        three += rows[c, 2, k] * first + rows[c, 2, 6 + k] * second
+    return one, two, three
 
 
-@compiled(error_model="numpy", fastmath=FAST)
-def _push(answers: Array, c: int, row: int, step: float, v: Array) -> None:
-    """Change the velocities (12,) of A and B by an impulse along an axis of a point."""
-    for k in range(12):
-        v[k] += step * answers[c, row, k]
+@compiled(error_model="numpy", fastmath=FAST, inline="always")
+def _push(
+    c: int, bodies: Indices, answers: Array, one: float, two: float, three: float, twist: Array, impulse: Array
+) -> None:
+    """Add to the impulse of a point, and change the velocities of A and B by that."""
+    a, b = bodies[c, 0], bodies[c, 1]
+    for k in range(6):
+        twist[a, k] += one * answers[c, 0, k] + two * answers[c, 1, k] + three * answers[c, 2, k]
+    for k in range(6, 12):
+        twist[b, k - 6] += one * answers[c, 0, k] + two * answers[c, 1, k] + three * answers[c, 2, k]
+    impulse[c, 0] += one
+    impulse[c, 1] += two
+    impulse[c, 2] += three
 
 
-@compiled(error_model="numpy", fastmath=FAST)
+@compiled(error_model="numpy", fastmath=FAST, inline="always")
 def _visit(
     c: int,
+    bodies: Indices,
     rows: Array,
     answers: Array,
     mobility: Array,
+    across: Array,
     friction: Array,
     target: Array,
+    twist: Array,
     impulse: Array,
-    v: Array,
 ) -> tuple[float, float, bool]:
-    """Solve the program for one contact point alone.
+    """Solve the program for one contact point alone; `across` (m, 2) are the rates along t1 and t2 by a normal impulse.
 
     Returns:
         The change of u, the square of that of the impulse, and whether the point bears or nearly bears something.
     """
-    each = mobility[c, 0]
-    open_by = _rate(rows, c, 0, v) - target[c]
-    now = max(0.0, impulse[c, 0] - open_by / each)
-    if now == 0.0 and impulse[c, 0] == 0.0 and impulse[c, 1] == 0.0 and impulse[c, 2] == 0.0:
+    normal, one, two = _rates(c, bodies, rows, twist)
+    each, open_by = mobility[c, 0], normal - target[c]
+    before, first, second = impulse[c, 0], impulse[c, 1], impulse[c, 2]
+    now = max(0.0, before - open_by / each)
+    if now == 0.0 and before == 0.0 and first == 0.0 and second == 0.0:
         return 0.0, 0.0, open_by < NEARLY
-    step = now - impulse[c, 0]
-    _push(answers, c, 0, step, v)
-    impulse[c, 0] = now
-    change, square = abs(step) * each, step * step * each
-    most = friction[c] * now
-    if most == 0.0 and impulse[c, 1] == 0.0 and impulse[c, 2] == 0.0:
-        return change, square, True
-    each = mobility[c, 1]
-    one = impulse[c, 1] - _rate(rows, c, 1, v) / each
-    two = impulse[c, 2] - _rate(rows, c, 2, v) / each
-    size = np.sqrt(one * one + two * two)
+    step, side = now - before, mobility[c, 1]
+    one = first - (one + across[c, 0] * step) / side
+    two = second - (two + across[c, 1] * step) / side
+    most, size = friction[c] * now, np.sqrt(one * one + two * two)
     if size > most:
-        share = most / size
-        one, two = share * one, share * two
-    step = one - impulse[c, 1]
-    other = two - impulse[c, 2]
-    _push(answers, c, 1, step, v)
-    _push(answers, c, 2, other, v)
-    impulse[c, 1], impulse[c, 2] = one, two
-    change = max(change, max(abs(step), abs(other)) * each)
-    return change, square + (step * step + other * other) * each, True
+        one, two = one * (most / size), two * (most / size)
+    one, two = one - first, two - second
+    _push(c, bodies, answers, step, one, two, twist, impulse)
+    impulse[c, 0] = now  # without rounding: none is less than zero
+    change = max(abs(step) * each, max(abs(one), abs(two)) * side)
+    return change, step * step * each + (one * one + two * two) * side, True
 
 
 @compiled(error_model="numpy", fastmath=FAST)
 def _hold(
-    c: int, number: int, rows: Array, answers: Array, held: Array, hold: Array, impulse: Array, v: Array
+    first: int,
+    chosen: Indices,
+    bodies: Indices,
+    rows: Array,
+    answers: Array,
+    mobility: Array,
+    held: Array,
+    hold: Array,
+    twist: Array,
+    impulse: Array,
+    before: Array,
 ) -> tuple[float, float]:
-    """Solve the three equations of one joint point; the change of u, and the square of that of the impulse."""
+    """Solve the three equations of each joint point alone, from the `first` of the chosen ones on; as `_visit`."""
     change, square = 0.0, 0.0
-    one = hold[number, 0] - _rate(rows, c, 0, v)
-    two = hold[number, 1] - _rate(rows, c, 1, v)
-    three = hold[number, 2] - _rate(rows, c, 2, v)
-    for row in range(3):
-        step = held[number, row, 0] * one + held[number, row, 1] * two + held[number, row, 2] * three
-        off = one if row == 0 else (two if row == 1 else three)
-        _push(answers, c, row, step, v)
-        impulse[c, row] += step
-        change, square = max(change, abs(off)), square + step * off
+    for place in range(first, len(chosen)):
+        c = chosen[place]
+        if mobility[c, 0] <= 0.0:
+            continue
+        number = c - len(bodies) + len(held)
+        one, two, three = _rates(c, bodies, rows, twist)
+        one, two, three = hold[number, 0] - one, hold[number, 1] - two, hold[number, 2] - three
+        p = held[number, 0, 0] * one + held[number, 0, 1] * two + held[number, 0, 2] * three
+        q = held[number, 1, 0] * one + held[number, 1, 1] * two + held[number, 1, 2] * three
+        r = held[number, 2, 0] * one + held[number, 2, 1] * two + held[number, 2, 2] * three
+        for row in range(3):
+            before[place, row] = impulse[c, row]
+        _push(c, bodies, answers, p, q, r, twist, impulse)
+        change = max(change, abs(one), abs(two), abs(three))
+        square += p * one + q * two + r * three
     return change, square
 
 
@@ -121,7 +144,7 @@ def solve(
     """Solve the program of the points `chosen`; how many sweeps it took.
 
     Args:
-        chosen: (k,) points of the program; the last j of all m are those of joints.
+        chosen: (k,) points of the program, in order; the last j of all m are those of joints.
         bodies: (m, 2).
         jacobian: (m, 3, 2, 6).
         answer: (m, 3, 2, 6).
@@ -133,17 +156,24 @@ def solve(
         twist: (n, 6) velocities with the impulses at the start; changed in place.
         impulse: (m, 3) along n, t1, t2, N s; a start, changed in place.
         tolerance: a sweep over all that changes no u by more ends it, m/s.
-        visits: of points, after which the next sweep over all ends it.
+        visits: of points, after which the next sweep over all ends it; `MORE` times as many where impulses change much.
         most: sweeps, the last of which is always one of projection over all.
     """
     count, joints = len(chosen), len(bodies) - len(held)
     rows, answers = jacobian.reshape(len(bodies), 3, 12), answer.reshape(len(bodies), 3, 12)
-    before, way = np.zeros((count, 3)), np.zeros((count, 3))
-    listed, v = np.arange(count), np.empty(12)
+    before, way, across = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((joints, 2))
+    contacts = 0
+    for c in chosen:
+        if c < joints:
+            contacts += 1
+            for k in range(12):
+                across[c, 0] += rows[c, 1, k] * answers[c, 0, k]
+                across[c, 1] += rows[c, 2, k] * answers[c, 0, k]
+    listed = np.arange(count)
     bearing, last, full, left = 0, np.inf, True, visits
     for sweep in range(most):
         change, square = 0.0, 0.0
-        size = count if full else bearing
+        size = contacts if full else bearing
         kept = 0
         for number in range(size):
             index = number if sweep % 2 == 0 else size - 1 - number
@@ -153,77 +183,47 @@ def solve(
                 continue
             for row in range(3):
                 before[place, row] = impulse[c, row]
-            a, b = bodies[c, 0], bodies[c, 1]
-            for k in range(6):
-                v[k], v[6 + k] = twist[a, k], twist[b, k]
-            if c >= joints:
-                largest, moved = _hold(c, c - joints, rows, answers, held, hold, impulse, v)
-                largest, bears = EXACTER * largest, True
-            else:
-                largest, moved, bears = _visit(c, rows, answers, mobility, friction, target, impulse, v)
-            if moved > 0.0:
-                for k in range(6):  # where A is B, a joint to the world, the row of A is zero
-                    twist[a, k] = v[k]
-                for k in range(6):
-                    twist[b, k] = v[6 + k]
-                change, square = max(change, largest), square + moved
+            largest, moved, bears = _visit(
+                c, bodies, rows, answers, mobility, across, friction, target, twist, impulse
+            )  # fmt: skip
+            change, square = max(change, largest), square + moved
             if full and bears:
                 listed[kept] = place
                 kept += 1
             elif full:
                 for row in range(3):
                     way[place, row] = 0.0
-        left -= size
+        if contacts < count:
+            largest, moved = _hold(
+                contacts, chosen, bodies, rows, answers, mobility, held, hold, twist, impulse, before
+            )  # fmt: skip
+            change, square = max(change, EXACTER * largest), square + moved
+        left -= size + count - contacts
+        spent = left <= 0 and (change < ROUGH * tolerance or left <= (1 - MORE) * visits)
         if full:
             bearing = kept
             if sweep % 2 == 1:  # in the order of the points again
                 for index in range(kept // 2):
                     other = kept - 1 - index
                     listed[index], listed[other] = listed[other], listed[index]
-            if change < tolerance or sweep >= most - 1 or left <= 0:
+            if change < tolerance or sweep >= most - 1 or spent:
                 return sweep + 1
-        full = change < tolerance or left <= 0 or sweep >= most - 2 or sweep % EVERY == EVERY - 1
+        full = change < tolerance or spent or sweep >= most - 2 or sweep % EVERY == EVERY - 1
         share, last = square / last, square
-        for index in range(bearing):
-            place = listed[index]
+        for index in range(bearing + count - contacts):
+            place = listed[index] if index < bearing else contacts + index - bearing
             c = chosen[place]
-            if share < 1.0:
-                _go_on(c, place, bodies, answers, share, before, way, twist, impulse, v)
+            if share < 1.0:  # farther along the last way
+                one, two, three = share * way[place, 0], share * way[place, 1], share * way[place, 2]
+                way[place, 0] = one + impulse[c, 0] - before[place, 0]
+                way[place, 1] = two + impulse[c, 1] - before[place, 1]
+                way[place, 2] = three + impulse[c, 2] - before[place, 2]
+                if one != 0.0 or two != 0.0 or three != 0.0:
+                    _push(c, bodies, answers, one, two, three, twist, impulse)
             else:
                 for row in range(3):
                     way[place, row] = 0.0
     return most
-
-
-@compiled(error_model="numpy", fastmath=FAST)
-def _go_on(
-    c: int,
-    place: int,
-    bodies: Indices,
-    answers: Array,
-    share: float,
-    before: Array,
-    way: Array,
-    twist: Array,
-    impulse: Array,
-    v: Array,
-) -> None:
-    """Go farther along the last way of a point's impulse, by a share of it."""
-    any_way = False
-    for row in range(3):
-        v[row] = share * way[place, row]
-        way[place, row] = v[row] + impulse[c, row] - before[place, row]
-        any_way = any_way or v[row] != 0.0
-    if not any_way:
-        return
-    a, b = bodies[c, 0], bodies[c, 1]
-    for row in range(3):
-        step = v[row]
-        impulse[c, row] += step
-        for k in range(6):
-            twist[a, k] += step * answers[c, row, k]
-        for k in range(6):
-            twist[b, k] += step * answers[c, row, 6 + k]
 
 
 @compiled(error_model="numpy")
@@ -240,22 +240,19 @@ def residuals(
     """Largest violation of Signorini's law and of joints, and of Coulomb's law, both m/s: see `solve`."""
     signorini, coulomb = 0.0, 0.0
     joints = len(bodies) - len(hold)
-    rows, v = jacobian.reshape(len(bodies), 3, 12), np.empty(12)
+    rows = jacobian.reshape(len(bodies), 3, 12)
     for c in range(len(bodies)):
         if mobility[c, 0] <= 0.0:
             continue
-        for k in range(6):
-            v[k], v[6 + k] = twist[bodies[c, 0], k], twist[bodies[c, 1], k]
+        normal, one, two = _rates(c, bodies, rows, twist)
         if c >= joints:
-            for row in range(3):
-                signorini = max(signorini, abs(_rate(rows, c, row, v) - hold[c - joints, row]))
+            number = c - joints
+            off = max(abs(normal - hold[number, 0]), abs(one - hold[number, 1]), abs(two - hold[number, 2]))
+            signorini = max(signorini, off)
             continue
-        open_by = _rate(rows, c, 0, v) - target[c]
-        signorini = max(signorini, abs(min(impulse[c, 0] * mobility[c, 0], open_by)))
-        one = impulse[c, 1] - _rate(rows, c, 1, v) / mobility[c, 1]
-        two = impulse[c, 2] - _rate(rows, c, 2, v) / mobility[c, 1]
-        size = np.sqrt(one * one + two * two)
-        share = min(1.0, friction[c] * impulse[c, 0] / max(size, 1e-300))
+        signorini = max(signorini, abs(min(impulse[c, 0] * mobility[c, 0], normal - target[c])))
+        one, two = impulse[c, 1] - one / mobility[c, 1], impulse[c, 2] - two / mobility[c, 1]
+        share = min(1.0, friction[c] * impulse[c, 0] / max(np.sqrt(one * one + two * two), 1e-300))
         off = np.sqrt((share * one - impulse[c, 1]) ** 2 + (share * two - impulse[c, 2]) ** 2)
         coulomb = max(coulomb, off * mobility[c, 1])
     return signorini, coulomb
