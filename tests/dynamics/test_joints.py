@@ -161,7 +161,7 @@ def test_wrong_joints_are_one_sentence(hand: wb.Figure) -> None:
         RigidBodies(scene("beam"))
     with pytest.raises(InputError, match="'bag' has a joint to itself"):
         RigidBodies(scene("bag"))
-    with pytest.raises(InputError, match="Hinge axis is .*give a direction"):
+    with pytest.raises(InputError, match=r"Hinge axis is .*give a direction"):
         wb.Hinge(axis=(0.0, 0.0, 0.0))
     with pytest.raises(InputError, match="Body joints"):
         wb.Body(joints=["hinge"])  # type: ignore[list-item]

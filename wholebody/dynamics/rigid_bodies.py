@@ -31,6 +31,7 @@ from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
 from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord
 from wholebody.dynamics.joints import CLOSED, Joints
+from wholebody.dynamics.passing import Before, passed
 from wholebody.dynamics.pieces import Pieces
 from wholebody.dynamics.sleeping import Sleepers
 from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram
@@ -45,10 +46,10 @@ LONGEST = 10.0  # s: of a frame, which is 2,400 steps
 SHORTEST = 1e-6  # s: of a step that ends with an impact
 INSIDE = 1e-4  # m: a step that leaves pieces deeper in each other is made again with half the time
 LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
-PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
 HALVINGS = 6  # of a step, at most
+CAREFUL = 2  # of them before pieces are parted by displacements
 MARGIN = 2e-3  # m: pairs are looked at from this much farther than bodies come in a step
-STOPS = 12  # early ends of steps in a frame, at most
+STOPS = 8  # early ends of steps in a frame, at most
 DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
 FASTEST = 1e3  # m/s2: of gravity
 STRONGEST = 1e6  # N s
@@ -227,16 +228,19 @@ class RigidBodies:
         first = float(program.hits.min(initial=np.inf))
         if not together and first < time:
             time, record.stops = max(first, SHORTEST), record.stops - 1
-        kept, near, margin, start = state.kept(), self._near, self._margin, self._old
+        before, start, weight = Before(state, self._near, self._margin), self._old, float(np.linalg.norm(self.gravity))
         for halving in range(HALVINGS + 1):
-            self._move(program, time, together, start, kept)
+            self._move(program, time, together, start, before.kept)
             impulse = program.world_impulse()
             record.steps += 1
             least = self._look(SUBSTEP)
-            clear = least >= -INSIDE and self._parted(near, margin, kept[0], time)
-            if clear or halving == HALVINGS:
+            if halving == HALVINGS:
                 break
-            state.restore(kept)
+            if least >= (LEAST_GAP if halving < CAREFUL else -INSIDE):
+                ways = self._ways(time)
+                if not passed(state, before, self._near, self._margin, ways, time, weight):
+                    break
+            state.restore(before.kept)
             start, time = program.remembered(time), 0.5 * time
         record.time += time
         self._old = program.remembered(time)
@@ -303,29 +307,6 @@ class RigidBodies:
         speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * self._pieces.levers
         return np.asarray((speed + np.where(state.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
 
-    def _parted(self, near: Contacts, margin: Array, kept: Array, time: float) -> bool:
-        """Whether no pieces can have been in each other on the way from positions (n, 3) that were kept.
-
-        `near` were the pairs within margins (n,) of both bodies before the step.
-        """
-        pieces, after = self._pieces, self._near
-        if not (self._ways(time) <= margin).all():
-            return False
-        bodies = pieces.body[near.pair]
-        found = np.full(len(pieces.table.pairs), -1, dtype=np.intp)
-        found[after.number] = np.arange(len(after.number))
-        found = found[near.number]
-        listed = found >= 0
-        gap, normal = self._margin[bodies].sum(axis=1), np.zeros((len(listed), 3))
-        gap[listed], normal[listed] = after.distance[found[listed]], after.normal[found[listed]]
-        spin, fall = np.linalg.norm(self.state.spin, axis=1), float(np.linalg.norm(self.gravity))
-        doubtful = passing_kernel.doubtful(
-            near.pair, np.ascontiguousarray(near.distance), np.ascontiguousarray(near.normal), gap, normal,
-            near.placements, after.placements, pieces.body, self.state.position - kept, spin * time, pieces.levers,
-            fall * time**2 / 8.0, PASSING, *pieces.heights,
-        )  # fmt: skip
-        return int(doubtful) == 0
-
     def _part(self, least: float) -> float:
         """Part pieces that are nearer than `LEAST_GAP`, by the least displacements; the least distance then."""
         state = self.state
@@ -388,7 +369,7 @@ def compiled_kernel() -> Any:
     impact_kernel.resolve(none, none, pairs, *laid, some, some, held, mask, twist, 1.0, 1, vectors, np.zeros((1, 5)))
     passing_kernel.doubtful(
         pairs, some, vectors, some, vectors, turned, turned, none, one, mass, mass, 0.0, 1.0, vectors,
-        none, none, some, vectors, np.zeros((0, 4)),
+        none, none, some, vectors, np.zeros((0, 4)), mask[:0],
     )  # fmt: skip
     passing_kernel.join(none, none, none, none)
     return motion_kernel

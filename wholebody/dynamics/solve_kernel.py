@@ -20,7 +20,7 @@ from wholebody.compiled import compiled
 EXACTER = 1e4  # joints are solved to the tolerance over this: they close in every step, contacts only may open
 NEARLY = 0.01  # m/s: points without impulse that are nearer to their target than this are visited in every sweep
 EVERY = 8  # sweeps over the points that bear something between sweeps over all
-ROUGH = 10.0  # tolerances: while a sweep changes more, visits are not counted as used up ...
+ROUGH = 30.0  # tolerances: while a sweep changes more, visits are not counted as used up ...
 MORE = 6  # ... until they are so many times as many
 FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the same in each run
 
