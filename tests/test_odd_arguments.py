@@ -285,6 +285,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         return wb.Scene(arm).add(wb.Sphere(0.1), name="ball", at=(1.0, 1.0, 1.0), body=body)
 
     yield "Body", Call(wb.Body, body, lambda made: RigidBodies(loose(made)).advance(0.1))
+    for joint in (wb.BallJoint, wb.Hinge):
+        hung = {"at": (0.0, 0.0, 0.1), "to": None, **({"axis": (0.0, 1.0, 0.0)} if joint is wb.Hinge else {})}
+        yield joint.__name__, Call(joint, hung, lambda made: RigidBodies(loose(wb.Body(joints=[made]))).advance(0.1))
+    yield "Body(joints)", Call(wb.Body, {"joints": ()}, lambda made: RigidBodies(loose(made)).advance(0.1))
     yield "Body(density)", Call(wb.Body, {"density": 500.0}, lambda made: RigidBodies(loose(made)).advance(0.1))
     material = {"name": "glass", "against": {"wood": (0.5, 0.1)}, "others": (0.5, 0.1)}
     yield "Material", Call(wb.Material, material, lambda made: RigidBodies(loose(wb.Body(material=made))))

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
     from wholebody.matter.body import Body
+    from wholebody.matter.joints import BallJoint, Hinge
     from wholebody.matter.materials import Material
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
@@ -105,6 +106,7 @@ __all__ = [
     "AvoidedCase",
     "Axis",
     "Balance",
+    "BallJoint",
     "BatchProgress",
     "Bisection",
     "Body",
@@ -130,6 +132,7 @@ __all__ = [
     "Freeze",
     "Goal",
     "HalfSpace",
+    "Hinge",
     "Hold",
     "Hull",
     "InputError",
@@ -193,6 +196,7 @@ _MODULES = {
     "wholebody.dynamics.coupling": "Spring",
     "wholebody.dynamics.world": "World",
     "wholebody.matter.body": "Body",
+    "wholebody.matter.joints": "BallJoint Hinge",
     "wholebody.matter.materials": "Material",
     "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
