@@ -63,6 +63,9 @@ if TYPE_CHECKING:
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
     from wholebody.solution import Solution
+    from wholebody.studies.many import SolveProgress, solve_many
+    from wholebody.studies.records import Records, SolveRecord
+    from wholebody.studies.study import study
     from wholebody.taskfile import Task, read_task
     from wholebody.tasks import (
         Axis,
@@ -145,11 +148,14 @@ __all__ = [
     "PotentialEnergy",
     "Problem",
     "ReachCones",
+    "Records",
     "Relative",
     "Scene",
     "Shape",
     "SkeletonMotion",
     "Solution",
+    "SolveProgress",
+    "SolveRecord",
     "Sphere",
     "Spring",
     "StanceFeet",
@@ -178,6 +184,8 @@ __all__ = [
     "retarget",
     "simplify",
     "solve",
+    "solve_many",
+    "study",
     "torques",
 ]
 
@@ -222,6 +230,9 @@ _MODULES = {
     "wholebody.scene": "Scene",
     "wholebody.simplification.simplify": "simplify",
     "wholebody.solution": "Solution",
+    "wholebody.studies.many": "SolveProgress solve_many",
+    "wholebody.studies.records": "Records SolveRecord",
+    "wholebody.studies.study": "study",
     "wholebody.taskfile": "Task read_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
     "Hold Measure Orientation Plane Point Posture PotentialEnergy ReachCones Relative StepLimit",
