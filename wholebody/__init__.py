@@ -64,6 +64,8 @@ if TYPE_CHECKING:
     from wholebody.simplification.simplify import simplify
     from wholebody.solution import Solution
     from wholebody.studies.many import SolveProgress, solve_many
+    from wholebody.studies.reach_map import reach_map
+    from wholebody.studies.reach_result import ReachMap
     from wholebody.studies.records import Records, SolveRecord
     from wholebody.studies.study import study
     from wholebody.taskfile import Task, read_task
@@ -148,6 +150,7 @@ __all__ = [
     "PotentialEnergy",
     "Problem",
     "ReachCones",
+    "ReachMap",
     "Records",
     "Relative",
     "Scene",
@@ -177,6 +180,7 @@ __all__ = [
     "equipment",
     "follow_path",
     "load",
+    "reach_map",
     "read_clip",
     "read_many",
     "read_skeleton",
@@ -232,6 +236,8 @@ _MODULES = {
     "wholebody.solution": "Solution",
     "wholebody.studies.many": "SolveProgress solve_many",
     "wholebody.studies.records": "Records SolveRecord",
+    "wholebody.studies.reach_map": "reach_map",
+    "wholebody.studies.reach_result": "ReachMap",
     "wholebody.studies.study": "study",
     "wholebody.taskfile": "Task read_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
