@@ -619,6 +619,15 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     clip.write(path / "read.npz")
     files = {"files": [path / "read.npz"], "folder": path / "many", "figure": arm, "jobs": 1, "progress": print}
     yield "read_many", Call(wb.read_many, files)
+    at_once: dict[str, Any] = {"method": "qp", "jobs": 1, "seconds": 9.0, "warm_start": True}
+    at_once |= {"folder": path / "records", "progress": lambda told: True}
+    yield "solve_many", Call(wb.solve_many, {"problems": [], **at_once})
+    varied = {"task": path / "task.toml", "layouts": {"as it is": {}}, **at_once}
+    yield "study", Call(wb.study, varied)
+    anything = partial(wb.study, lambda *given: ask, progress=lambda told: True)
+    yield "study(function)", Call(anything, {"people": [arm], "targets": [places[0]], "layouts": [None]})
+    record = wb.SolveRecord("a")
+    yield "Records", Call(wb.Records, {"records": [record]}, lambda made: (repr(made), made.counts(), made.rows()))
     for method in (wb.Trajectory, wb.PerFrame, wb.Fade, wb.Bisection):
         yield f"{method.__name__}.avoid", Call(method().avoid, avoided)
     settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "solver": "osqp", "iterations": 10}

@@ -64,6 +64,11 @@ if TYPE_CHECKING:
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
     from wholebody.solution import Solution
+    from wholebody.studies.many import SolveProgress, solve_many
+    from wholebody.studies.reach_map import reach_map
+    from wholebody.studies.reach_result import ReachMap
+    from wholebody.studies.records import Records, SolveRecord
+    from wholebody.studies.study import study
     from wholebody.taskfile import Task, read_task
     from wholebody.tasks import (
         Axis,
@@ -151,12 +156,16 @@ __all__ = [
     "Problem",
     "RangeOfMotion",
     "ReachCones",
+    "ReachMap",
+    "Records",
     "Relative",
     "Rhythm",
     "Scene",
     "Shape",
     "SkeletonMotion",
     "Solution",
+    "SolveProgress",
+    "SolveRecord",
     "Sphere",
     "Spring",
     "StanceFeet",
@@ -178,6 +187,7 @@ __all__ = [
     "equipment",
     "follow_path",
     "load",
+    "reach_map",
     "read_clip",
     "read_many",
     "read_skeleton",
@@ -185,6 +195,8 @@ __all__ = [
     "retarget",
     "simplify",
     "solve",
+    "solve_many",
+    "study",
     "torques",
 ]
 
@@ -230,6 +242,11 @@ _MODULES = {
     "wholebody.scene": "Scene",
     "wholebody.simplification.simplify": "simplify",
     "wholebody.solution": "Solution",
+    "wholebody.studies.many": "SolveProgress solve_many",
+    "wholebody.studies.records": "Records SolveRecord",
+    "wholebody.studies.reach_map": "reach_map",
+    "wholebody.studies.reach_result": "ReachMap",
+    "wholebody.studies.study": "study",
     "wholebody.taskfile": "Task read_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
     "Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "

@@ -77,7 +77,19 @@ def read_task(path: str | PathLike[str]) -> Task:
         InputError: values that contradict each other.
     """
     file = checked_path(path, "path")
-    contents = read_contents(file)
+    return task_from(read_contents(file), file)
+
+
+def task_from(contents: Contents, file: Path) -> Task:
+    """The task that the contents of a file state.
+
+    Args:
+        contents: of the file, or changed since.
+        file: which paths are relative to.
+
+    Raises:
+        FileFormatError, UnknownNameError, InputError: as for `read_task`.
+    """
     figure = _figure(contents)
     for entries in contents.tables.values():
         for entry in entries:
