@@ -231,6 +231,9 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     def on_a_person(term: Any) -> Any:
         return term.resolve(person, person.figure.neutral)
 
+    person.add(wb.Box((0.4, 0.4, 0.1)), name="crate", at=(0.5, 0.0, 0.4)).add(wb.HalfSpace(), name="floor")
+    person.add(wb.Box((0.1, 0.4, 0.8)), name="post", at=(-0.9, 0.0, 0.4))
+
     yield "load", Call(lambda spec, **options: wb.load(spec, **options), {"spec": path / "arm.urdf"})
     for option, value in {"root": "fixed", "package_dirs": [path], "concavity": 0.5, "samples": 10, "seed": 0}.items():
         yield f"load({option})", Call(wb.load, {"spec": path / "arm.urdf", option: value})
@@ -356,6 +359,17 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Plane", Call(wb.Plane, plane, solve_it)
     yield "Balance", Call(wb.Balance, {"feet": ["left_foot"], "margin": 0.0}, on_a_person)
     yield "ReachCones", Call(wb.ReachCones, {"names": ["left_shoulder"]}, on_a_person)
+    touch = {"part": "link4", "thing": "ball", "weight": 1.0}
+    yield "Touch", Call(wb.Touch, touch, solve_it)
+    lean = {"on": "crate", "part": "thorax", "side": at, "weight": 1.0}
+    yield "Lean", Call(wb.Lean, lean, on_a_person)
+    sit = {"on": "crate", "pelvis": "pelvis", "trunk": "thorax", "weight": 1.0}
+    yield "Sit", Call(wb.Sit, sit, on_a_person)
+    yield "Sit(back)", Call(lambda back: wb.Sit("crate", back), {"back": "post"}, on_a_person)
+    yield "Stand", Call(wb.Stand, {"on": "crate", "feet": ["left_foot"], "balance": True, "margin": 0.0}, on_a_person)
+    grasp = {"hand": "left", "thing": "crate", "kind": "palm", "side": at, "weight": 1.0}
+    yield "Grasp", Call(wb.Grasp, grasp, on_a_person)
+    yield "Figure.grounded", Call(person.figure.grounded, {"q": person.figure.neutral, "scene": person})
     yield "Freeze", Call(lambda name: wb.Freeze(name), {"name": "joint1"}, solve_it)
     limit = {"velocity": 1.0, "joints": {"joint1": 1.0}, "root_velocity": math.inf, "root_turn": math.inf}
     yield "StepLimit", Call(wb.StepLimit, limit, solve_it)

@@ -76,7 +76,9 @@ if TYPE_CHECKING:
         Frame,
         Freeze,
         Goal,
+        Grasp,
         Hold,
+        Lean,
         Measure,
         Orientation,
         Plane,
@@ -85,7 +87,10 @@ if TYPE_CHECKING:
         PotentialEnergy,
         ReachCones,
         Relative,
+        Sit,
+        Stand,
         StepLimit,
+        Touch,
     )
     from wholebody.tracking.drag import Drag
     from wholebody.tracking.path_following import follow_path
@@ -127,10 +132,12 @@ __all__ = [
     "Frame",
     "Freeze",
     "Goal",
+    "Grasp",
     "HalfSpace",
     "Hold",
     "Hull",
     "InputError",
+    "Lean",
     "Material",
     "Measure",
     "Mesh",
@@ -148,15 +155,18 @@ __all__ = [
     "Relative",
     "Scene",
     "Shape",
+    "Sit",
     "SkeletonMotion",
     "Solution",
     "Sphere",
     "Spring",
     "StanceFeet",
+    "Stand",
     "StepLimit",
     "Strength",
     "Task",
     "Torques",
+    "Touch",
     "Trajectory",
     "UnknownNameError",
     "Viewer",
@@ -224,7 +234,8 @@ _MODULES = {
     "wholebody.solution": "Solution",
     "wholebody.taskfile": "Task read_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
-    "Hold Measure Orientation Plane Point Posture PotentialEnergy ReachCones Relative StepLimit",
+    "Hold Measure Orientation Plane Point Posture PotentialEnergy ReachCones Relative StepLimit "
+    "Grasp Lean Sit Stand Touch",
     "wholebody.view": "Viewer",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}

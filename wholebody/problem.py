@@ -65,7 +65,7 @@ class Problem:
             constraints: what must always hold; bounds on the displacement are given here too.
             measures: costs to minimise; None for `Effort()`.
             clearance: least distance between pieces, metres.
-            touching: pairs of segment or object names whose clearance is zero.
+            touching: pairs of segment or object names whose clearance is zero; those of contact terms are added.
 
         Raises:
             InputError: a value of the wrong kind, shape or range.
@@ -206,7 +206,8 @@ class Problem:
     def _clearances(self, workspace: Workspace) -> Array:
         pairs, owners = workspace.table.pairs, workspace.owners
         asked = np.full(len(pairs), self.clearance)
-        allowed = set(self.touching) | {(b, a) for a, b in self.touching}
+        brought = [pair for term in (*self.goals, *self.constraints) for pair in term.touching]
+        allowed = {*self.touching, *brought} | {(b, a) for a, b in (*self.touching, *brought)}
         if allowed:
             named = [(owners[a], owners[b]) in allowed for a, b in pairs]
             asked[np.array(named, dtype=bool)] = 0.0

@@ -67,6 +67,10 @@ def test_terms_are_those_that_python_makes(everything: wb.Task) -> None:
             wb.CenterOfMass((0, 0, 1), axes="xy"),
             wb.Relative("left_palm", "right_palm", (0, 0.3, 0), orientation=False),
             wb.Posture("sitting", joints=["left_leg"]),
+            wb.Touch("right_index_tip", "box"),
+            wb.Lean("rod", side=(1, 0, 0)),
+            wb.Sit("box", "rod"),
+            wb.Grasp("left", "box", side=(0, 1, 0)),
         ],
         constraints=[
             wb.Hold("left_foot", orientation=False),
@@ -74,6 +78,8 @@ def test_terms_are_those_that_python_makes(everything: wb.Task) -> None:
             wb.Balance(("left_foot", "right_foot"), margin=0.01),
             wb.Freeze("lower_body", "root"),
             wb.ReachCones(["right_shoulder"]),
+            wb.Stand("ground", feet=["left_foot"], balance=False),
+            wb.Grasp("right", "rod", "power"),
         ],
         measures=[wb.Effort(), wb.Discomfort(0.1), wb.Displacement(), wb.PotentialEnergy(0.01)],
     )

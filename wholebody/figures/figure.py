@@ -13,6 +13,7 @@ from wholebody import checks
 from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
+from wholebody.figures.grounding import Among, grounded
 from wholebody.figures.reduction import reduced_parts
 
 LARGEST = 1e6
@@ -299,6 +300,22 @@ class Figure:
         q = self._checked(q).copy()
         q[self.limits.idx_q] = np.clip(q[self.limits.idx_q], self.limits.lower, self.limits.upper)
         return q
+
+    def grounded(self, q: Array, scene: Among) -> Array:
+        """Return a copy of q moved vertically until the lowest segments stand on the things of a scene.
+
+        Args:
+            q: (nq,).
+            scene: a scene of this figure; things that it carries are not looked at.
+
+        Raises:
+            InputError: the root is fixed, nothing is below the figure, or the scene has another figure.
+        """
+        if self.root != "free":
+            raise InputError(f"{self.name} has a fixed root and stays where it is; load it with root='free'")
+        if getattr(scene, "model", None) is not self.model:
+            raise InputError(f"grounded: give a scene of this figure, not {checks.shown(scene)}; see wb.Scene(figure)")
+        return grounded(self.model, self.segments, self._checked(q), scene)
 
     def reduced(self, joints: str | Sequence[str], posture: str | Array | None = None) -> Figure:
         """Return a figure that keeps only some joints; the others are locked, and pairs that cannot move are dropped.

@@ -227,7 +227,8 @@ def _file(name: str, where: Where) -> Path:
 
 
 def _goal_name(entry: Entry) -> str:
-    moved = entry.values.get("frame", entry.values.get("target", "") if entry.name == "posture" else "")
+    named = ("frame", "part", "on", "hand", *(("target",) if entry.name == "posture" else ()))
+    moved = next((entry.values[key] for key in named if key in entry.values), "")
     return f"{entry.name} {moved}".strip()
 
 

@@ -9,6 +9,7 @@ from wholebody.tasks.discomfort import Discomfort
 from wholebody.tasks.displacement import Displacement
 from wholebody.tasks.effort import Effort
 from wholebody.tasks.frame import Frame, Orientation
+from wholebody.tasks.grasp import Grasp
 from wholebody.tasks.hold import Hold
 from wholebody.tasks.plane import Plane
 from wholebody.tasks.point import Point
@@ -16,6 +17,9 @@ from wholebody.tasks.posture import Posture
 from wholebody.tasks.potential_energy import PotentialEnergy
 from wholebody.tasks.reach_cones import ReachCones
 from wholebody.tasks.relative import Relative
+from wholebody.tasks.sit import Sit
+from wholebody.tasks.stand import Stand
+from wholebody.tasks.touch import Lean, Touch
 
 __all__ = [
     "Axis",
@@ -29,7 +33,9 @@ __all__ = [
     "Frame",
     "Freeze",
     "Goal",
+    "Grasp",
     "Hold",
+    "Lean",
     "Measure",
     "Orientation",
     "Plane",
@@ -38,6 +44,9 @@ __all__ = [
     "PotentialEnergy",
     "ReachCones",
     "Relative",
+    "Sit",
+    "Stand",
     "StepLimit",
     "Term",
+    "Touch",
 ]
