@@ -336,7 +336,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Mesh", Call(wb.Mesh, mesh, put)
     yield "Mesh(vertices)", Call(lambda vertices: wb.Mesh((vertices, faces)), {"vertices": corners}, put)
     yield "Mesh(faces)", Call(lambda faces: wb.Mesh((corners, faces)), {"faces": faces}, put)
-    for shape in (wb.Box((1, 1, 1)), wb.Sphere(1), wb.Capsule(1, 1), wb.Ellipsoid((1, 1, 1)), wb.HalfSpace()):
+    simple = wb.Box((1, 1, 1)), wb.Sphere(1), wb.Capsule(1, 1), wb.Ellipsoid((1, 1, 1)), wb.HalfSpace()
+    for shape in (*simple, wb.Cylinder(0.1, 0.2), wb.Torus(0.1, 0.02)):
         yield f"{type(shape).__name__}.pieces", Call(shape.pieces, {})
     yield "Hull.pieces", Call(wb.Hull(corners).pieces, {})
     yield "Mesh.pieces", Call(wb.Mesh((corners, faces)).pieces, {})
@@ -359,6 +360,16 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Plane", Call(wb.Plane, plane, solve_it)
     yield "Balance", Call(wb.Balance, {"feet": ["left_foot"], "margin": 0.0}, on_a_person)
     yield "ReachCones", Call(wb.ReachCones, {"names": ["left_shoulder"]}, on_a_person)
+    yield "Cylinder", Call(wb.Cylinder, {"radius": 0.1, "length": 0.2}, lambda shape: shape.pieces())
+    yield "Torus", Call(wb.Torus, {"radius": 0.1, "tube": 0.02}, lambda shape: shape.pieces())
+    task = wb.read_task(path / "task.toml")
+    given = {"problem": task.problem, "path": path / "written.toml", "title": "one line"}
+    yield "write_task", Call(wb.write_task, given)
+    answer = wb.solve(task.problem)
+    stored = path / "result.json"
+    yield "write_result", Call(wb.write_result, {"task": task, "solution": answer, "path": stored})
+    wb.write_result(task, answer, stored)
+    yield "read_result", Call(wb.read_result, {"path": stored})
     touch = {"part": "link4", "thing": "ball", "weight": 1.0}
     yield "Touch", Call(wb.Touch, touch, solve_it)
     lean = {"on": "crate", "part": "thorax", "side": at, "weight": 1.0}

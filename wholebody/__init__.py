@@ -30,7 +30,18 @@ if TYPE_CHECKING:
     from wholebody.dynamics.coupling import Spring
     from wholebody.dynamics.world import World
     from wholebody.figures import Figure, load
-    from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+    from wholebody.geometry.shapes import (
+        Box,
+        Capsule,
+        Cylinder,
+        Ellipsoid,
+        HalfSpace,
+        Hull,
+        Mesh,
+        Shape,
+        Sphere,
+        Torus,
+    )
     from wholebody.matter.body import Body
     from wholebody.matter.materials import Material
     from wholebody.methods.ccd.method import CCD
@@ -63,7 +74,7 @@ if TYPE_CHECKING:
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
     from wholebody.solution import Solution
-    from wholebody.taskfile import Task, read_task
+    from wholebody.taskfile import Result, Task, read_result, read_task, write_result, write_task
     from wholebody.tasks import (
         Axis,
         Balance,
@@ -118,6 +129,7 @@ __all__ = [
     "Clip",
     "ClipCheck",
     "Constraint",
+    "Cylinder",
     "DampedLeastSquares",
     "DerivativeCheck",
     "Discomfort",
@@ -153,6 +165,7 @@ __all__ = [
     "Problem",
     "ReachCones",
     "Relative",
+    "Result",
     "Scene",
     "Shape",
     "Sit",
@@ -166,6 +179,7 @@ __all__ = [
     "Strength",
     "Task",
     "Torques",
+    "Torus",
     "Touch",
     "Trajectory",
     "UnknownNameError",
@@ -183,19 +197,22 @@ __all__ = [
     "load",
     "read_clip",
     "read_many",
+    "read_result",
     "read_skeleton",
     "read_task",
     "retarget",
     "simplify",
     "solve",
     "torques",
+    "write_result",
+    "write_task",
 ]
 
 _MODULES = {
     "wholebody.assessment": "Assessment assess",
     "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
-    "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
+    "wholebody.geometry.shapes": "Box Capsule Cylinder Ellipsoid HalfSpace Hull Mesh Shape Sphere Torus",
     "wholebody.dynamics.coupling": "Spring",
     "wholebody.dynamics.world": "World",
     "wholebody.matter.body": "Body",
@@ -232,7 +249,7 @@ _MODULES = {
     "wholebody.scene": "Scene",
     "wholebody.simplification.simplify": "simplify",
     "wholebody.solution": "Solution",
-    "wholebody.taskfile": "Task read_task",
+    "wholebody.taskfile": "Result Task read_result read_task write_result write_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
     "Hold Measure Orientation Plane Point Posture PotentialEnergy ReachCones Relative StepLimit "
     "Grasp Lean Sit Stand Touch",

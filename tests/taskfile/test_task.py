@@ -43,10 +43,12 @@ def test_scene_and_start(everything: wb.Task) -> None:
     assert figure.joint_values(problem.start)["left_elbow_flexion"] == 0.5
     objects = problem.scene.objects
     assert [type(thing.shape).__name__ for thing in objects.values()] == [
-        "Box", "Sphere", "Capsule", "Ellipsoid", "HalfSpace", "Hull", "Mesh", "Box",
+        "Box", "Sphere", "Capsule", "Ellipsoid", "Cylinder", "Torus", "HalfSpace", "Hull", "Mesh", "Box",
     ]  # fmt: skip
     assert objects["pack"].segment == "thorax"
     assert objects["box"].color == (1.0, 0.0, 0.0, 1.0)
+    np.testing.assert_allclose(objects["drum"].color, (70 / 255, 130 / 255, 180 / 255, 1.0))
+    np.testing.assert_allclose(objects["wheel"].color, (128 / 255, 1.0, 0.0, 64 / 255))
     np.testing.assert_allclose(objects["box"].placement.rotation @ [1, 0, 0], [0, 1, 0], atol=1e-12)
     np.testing.assert_allclose(objects["rod"].placement.translation, [2, 1, 0])
     np.testing.assert_allclose(np.abs(objects["tetrahedron"].shape.vertices).max(), 1.0)

@@ -79,6 +79,7 @@ class Figure:
         excluded_pairs: pairs of pieces that are never tested, with the reason.
         notes: sentences on what had to be changed about the geometry of a file.
         limits: joint limits as arrays.
+        loaded_as: name or path and options by which `wb.load` made it; None for one made in another way.
         followers: joint to the law by which it follows another (mimic).
         effort_weights: (nv,) weight of each degree of freedom in the effort; 0 for the root.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
@@ -107,6 +108,7 @@ class Figure:
         self.cones = MappingProxyType(dict(description.cones))
         self.collision_groups = MappingProxyType(dict(description.collision_groups))
         self.excluded_pairs, self.notes = description.excluded, description.notes
+        self.loaded_as: tuple[str, dict[str, Any]] | None = None
         self._description = description
         self._made: dict[str, Array] = {}
         first = model.joints[1] if model.njoints > 1 else None
@@ -138,7 +140,8 @@ class Figure:
             for name, part in self._description._asdict().items()
         }
         visual = None if self.visual is self.geometry else self.visual
-        return Figure, (self.name, self.model, self.geometry, self.detail, Description(**known), visual)
+        made_from = (self.name, self.model, self.geometry, self.detail, Description(**known), visual)
+        return Figure, made_from, {"loaded_as": self.loaded_as}
 
     @property
     def joints(self) -> tuple[str, ...]:
