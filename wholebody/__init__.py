@@ -30,7 +30,18 @@ if TYPE_CHECKING:
     from wholebody.dynamics.coupling import Spring
     from wholebody.dynamics.world import World
     from wholebody.figures import Figure, load
-    from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+    from wholebody.geometry.shapes import (
+        Box,
+        Capsule,
+        Cylinder,
+        Ellipsoid,
+        HalfSpace,
+        Hull,
+        Mesh,
+        Shape,
+        Sphere,
+        Torus,
+    )
     from wholebody.matter.body import Body
     from wholebody.matter.joints import BallJoint, Hinge
     from wholebody.matter.materials import Material
@@ -70,6 +81,7 @@ if TYPE_CHECKING:
     from wholebody.studies.records import Records, SolveRecord
     from wholebody.studies.study import study
     from wholebody.taskfile import Task, read_task
+    from wholebody.taskfile import Result, Task, read_result, read_task, write_result, write_task
     from wholebody.tasks import (
         Axis,
         Balance,
@@ -82,7 +94,9 @@ if TYPE_CHECKING:
         Frame,
         Freeze,
         Goal,
+        Grasp,
         Hold,
+        Lean,
         Measure,
         Orientation,
         Plane,
@@ -93,7 +107,10 @@ if TYPE_CHECKING:
         ReachCones,
         Relative,
         Rhythm,
+        Sit,
+        Stand,
         StepLimit,
+        Touch,
     )
     from wholebody.tracking.drag import Drag
     from wholebody.tracking.path_following import follow_path
@@ -122,6 +139,7 @@ __all__ = [
     "Clip",
     "ClipCheck",
     "Constraint",
+    "Cylinder",
     "DampedLeastSquares",
     "DerivativeCheck",
     "Discomfort",
@@ -136,11 +154,13 @@ __all__ = [
     "Frame",
     "Freeze",
     "Goal",
+    "Grasp",
     "HalfSpace",
     "Hinge",
     "Hold",
     "Hull",
     "InputError",
+    "Lean",
     "Material",
     "Measure",
     "Mesh",
@@ -160,8 +180,10 @@ __all__ = [
     "Records",
     "Relative",
     "Rhythm",
+    "Result",
     "Scene",
     "Shape",
+    "Sit",
     "SkeletonMotion",
     "Solution",
     "SolveProgress",
@@ -169,10 +191,13 @@ __all__ = [
     "Sphere",
     "Spring",
     "StanceFeet",
+    "Stand",
     "StepLimit",
     "Strength",
     "Task",
     "Torques",
+    "Torus",
+    "Touch",
     "Trajectory",
     "UnknownNameError",
     "Viewer",
@@ -190,6 +215,7 @@ __all__ = [
     "reach_map",
     "read_clip",
     "read_many",
+    "read_result",
     "read_skeleton",
     "read_task",
     "retarget",
@@ -198,13 +224,15 @@ __all__ = [
     "solve_many",
     "study",
     "torques",
+    "write_result",
+    "write_task",
 ]
 
 _MODULES = {
     "wholebody.assessment": "Assessment assess",
     "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
-    "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
+    "wholebody.geometry.shapes": "Box Capsule Cylinder Ellipsoid HalfSpace Hull Mesh Shape Sphere Torus",
     "wholebody.dynamics.coupling": "Spring",
     "wholebody.dynamics.world": "World",
     "wholebody.matter.body": "Body",
@@ -251,6 +279,10 @@ _MODULES = {
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
     "Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
     "StepLimit",
+    "wholebody.taskfile": "Result Task read_result read_task write_result write_task",
+    "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
+    "Hold Measure Orientation Plane Point Posture PotentialEnergy ReachCones Relative StepLimit "
+    "Grasp Lean Sit Stand Touch",
     "wholebody.view": "Viewer",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}
