@@ -10,6 +10,8 @@ from wholebody.cli.bench import (
     challenge,
     compare,
     detail,
+    export,
+    judge,
     loads,
     motion,
     newton,
@@ -36,6 +38,8 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     kinds = parser.add_subparsers(title="what to measure", metavar="WHAT", required=True)
     for command in (
         compare,
+        export,
+        judge,
         step,
         reaches,
         solve,
