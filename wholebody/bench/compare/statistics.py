@@ -191,5 +191,5 @@ def same_share(counts: Sequence[tuple[int, int]]) -> float:
     def statistic(found: Array) -> Array:
         return np.asarray(((found - expected) ** 2 / (expected * (1.0 - wins / total))).sum(axis=-1))
 
-    drawn = np.random.default_rng(SEED).multivariate_hypergeometric(tries, wins, RESAMPLES)
+    drawn = np.random.default_rng(SEED).multivariate_hypergeometric(tries, wins, RESAMPLES).astype(float)
     return float((1 + np.count_nonzero(statistic(drawn) >= statistic(done.astype(float)) - 1e-9)) / (RESAMPLES + 1))

@@ -11,7 +11,7 @@ overlap of all pairs, clearances, joint limits, what is held, and effort above t
 from the files by Pinocchio and coal alone. Prints a table, and writes every figure as JSON. Answers that are malformed
 are refused with one sentence that names the entry."""
 
-WIDTH = 190  # columns of the table, also where the terminal has fewer
+WIDTH = 230  # columns of the table, also where the terminal has fewer
 
 
 def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
