@@ -10,6 +10,7 @@ import pytest
 from wholebody.bench.compare.advice import advice, choices, standings
 from wholebody.bench.compare.charts import curve, groups, performance
 from wholebody.bench.compare.front import OURS, front, fronts, time_to
+from wholebody.bench.compare.paired import best
 from wholebody.bench.compare.rankings import rankings, seeds_in_words, sensitivity
 from wholebody.bench.compare.record import ANSWERED, FAILED, REFUSED, Record
 from wholebody.bench.compare.results import QUANTITIES, Results
@@ -187,6 +188,13 @@ def test_a_chart_has_at_most_six_methods_and_further_ones_stand_beside_ours() ->
     assert {name for group in found for name in group} == set(names)
     assert groups(["a", "b"]) == [("a", "b")]
     assert groups([]) == []
+
+
+def test_nobody_is_the_fastest_of_four_problems() -> None:
+    few = {("s", number): 0.1 for number in range(4)}
+    assert best({"a": few, "b": dict.fromkeys(few, 9.0)}) == ("a", "b")
+    many = {("s", number): 0.1 for number in range(9)}
+    assert best({"a": many, "b": dict.fromkeys(many, 9.0)}) == ("a",)
 
 
 def test_methods_that_differ_are_ranked_and_seeds_that_matter_are_named() -> None:

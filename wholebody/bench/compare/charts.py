@@ -194,7 +194,7 @@ def overview(
         panel.grid(axis="y", visible=False)
     left.set(xlabel="solved [%]", xlim=(-2.0, 102.0))
     plot_style.plain_log(right)
-    right.set(xlabel="time of a solve, mean; one that is not solved counts as the longest [ms]")
+    right.set(xlabel="mean time of a solve, failures as the longest [ms]")
     chart.suptitle("Every set: solved, and how fast; bands are intervals of 95 %", x=0.01, ha="left", fontsize=13)
     _legend(chart, adapters, drawn)
     return plot_style.save(chart, path)

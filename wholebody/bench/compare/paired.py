@@ -22,9 +22,12 @@ Figures = Mapping[tuple[str, int], float]
 def best(found: Mapping[str, Figures]) -> tuple[str, ...]:
     """Return the methods with the least figure, as many as cannot be told apart; the least of all first.
 
-    A method that has too few problems in common with the least is left out.
+    A method that has too few problems in common with the least is left out. Where the least itself has too few problems
+    to compare with anybody, nobody is told apart.
     """
     order = sorted((name for name in found if found[name]), key=lambda name: middle(list(found[name].values())))
+    if order and len(found[order[0]]) < LEAST:
+        return tuple(order)
     for first in order:
         others = {name: ratio(found[name], found[first]) for name in order if name != first}
         if not any(each.high < 1.0 for each in others.values()):

@@ -14,6 +14,8 @@ from pathlib import Path
 from wholebody.bench.compare.advice import advice, choices, effort, error, reference, slowness, standings
 from wholebody.bench.compare.charts import draw_all, groups
 from wholebody.bench.compare.front import MOST, OURS, Rival, fronts
+from wholebody.bench.compare.lock import NAME as LOCK
+from wholebody.bench.compare.lock import locked, write_lock
 from wholebody.bench.compare.pages import Material, drawn_within, write_pages
 from wholebody.bench.compare.paired import algorithms
 from wholebody.bench.compare.rankings import in_words, rankings, seeds_in_words, sensitivity
@@ -63,6 +65,7 @@ def publish(
     given = material(settings, store.chunks, facts, missing)
     write_rows(folder / "solves.csv", facts, store.records)
     write_rows(folder / "summary.csv", facts, given.rows)
+    write_lock(folder / LOCK, locked(given))
     front = fronts(given.results)
     if front:
         write_rows(folder / "front.csv", facts, front)
@@ -84,6 +87,7 @@ def publish(
     write_text(folder / "compare.md", short + "\n")
     if docs is not None:
         replace_section(docs / "results.md", "compare", short)
+        write_lock(docs / "assets" / "bench" / f"compare-{LOCK}", locked(given))
         (docs / "assets" / "bench").mkdir(parents=True, exist_ok=True)
         for svg, _ in (found for name, found in charts.items() if f"/{name}.svg" in short):
             shutil.copyfile(svg, docs / "assets" / "bench" / svg.name)
