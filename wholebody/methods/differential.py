@@ -6,6 +6,8 @@ size, and the damping grows while steps alternate in direction.
 
 from __future__ import annotations
 
+import threading
+import time
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -27,6 +29,30 @@ DAMPING = 1e-3  # weight of the motion after a step opposed to the previous one,
 STIFFER, LOOSER = 4.0, 0.5  # factors on that, after another such step and after any other
 MOST_DAMPING = 10.0
 FIRM = 1e-4  # m, rad: what must hold and is missed by less than this is no reason to prefer an earlier posture
+
+
+class Stopwatch(threading.local):
+    """Adds up the time that this thread spends within it.
+
+    Attributes:
+        seconds: so far, wall time.
+    """
+
+    def __init__(self) -> None:
+        """Begin at 0."""
+        self.seconds = self._began = 0.0
+
+    def __enter__(self) -> None:
+        """Begin to count."""
+        self._began = time.perf_counter()
+
+    def __exit__(self, *_: object) -> None:
+        """Add what went by."""
+        self.seconds += time.perf_counter() - self._began
+
+
+TOOL = Stopwatch()
+"""Runs while a tool computes, so that its time is told apart from what states problems to it and judges its steps."""
 
 
 class StepError(Exception):

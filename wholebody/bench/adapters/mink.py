@@ -18,12 +18,11 @@ from wholebody.bench.adapters.loop import NEAR, Loop, Stepper, kept_apart, longe
 from wholebody.bench.adapters.mjcf import ROOT, mjcf
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
 from wholebody.figures.figure import Figure
-from wholebody.methods.differential import StepError
+from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
-GAIN = 0.85  # share of what is free of a gap that may be used up in one iteration: mink's default
 HOLDING = 10.0  # cost of what is held, where goals cost 1
 OUT = 0.1  # of the room beside things that move: what a pair that lacks it gains in one step
 COLLISION_GAIN = 0.5 * DT  # half of what is free of a gap may be used up in one step of a reach; see `MinkTool`
@@ -52,9 +51,9 @@ def mink_adapter(variant: str = "") -> Adapter:
         f"LookAtTask, ComTask and PostureTask (posture and measures, with a weight that fades) as soft tasks, {holds}, "
         f"DofFreezingTask, ConfigurationLimit, VelocityLimit and FreeJointVelocityLimit of {loop.longest} rad or, for "
         "each metre of the figure, m a step, a CollisionAvoidanceLimit for every clearance that occurs, gain "
-        f"{GAIN}; for each metre of the figure it looks {100 * NEAR:g} cm far and keeps {1e3 * loop.margin:g} mm more "
-        "than the clearance, less where the start has less room; one start, at most 200 steps, the loop of our adapter to "
-        "placo. Building its model is set-up.",
+        f"{loop.gain}; for each metre of the figure it looks {100 * NEAR:g} cm far and keeps {1e3 * loop.margin:g} mm "
+        "more than the clearance, less where the start has less room; one start, at most 200 steps, the loop of our "
+        "adapter to placo. Building its model is set-up.",
         differences=(*_DIFFERENCES, more) if hard else _DIFFERENCES,
     )
 
@@ -65,10 +64,11 @@ class MinkLoop(Loop):
     name = "mink"
     kinds = (*Loop.kinds, wb.Axis)
     hard: ClassVar[bool] = False
+    gain: ClassVar[float] = 0.85  # share of what is free of a gap that may be used up in one step: mink's default
 
     def build(self, problem: Problem) -> Stepper:
         """Write the model."""
-        return _MinkStepper(problem, self.longest, self.margin, self.hard)
+        return _MinkStepper(problem, type(self))
 
 
 class HardMinkLoop(MinkLoop):
@@ -76,11 +76,14 @@ class HardMinkLoop(MinkLoop):
 
     name = "mink/hard"
     hard = True
+    longest = 0.025
+    margin = 0.0  # rows that ask for room beside a foot that cannot move leave a program no solution
+    gain = 1.0  # with less, what is held cannot come back
 
 
 class _MinkStepper:
-    def __init__(self, problem: Problem, longest: float, margin: float, hard: bool) -> None:
-        self._problem, self._longest, self._margin, self._holds_hard = problem, longest, margin, hard
+    def __init__(self, problem: Problem, loop: type[MinkLoop]) -> None:
+        self._problem, self._loop, self._longest, self._holds_hard = problem, loop, loop.longest, loop.hard
         self._sites: dict[str, tuple[int, Any]] = {}
         self._room = 0.0
         for term in (*problem.goals, *problem.constraints):
@@ -120,18 +123,20 @@ class _MinkStepper:
         """One `solve_ik`, with a time step of one second."""
         import mink
 
-        configuration = self._configuration
-        configuration.update(self._order.theirs(q))
+        configuration, theirs = self._configuration, self._order.theirs(q)
+        with TOOL:
+            configuration.update(theirs)
         for task, site, place in self._points:
             turn = configuration.get_transform_frame_to_world(site, "site").rotation()
             task.set_target(mink.SE3.from_rotation_and_translation(turn, place))
         for task, share in self._comfort:
             task.set_cost(weight**0.5 * share)
         try:
-            velocity = mink.solve_ik(
-                configuration, [*self._tasks, *(task for task, _ in self._comfort)], 1.0, solver="daqp",
-                damping=damping, limits=self._limits, constraints=self._hard or None,
-            )  # fmt: skip
+            with TOOL:
+                velocity = mink.solve_ik(
+                    configuration, [*self._tasks, *(task for task, _ in self._comfort)], 1.0, solver="daqp",
+                    damping=damping, limits=self._limits, constraints=self._hard or None,
+                )  # fmt: skip
         except mink.NoSolutionFound as error:
             raise StepError(f"{type(error).__name__}: its program has no solution") from None
         return np.asarray(velocity, dtype=float)[self._dof]
@@ -186,7 +191,7 @@ class _MinkStepper:
         names = [piece.name for piece in problem.scene.geometry.geometryObjects]
         pieces = problem.scene.geometry.geometryObjects
         groups: dict[tuple[float, float], list[Any]] = {}
-        for pair in kept_apart(problem, self._margin * reach, self._holds_hard):
+        for pair in kept_apart(problem, self._loop.margin * reach, self._holds_hard):
             room = 0.0 if pieces[pair.first].parentJoint and pieces[pair.second].parentJoint else self._room
             asked = pair.clearance + max(pair.margin, room), room
             groups.setdefault(asked, []).append(([names[pair.first]], [names[pair.second]]))
@@ -194,7 +199,7 @@ class _MinkStepper:
             apart = mink.CollisionAvoidanceLimit(
                 model,
                 pairs,
-                gain=GAIN,
+                gain=self._loop.gain,
                 minimum_distance_from_collisions=clearance,
                 collision_detection_distance=clearance + NEAR * reach,
                 bound_relaxation=-OUT * room,  # without it, a pair that is nearer than it may be stays so

@@ -16,7 +16,7 @@ from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
 from wholebody.bench.adapters.loop import Loop, Stepper, kept_apart, longest_moves, pulls, size
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
-from wholebody.methods.differential import StepError
+from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
 from wholebody.tasks.residuals import PlacementResidual
 
@@ -108,19 +108,21 @@ class _PinkStepper:
         """One `solve_ik`, with a time step of one second."""
         import pink
 
-        configuration = pink.Configuration(
-            self._model, self._data, q, copy_data=False, collision_model=self._geometry if self._barriers else None
-        )
+        with TOOL:
+            configuration = pink.Configuration(
+                self._model, self._data, q, copy_data=False, collision_model=self._geometry if self._barriers else None
+            )
         for task, place in self._points:
             turn = configuration.get_transform_frame_to_world(task.frame).rotation
             task.set_target(pin.SE3(turn, place))
         for task, share in self._comfort:
             task.cost = weight**0.5 * share
         try:
-            velocity = pink.solve_ik(
-                configuration, [*self._tasks, *(task for task, _ in self._comfort)], 1.0, solver="daqp",
-                damping=damping, barriers=self._barriers, constraints=self._hard, safety_break=False,
-            )  # fmt: skip
+            with TOOL:
+                velocity = pink.solve_ik(
+                    configuration, [*self._tasks, *(task for task, _ in self._comfort)], 1.0, solver="daqp",
+                    damping=damping, barriers=self._barriers, constraints=self._hard, safety_break=False,
+                )  # fmt: skip
         except pink.exceptions.NoSolutionFound as error:
             raise StepError(f"{type(error).__name__}: its program has no solution") from None
         return np.asarray(velocity, dtype=float)

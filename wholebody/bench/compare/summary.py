@@ -29,6 +29,7 @@ class Summary:
         success, success_fine: share of the cases not refused that are solved to 1e-3 and to 1e-4, as judged.
         false_claims: answers called solved that are off by more than 1 mm.
         median_ms, p95_ms, cpu_median_ms: of a call (of a frame where goals move), over all answers.
+        tool: share of the time within calls of the tool behind an adapter, median; 0 for methods of our own.
         setup_ms, iterations: medians; the first to build a model of its own.
         programs: what closed its quadratic programs, of all problems together.
         worst_median: median of the worst error [m or rad].
@@ -51,6 +52,7 @@ class Summary:
     median_ms: float
     p95_ms: float
     cpu_median_ms: float
+    tool: float
     setup_ms: float
     iterations: float
     programs: str
@@ -105,6 +107,7 @@ def _summary(results: Results, family: str, adapter: str) -> Summary:
         median_ms=1e3 * middle([record.seconds for record in answered]),
         p95_ms=1e3 * middle([record.seconds for record in answered], 0.95),
         cpu_median_ms=1e3 * middle([record.cpu_seconds for record in answered]),
+        tool=middle([record.tool_seconds / max(record.seconds, 1e-9) for record in answered]),
         setup_ms=1e3 * middle([record.setup_seconds for record in answered]),
         iterations=middle([record.iterations for record in answered]),
         programs=summed_programs(record.programs for record in answered),
