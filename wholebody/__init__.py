@@ -80,7 +80,6 @@ if TYPE_CHECKING:
     from wholebody.studies.reach_result import ReachMap
     from wholebody.studies.records import Records, SolveRecord
     from wholebody.studies.study import study
-    from wholebody.taskfile import Task, read_task
     from wholebody.taskfile import Result, Task, read_result, read_task, write_result, write_task
     from wholebody.tasks import (
         Axis,
@@ -179,8 +178,8 @@ __all__ = [
     "ReachMap",
     "Records",
     "Relative",
-    "Rhythm",
     "Result",
+    "Rhythm",
     "Scene",
     "Shape",
     "Sit",
@@ -275,14 +274,10 @@ _MODULES = {
     "wholebody.studies.reach_map": "reach_map",
     "wholebody.studies.reach_result": "ReachMap",
     "wholebody.studies.study": "study",
-    "wholebody.taskfile": "Task read_task",
-    "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
-    "Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
-    "StepLimit",
     "wholebody.taskfile": "Result Task read_result read_task write_result write_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
-    "Hold Measure Orientation Plane Point Posture PotentialEnergy ReachCones Relative StepLimit "
-    "Grasp Lean Sit Stand Touch",
+    "Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
+    "StepLimit Grasp Lean Sit Stand Touch",
     "wholebody.view": "Viewer",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}

@@ -98,7 +98,9 @@ class Problem:
             term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
         )
         self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
-        added = default_constraints(scene, self.start, stated, self.bounds, ranges=range_of_motion, balance=balance)
+        added = default_constraints(
+            scene, self.start, stated, self.bounds, self.goals, ranges=range_of_motion, balance=balance
+        )
         self.defaults: tuple[Constraint, ...] = tuple(term.resolve(scene, self.start) for term in added)
         self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
         pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
