@@ -61,7 +61,7 @@ def test_what_is_out_of_reach_is_known_soon(standing, honest):
     problem = wb.Problem(standing, goals=[wb.Point("right_index_tip", (0.2, -0.3, 2.6))], constraints=FEET)
     solution = honest(problem, wb.solve(problem))
     assert solution.status == "unreachable"
-    assert solution.assessment.goal_error == pytest.approx(0.3087, abs=1e-3)
+    assert solution.assessment.goal_error == pytest.approx(0.3252, abs=1e-3)
     assert solution.iterations < 200
 
 
