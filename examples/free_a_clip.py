@@ -66,7 +66,7 @@ def swing(figure: wb.Figure) -> wb.Clip:
     """Arms swing as in a walk, for two seconds."""
     q = []
     for turn in (2.0 * np.pi * np.arange(61) / 40.0).tolist():
-        flexion = {f"{side}_shoulder_flexion": sign * 0.5 * np.sin(turn) for side, sign in (("left", 1), ("right", -1))}
+        flexion = {f"{side}_shoulder_flexion": sign * 0.6 * np.sin(turn) for side, sign in (("left", 1), ("right", -1))}
         q.append(figure.with_joints(figure.neutral, flexion))
     return wb.Clip(figure, np.array(q), 1 / 30, "swing")
 

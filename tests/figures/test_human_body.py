@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from wholebody.errors import InputError
 from wholebody.figures import load
 from wholebody.figures.anthropometry import body, design_cases, table
 from wholebody.figures.measuring import ansur, measure
@@ -102,3 +103,31 @@ def test_calf_and_thigh_give_way_by_what_flesh_does():
             pieces[thigh].geometry, here, pieces[calf].geometry, there, coal.DistanceRequest(), coal.DistanceResult()
         )
         assert 0.0 < depth < 0.035, case
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_percentile_is_a_design_case(case):
+    who = design_cases()[case]
+    made = body(who.sex, percentile=int(case[1:]))
+    assert (made.stature, made.mass) == pytest.approx((who.stature, who.mass), rel=1e-3)
+    assert body(who.sex, stature=1.7, percentile=50).stature == 1.7
+
+
+def test_percentiles_in_between_follow_the_normal_deviate():
+    # Statures are nearly normal: mean 175.62 cm, standard deviation 6.86 cm (4082 men of ANSUR II).
+    for percentile, deviate in ((10, -1.2816), (40, -0.2533), (90, 1.2816)):
+        assert body(percentile=percentile).stature == pytest.approx(1.7562 + 0.0686 * deviate, abs=0.006)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"percentile": 0.5}, "percentile is 0.5"),
+        ({"percentile": math.nan}, "percentile is nan"),
+        ({"percentile": "fifth"}, "percentile"),
+        ({"percentile": 5, "stature": 1.7, "mass": 70}, "leaves nothing to percentile"),
+    ],
+)
+def test_impossible_percentiles_are_refused(options, words):
+    with pytest.raises(InputError, match=words):
+        load("human", **options)

@@ -14,6 +14,7 @@ EPILOG = """\
 examples:
   wholebody figure human --sex female --stature 1.62 --mass 60
   wholebody figure human --sex female --stature 1.62 --mass 60 --out small-woman.urdf
+  wholebody figure human --sex female --percentile 5
   wholebody figure robot.urdf"""
 
 
@@ -25,6 +26,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser.add_argument("--sex", choices=("male", "female"), help="sex of a person (default: male)")
     parser.add_argument("--stature", type=float, metavar="M", help="height of a person, m (default: median)")
     parser.add_argument("--mass", type=float, metavar="KG", help="mass of a person, kg (default: from the stature)")
+    parser.add_argument("--percentile", type=float, metavar="P", help="of stature and mass if not given, 1 to 99")
     parser.add_argument(
         "--detail", choices=("spheres", "capsules", "hulls"), help="detail of the geometry (default: capsules)"
     )
@@ -39,7 +41,9 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.cli.tables import show_figure
     from wholebody.figures import load
 
-    given: dict[str, Any] = {name: getattr(arguments, name) for name in ("sex", "stature", "mass", "detail")}
+    given: dict[str, Any] = {
+        name: getattr(arguments, name) for name in ("sex", "stature", "mass", "percentile", "detail")
+    }
     options = {name: value for name, value in given.items() if value is not None}
     if arguments.out is not None:
         return _write(arguments.name, options, arguments.out)
@@ -56,7 +60,7 @@ def _write(name: str, options: dict[str, Any], out: Path) -> int:
         raise InputError("--out writes the person in capsules; write: wholebody figure human --out FILE.urdf")
     if out.suffix != ".urdf":
         raise InputError(f"--out: {out} does not end in .urdf; give it that ending")
-    person = body(options.get("sex", "male"), options.get("stature"), options.get("mass"))
+    person = body(options.get("sex", "male"), options.get("stature"), options.get("mass"), options.get("percentile"))
     write_human(out, person)
     print(f"wrote {out}: {person.sex}, {person.stature:.3f} m, {person.mass:.1f} kg")
     return 0

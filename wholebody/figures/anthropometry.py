@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
 
@@ -147,22 +148,32 @@ class Body:
         return c0 + cq * math.sqrt(self.mass / self.stature) + ch * self.stature
 
 
-def body(sex: str = "male", stature: float | None = None, mass: float | None = None) -> Body:
+def body(
+    sex: str = "male", stature: float | None = None, mass: float | None = None, percentile: float | None = None
+) -> Body:
     """Return a checked `Body`.
 
     Args:
         sex: "male" or "female".
         stature: metres; the median of the sex if left out.
         mass: kilograms; if left out, the median of the sex, or the mass expected at the stature that was given.
+        percentile: 1 to 99: stature and mass, unless one of them is given, are this percentile of the sex in ANSUR II,
+            between the percentiles of the table on a line in the normal deviate.
 
     Raises:
-        InputError: an unknown sex, or a number out of the range of people.
+        InputError: an unknown sex, a number out of the range of people, or a percentile of nothing.
     """
     if not isinstance(sex, str) or sex.lower() not in _SEXES:
         raise InputError(f"sex is {shown(sex)}; give 'male' or 'female'")
     sex = sex.lower()
     column = _SEXES[sex]
     median = keyed("design_cases", "case")[f"{column}50"]
+    if percentile is not None:
+        if stature is not None and mass is not None:
+            raise InputError("stature and mass are given, which leaves nothing to percentile; leave one out")
+        share = number(percentile, "percentile", 1.0, 99.0, "")
+        stature = 0.01 * _percentile(column, "stature", share) if stature is None else stature
+        mass = _percentile(column, "mass", share) if mass is None else mass
     if mass is None and stature is not None:
         factor, exponent = _EXPECTED_MASS[column]
         mass = factor * number(stature, "stature", *STATURE_RANGE, "m") ** exponent
@@ -175,6 +186,13 @@ def body(sex: str = "male", stature: float | None = None, mass: float | None = N
             f"mass {weight:g} kg does not go with stature {height:g} m; give a mass between {low:.0f} and {high:.0f} kg"
         )
     return Body(sex, height, weight)
+
+
+def _percentile(column: str, dimension: str, percentile: float) -> float:
+    row = next(row for row in table("percentiles") if row["sex"] == column and row["dim"] == dimension)
+    known = [int(name[1:]) for name in row if name[0] == "p" and name[1:].isdigit()]
+    deviate = [NormalDist().inv_cdf(0.01 * share) for share in (percentile, *known)]
+    return float(np.interp(deviate[0], deviate[1:], [float(row[f"p{share:02d}"]) for share in known]))
 
 
 def describe(person: Body) -> str:

@@ -92,10 +92,14 @@ def hand_spec(side: str = "right", person: Body | None = None) -> BodySpec:
 
 
 def hand_figure(
-    side: str = "right", sex: str = "male", stature: float | None = None, mass: float | None = None
+    side: str = "right",
+    sex: str = "male",
+    stature: float | None = None,
+    mass: float | None = None,
+    percentile: float | None = None,
 ) -> Figure:
     """Return a hand with a free root at the wrist; arguments as for `hand_spec` and the person."""
-    spec = hand_spec(side, body(sex, stature, mass))
+    spec = hand_spec(side, body(sex, stature, mass, percentile))
     model = model_of(spec)
     tested, excluded = _pairs(spec.solids)
     names = tuple(joint.name for joint in spec.joints)

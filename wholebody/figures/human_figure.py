@@ -24,7 +24,11 @@ ESTIMATE: without it a person bows and walks away before an arm is lifted."""
 
 
 def human_figure(
-    sex: str = "male", stature: float | None = None, mass: float | None = None, detail: str = "capsules"
+    sex: str = "male",
+    stature: float | None = None,
+    mass: float | None = None,
+    detail: str = "capsules",
+    percentile: float | None = None,
 ) -> Figure:
     """Return the person.
 
@@ -33,12 +37,13 @@ def human_figure(
         stature: metres; the median of the sex if left out.
         mass: kilograms; the median, or what is expected at the stature that was given.
         detail: "spheres" (39, for whole motions), "capsules" (and boxes), "hulls" (convex polyhedra).
+        percentile: 1 to 99, of the sex in ANSUR II, for stature and mass where they are left out.
 
     Raises:
         InputError: an impossible body.
         UnknownNameError: an unknown detail.
     """
-    person = body(sex, stature, mass)
+    person = body(sex, stature, mass, percentile)
     return figure_of(human_spec(person, detail), detail, person.sex)
 
 
@@ -132,11 +137,15 @@ def avatar_spec(person: Body | None = None, detail: str = "capsules") -> BodySpe
 
 
 def avatar_figure(
-    sex: str = "male", stature: float | None = None, mass: float | None = None, detail: str = "capsules"
+    sex: str = "male",
+    stature: float | None = None,
+    mass: float | None = None,
+    detail: str = "capsules",
+    percentile: float | None = None,
 ) -> Figure:
     """Return the avatar; arguments as for the person.
 
     Two arms and two legs of seven joints and a neck of three, on a rigid torso (Schmidl & Lin): the person with spine,
     shoulder girdle and upper neck fixed.
     """
-    return figure_of(avatar_spec(body(sex, stature, mass), detail), detail)
+    return figure_of(avatar_spec(body(sex, stature, mass, percentile), detail), detail)

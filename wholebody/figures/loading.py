@@ -24,8 +24,9 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
 
     Args:
         spec: "human", "avatar", "hand", or the path of a URDF or MJCF file.
-        **options: for "human" and "avatar": `sex` ("male", "female"), `stature` in metres, `mass` in kilograms and
-            `detail` ("spheres", "capsules", "hulls"); for "hand": `side` ("left", "right"), `sex`, `stature`, `mass`;
+        **options: for "human" and "avatar": `sex` ("male", "female"), `stature` in metres, `mass` in kilograms,
+            `percentile` (1 to 99) for those of the two that are left out, and `detail` ("spheres", "capsules",
+            "hulls"); for "hand": `side` ("left", "right"), `sex`, `stature`, `mass`, `percentile`;
             for a file: `root` ("fixed", "free"), `package_dirs`, folders for ``package://`` names, and `concavity`,
             a number or a mapping from link to number, which asks for the decomposition of meshes into convex pieces
             (0.01 is close, 1 is a hull); without it every mesh becomes its convex hull.

@@ -11,7 +11,8 @@ _STATURE = Key("stature", Number(1.3, 2.2, "m"), "the median of the sex if left 
 _MASS = Key("mass", Number(25.0, 250.0, "kg"), "the usual mass for sex and stature if left out")
 _SEX = Key("sex", kinds.Choice(("male", "female")), "male if left out")
 _DETAIL = Key("detail", kinds.Choice(("spheres", "capsules", "hulls")), "of its geometry; capsules if left out")
-_BODY = (_SEX, _STATURE, _MASS)
+_PERCENTILE = Key("percentile", Number(1.0, 99.0), "of the sex in ANSUR II, for stature and mass if left out")
+_BODY = (_SEX, _STATURE, _MASS, _PERCENTILE)
 
 FIGURES = {
     "human": Form("A person with 55 degrees of freedom.", (*_BODY, _DETAIL)),

@@ -58,10 +58,10 @@ def test_a_start_whose_holds_are_far_off_comes_back_to_them(standing, seed):
 
 def test_what_is_out_of_reach_is_known_soon(standing, honest):
     """The work is counted in programs; it was 279."""
-    problem = wb.Problem(standing, goals=[wb.Point("right_index_tip", (0.2, -0.3, 2.6))], constraints=FEET)
+    problem = wb.Problem(standing, goals=[wb.Point("right_index_tip", (0.2, -0.3, 2.585))], constraints=FEET)
     solution = honest(problem, wb.solve(problem))
     assert solution.status == "unreachable"
-    assert solution.assessment.goal_error == pytest.approx(0.3087, abs=1e-3)
+    assert solution.assessment.goal_error == pytest.approx(0.3104, abs=1e-3)
     assert solution.iterations < 200
 
 
