@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array, Indices
+from wholebody.figures.anthropometry import Body
 from wholebody.figures.reach_cones import ReachCone
 
 ROOT_JOINT = "root_joint"
@@ -143,6 +144,7 @@ class Description(NamedTuple):
         effort: joint to weight of its effort; joints that are not named have 1.
         excluded: pairs of pieces that are not tested, with the reason.
         notes: sentences on what had to be changed about the geometry of a file.
+        person: sex, stature and mass of the figure or of the hand's owner; None for a figure of a file.
     """
 
     groups: Mapping[str, tuple[str, ...]]
@@ -155,6 +157,7 @@ class Description(NamedTuple):
     effort: Mapping[str, float] = MappingProxyType({})
     excluded: tuple[ExcludedPair, ...] = ()
     notes: tuple[str, ...] = ()
+    person: Body | None = None
 
 
 def limits_of(model: pin.Model) -> Limits:

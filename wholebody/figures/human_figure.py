@@ -54,6 +54,7 @@ def figure_of(spec: BodySpec, detail: str) -> Figure:
         collision_groups={segment: collision_group(segment) for segment in segments},
         effort={row["name"]: float(row["effort_weight"]) for row in table("joints")},
         excluded=(*(ExcludedPair(*entry) for entry in excluded), *rigid),
+        person=spec.person,
     )
     return Figure(spec.name, model, geometry, detail, description)
 

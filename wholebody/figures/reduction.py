@@ -64,6 +64,7 @@ def reduced_parts(figure: Articulated, keep: tuple[str, ...], q: Array) -> Reduc
         effort=old.effort,
         excluded=(*old.excluded, *fixed),
         notes=old.notes,
+        person=old.person,
     )
     return ReducedParts(small, geometry, visual, description)
 
