@@ -49,6 +49,7 @@ def hand_shape(person: Body, side: str) -> HandShape:
     """Return the hand of a person."""
     size, figure = Dimensions(person), hand_figure_of(person, side)
     bind, rest = _placements(figure, side, _spread(side)), _placements(figure, side, _resting(side))
+    _bring_thumb(rest, side, np.array([size.thumb.x, 0.0, -size.thumb.tip]))
     sign = 1.0 if side == "left" else -1.0
     palm = _palm(size, sign)
     fingers: list[Field] = []
@@ -77,6 +78,20 @@ def _placements(figure: Figure, side: str, degrees: dict[str, float]) -> dict[st
     pin.framesForwardKinematics(figure.model, data, figure.clamp(q))
     root = data.oMf[figure.frame_id(f"{side}_hand")].inverse()
     return {name: np.array((root * data.oMf[figure.frame_id(name)]).homogeneous) for name in figure.segments}
+
+
+def _bring_thumb(rest: dict[str, Array], side: str, target: Array) -> None:
+    """Turn the resting thumb about its first joint, so that it points to where the person's thumb ends."""
+    first, last = f"{side}_thumb_proximal", f"{side}_thumb_distal"
+    origin = rest[first][:3, 3].copy()
+    now, wanted = rest[last][:3, 3] - origin, target - origin
+    axis = np.cross(now, wanted)
+    angle = np.arctan2(np.linalg.norm(axis), now @ wanted)
+    turn = np.eye(4)
+    turn[:3, :3] = pin.exp3(angle * axis / max(float(np.linalg.norm(axis)), 1e-12))
+    turn[:3, 3] = origin - turn[:3, :3] @ origin
+    for segment in (first, last):
+        rest[segment] = turn @ rest[segment]
 
 
 def _spread(side: str) -> dict[str, float]:

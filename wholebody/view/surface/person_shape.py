@@ -144,6 +144,12 @@ class PersonShape:
                     0.036 * scale,
                 ),
             ]
+            solids.append(
+                ellipsoid(
+                    (shoulder[0] + 0.018 * scale, shoulder[1] - sign * 0.062 * scale, shoulder[2] - 0.085 * scale),
+                    np.array([0.075, 0.050, 0.100]) * scale,
+                )
+            )
             if size.body.sex == "female":
                 chest = self.at("thorax", (0.0, 0.0, 0.0))
                 front = self._front(float(chest[2]) - 0.01 * scale)

@@ -44,14 +44,23 @@ def piece_field(solid: Solid) -> Field:
 def caps(solids: Iterable[Solid], segment: str) -> list[tuple[Array, float]]:
     """Centres (3,), in the segment's frame, and radii of the balls around which a limb's pieces lie, highest first."""
     found: list[tuple[Array, float]] = []
-    for solid in solids:
-        if solid.segment != segment or not isinstance(solid.geometry, (coal.Capsule, coal.Sphere)):
-            continue
+    own = [s for s in solids if s.segment == segment and isinstance(s.geometry, (coal.Capsule, coal.Sphere))]
+    for solid in own:
+        others = [piece_field(other) for other in own if other is not solid]
+        if any(_contains(other, solid) for other in others):
+            continue  # a core within the flesh
         half = float(solid.geometry.halfLength) if isinstance(solid.geometry, coal.Capsule) else 0.0
         for end in {half, -half}:
             center = solid.placement.act(np.array([0.0, 0.0, end]))
             found.append((np.asarray(center), float(solid.geometry.radius)))
     return sorted(found, key=lambda entry: -float(entry[0][2]))
+
+
+def _contains(outer: Field, solid: Solid) -> bool:
+    """Whether a capsule or a ball is within another piece."""
+    half = float(solid.geometry.halfLength) if isinstance(solid.geometry, coal.Capsule) else 0.0
+    ends = np.array([solid.placement.act(np.array([0.0, 0.0, end])) for end in (half, -half)])
+    return bool((outer(ends) + float(solid.geometry.radius) < 1e-6).all())
 
 
 def limb(balls: Sequence[tuple[Array, float]]) -> Field:
