@@ -356,6 +356,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Plane", Call(wb.Plane, plane, solve_it)
     yield "Balance", Call(wb.Balance, {"feet": ["left_foot"], "margin": 0.0}, on_a_person)
     yield "ReachCones", Call(wb.ReachCones, {"names": ["left_shoulder"]}, on_a_person)
+    yield "RangeOfMotion", Call(wb.RangeOfMotion, {"names": ["neck"]}, on_a_person)
     yield "Freeze", Call(lambda name: wb.Freeze(name), {"name": "joint1"}, solve_it)
     limit = {"velocity": 1.0, "joints": {"joint1": 1.0}, "root_velocity": math.inf, "root_turn": math.inf}
     yield "StepLimit", Call(wb.StepLimit, limit, solve_it)

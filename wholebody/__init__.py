@@ -83,8 +83,10 @@ if TYPE_CHECKING:
         Point,
         Posture,
         PotentialEnergy,
+        RangeOfMotion,
         ReachCones,
         Relative,
+        Rhythm,
         StepLimit,
     )
     from wholebody.tracking.drag import Drag
@@ -144,8 +146,10 @@ __all__ = [
     "Posture",
     "PotentialEnergy",
     "Problem",
+    "RangeOfMotion",
     "ReachCones",
     "Relative",
+    "Rhythm",
     "Scene",
     "Shape",
     "SkeletonMotion",
@@ -224,7 +228,8 @@ _MODULES = {
     "wholebody.solution": "Solution",
     "wholebody.taskfile": "Task read_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
-    "Hold Measure Orientation Plane Point Posture PotentialEnergy ReachCones Relative StepLimit",
+    "Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
+    "StepLimit",
     "wholebody.view": "Viewer",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}

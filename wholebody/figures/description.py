@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array, Indices
 from wholebody.figures.anthropometry import Body
+from wholebody.figures.motion_ranges import MotionRange
 from wholebody.figures.reach_cones import ReachCone
 
 ROOT_JOINT = "root_joint"
@@ -143,6 +144,8 @@ class Description(NamedTuple):
         collision_groups: segment to the group whose parts are never tested against each other; may be empty.
         effort: joint to weight of its effort; joints that are not named have 1.
         excluded: pairs of pieces that are not tested, with the reason.
+        ranges: ranges of motion that more than one joint angle decides; a problem takes them by default.
+        root_effort: weight of the root's position [rad^2/m^2] and of its rotation in the effort.
         notes: sentences on what had to be changed about the geometry of a file.
         person: sex, stature and mass of the figure or of the hand's owner; None for a figure of a file.
     """
@@ -156,6 +159,8 @@ class Description(NamedTuple):
     collision_groups: Mapping[str, str] = MappingProxyType({})
     effort: Mapping[str, float] = MappingProxyType({})
     excluded: tuple[ExcludedPair, ...] = ()
+    ranges: Mapping[str, MotionRange] = MappingProxyType({})
+    root_effort: tuple[float, float] = (0.0, 0.0)
     notes: tuple[str, ...] = ()
     person: Body | None = None
 

@@ -97,6 +97,8 @@ def read_task(path: str | PathLike[str]) -> Task:
             measures=terms["measure"] or None,
             clearance=top.values.get("clearance", 0.0),
             touching=top.values.get("touching", ()),
+            range_of_motion=top.values.get("range_of_motion", True),
+            balance=top.values.get("balance"),
         ),
     )
     method = contents.one("method")

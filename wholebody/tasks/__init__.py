@@ -14,8 +14,10 @@ from wholebody.tasks.plane import Plane
 from wholebody.tasks.point import Point
 from wholebody.tasks.posture import Posture
 from wholebody.tasks.potential_energy import PotentialEnergy
+from wholebody.tasks.range_of_motion import RangeOfMotion
 from wholebody.tasks.reach_cones import ReachCones
 from wholebody.tasks.relative import Relative
+from wholebody.tasks.rhythm import Rhythm
 
 __all__ = [
     "Axis",
@@ -36,8 +38,10 @@ __all__ = [
     "Point",
     "Posture",
     "PotentialEnergy",
+    "RangeOfMotion",
     "ReachCones",
     "Relative",
+    "Rhythm",
     "StepLimit",
     "Term",
 ]
