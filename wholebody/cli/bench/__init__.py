@@ -10,6 +10,7 @@ from wholebody.cli.bench import (
     challenge,
     compare,
     detail,
+    human,
     loads,
     motion,
     newton,
@@ -52,5 +53,6 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         ablation,
         regress,
         world,
+        human,
     ):
         command.add_to(kinds)
