@@ -100,7 +100,7 @@ def tasks(figure: Figure) -> dict[str, Callable[[], Problem]]:
         scene.add(
             wb.Box((0.7 * scale, 1.2 * scale, 0.03)), name="desk", at=(0.62 * scale, 0.0, top - 0.015), color=WOOD
         )
-        goals = [
+        goals: list[Any] = [
             wb.Point(f"{side}_index_tip", (0.42 * scale, sign * 0.06 * scale, top + 0.02)) for side, sign in _SIDES
         ]
         goals += [wb.Axis(f"{side}_palm", UP, direction=DOWN, weight=0.01) for side, _ in _SIDES]
@@ -123,7 +123,9 @@ def tasks(figure: Figure) -> dict[str, Callable[[], Problem]]:
         return wb.Problem(room(), goals=goals, constraints=feet)
 
     def shoe() -> Problem:
-        goals = [wb.Point(f"{side}_index_tip", at(0.12, -0.085 + sign * 0.035, 0.115)) for side, sign in _SIDES]
+        goals: list[Any] = [
+            wb.Point(f"{side}_index_tip", at(0.12, -0.085 + sign * 0.035, 0.115)) for side, sign in _SIDES
+        ]
         goals.append(wb.Axis("gaze", FRONT, toward=at(0.12, -0.085, 0.1), weight=0.01))
         return wb.Problem(room(), start="squatting", goals=goals, constraints=feet)
 
