@@ -31,18 +31,18 @@ class Problem:
     """Scene, start, goals, constraints and measures, in the same form for every method.
 
     Joint limits and non-penetration are part of every problem. A person keeps its `RangeOfMotion` and `ReachCones`, and
-    `Balance` if it stands: both feet are held in the world where they are at the start, and nothing else carries it, that
-    is, no other frame is held in the world and the root is not frozen. What is stated takes the place of a default.
+    its `Balance` if it stands: both feet are held in the world where they are at the start, and nothing else carries
+    it, that is, no other frame is held in the world and the root is not frozen. What is stated takes the place of a
+    default.
 
-    A pair that is nearer than the clearance at the start,
-    but does not penetrate (soles on a floor, a hand on a table), must keep its distance. A pair that penetrates at the
-    start must reach the full clearance.
+    A pair that is nearer than the clearance at the start, but does not penetrate (soles on a floor, a hand on a table),
+    must keep its distance. A pair that penetrates at the start must reach the full clearance.
 
     Attributes:
         scene: figure and things.
         start: (nq,) the start posture.
         goals, constraints, bounds, measures: the terms, resolved on this scene and start.
-        defaults: those of the constraints that were not stated; methods that cannot take one leave it to the assessment.
+        defaults: the constraints that were not stated; methods that cannot take one leave it to the assessment.
         measures_given: whether the caller gave measures; false if they are the default.
         clearance: least distance of every pair, metres.
         clearances: (pairs,) least distance of each collision pair of the scene; may be changed between runs.
@@ -73,7 +73,7 @@ class Problem:
             constraints: what must always hold; bounds on the displacement are given here too.
             measures: costs to minimise; None for `Effort()`, and `Rhythm()` beside it for a person.
             clearance: least distance between pieces, metres.
-            touching: pairs of segment or object names whose clearance is zero.
+            touching: pairs of segment or object names whose clearance is zero; those of contact terms are added.
             range_of_motion: whether a person keeps its ranges of motion and reach cones.
             balance: whether the centre of mass stays above the feet; None if the figure is a person who stands.
 
@@ -98,7 +98,9 @@ class Problem:
             term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
         )
         self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
-        added = default_constraints(scene, self.start, stated, self.bounds, ranges=range_of_motion, balance=balance)
+        added = default_constraints(
+            scene, self.start, stated, self.bounds, self.goals, ranges=range_of_motion, balance=balance
+        )
         self.defaults: tuple[Constraint, ...] = tuple(term.resolve(scene, self.start) for term in added)
         self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
         pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
@@ -224,7 +226,8 @@ class Problem:
     def _clearances(self, workspace: Workspace) -> Array:
         pairs, owners = workspace.table.pairs, workspace.owners
         asked = np.full(len(pairs), self.clearance)
-        allowed = set(self.touching) | {(b, a) for a, b in self.touching}
+        brought = [pair for term in (*self.goals, *self.constraints) for pair in term.touching]
+        allowed = {*self.touching, *brought} | {(b, a) for a, b in (*self.touching, *brought)}
         if allowed:
             named = [(owners[a], owners[b]) in allowed for a, b in pairs]
             asked[np.array(named, dtype=bool)] = 0.0

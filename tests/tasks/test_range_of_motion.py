@@ -52,7 +52,7 @@ def test_an_extended_hip_takes_flexion_from_the_knee(man: wb.Figure, side: str) 
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_inward_rotation_lessens_as_the_arm_is_raised_aside(man: wb.Figure, side: str) -> None:
-    """At its side an arm turns inward freely, abducted by 80 by 70 degrees, by 120 not at all, overhead only outward."""
+    """An arm turns inward freely at its side, by 70 degrees abducted by 80, not at all by 120, outward overhead."""
     name, raised, turned = f"{side}_shoulder_twist", f"{side}_shoulder_abduction", f"{side}_shoulder_rotation"
     assert room(man, name, {turned: 70.0}) > 90.0
     assert room(man, name, {raised: 80.0, turned: 70.0}) == pytest.approx(0.0, abs=1e-6)
@@ -83,7 +83,7 @@ def test_twist_is_that_of_the_swing_and_twist_of_the_rotation(man: wb.Figure) ->
         q = pin.integrate(man.model, man.neutral, rng.normal(0.0, 0.5, man.model.nv))
         state = State(man.model).update(q)
         base, limb = (state.frame(man.frame_id(name)).rotation for name in ("thorax", "right_upper_arm"))
-        x, y, z, w = pin.Quaternion(part.center.T @ base.T @ limb).coeffs()
+        _, _, z, w = pin.Quaternion(part.center.T @ base.T @ limb).coeffs()
         twist = 2.0 * math.atan2(z, w)
         twist -= 2.0 * math.pi * round(twist / (2.0 * math.pi))
         height = -(base.T @ limb)[2, 2]

@@ -20,7 +20,7 @@ def scene() -> wb.Scene:
 
 
 def value(scene: wb.Scene, degrees: dict[str, float], tilt: float = 0.0) -> float:
-    """The measure where joints have these angles and the pelvis tips forward by `tilt` degrees, from the neutral one."""
+    """The measure where joints have these angles and the pelvis tips by `tilt` degrees, from a neutral start."""
     figure = scene.figure
     straight = pin.neutral(figure.model)
     q = figure.with_joints(straight, {joint: math.radians(angle) for joint, angle in degrees.items()})

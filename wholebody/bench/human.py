@@ -55,7 +55,7 @@ def measure(pictures: Path | None, *, quick: bool) -> Iterator[str | Measured]:
 
     Args:
         pictures: folder for a picture of each task; None draws none.
-        quick: one design case, no self-contacts but two, and three tasks.
+        quick: one design case and three tasks.
     """
     import wholebody as wb
 

@@ -42,8 +42,8 @@ class DampedLeastSquares:
     """Damped least squares, the textbook method: goals and equalities, limits by clamping, without contacts.
 
     Takes every goal, and constraints that are equalities (`Hold`, `Plane` with side "on"); bounds such as `Freeze` too.
-    Inequalities (`Balance`, `ReachCones`, `Plane` with side "above") are refused by name, but for those that a person has
-    by default: they are left to the assessment. Measures are reported, not
+    Inequalities (`Balance`, `ReachCones`, `Plane` with side "above") are refused by name, but for those that a person
+    has by default: they are left to the assessment. Measures are reported, not
     minimised: each step is the least motion, and there is one start. It may end in penetration, and then reports it.
 
     Attributes:

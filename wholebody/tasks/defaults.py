@@ -9,13 +9,16 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.tasks.balance import Balance
-from wholebody.tasks.base import Bound, Constraint, Measure, Surroundings
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
 from wholebody.tasks.bounds import Freeze
 from wholebody.tasks.effort import Effort
 from wholebody.tasks.hold import Hold
 from wholebody.tasks.range_of_motion import RangeOfMotion
 from wholebody.tasks.reach_cones import ReachCones
 from wholebody.tasks.rhythm import Rhythm, girdles_of
+from wholebody.tasks.sit import Sit
+from wholebody.tasks.stand import Stand
+from wholebody.tasks.touch import Lean
 
 FEET = ("left_foot", "right_foot")
 AS_AT_START = 1e-3
@@ -37,6 +40,7 @@ def default_constraints(
     start: Array,
     stated: Sequence[Constraint],
     bounds: Sequence[Bound],
+    goals: Sequence[Goal],
     *,
     ranges: bool,
     balance: bool | None,
@@ -48,6 +52,7 @@ def default_constraints(
         start: (nq,) the start.
         stated: resolved constraints.
         bounds: resolved bounds.
+        goals: resolved goals.
         ranges: whether ranges of motion and reach cones are kept.
         balance: whether to keep balance; None if the person stands.
     """
@@ -58,13 +63,15 @@ def default_constraints(
         found.append(RangeOfMotion())
     if ranges and figure.ranges and figure.cones and ReachCones not in known:
         found.append(ReachCones())
-    asked = stands(scene, start, stated, bounds) if balance is None else balance
-    if asked and Balance not in known:
+    asked = stands(scene, start, stated, bounds, goals) if balance is None else balance
+    if asked and not known & {Balance, Stand}:
         found.append(Balance())
     return found
 
 
-def stands(scene: Surroundings, start: Array, stated: Sequence[Constraint], bounds: Sequence[Bound]) -> bool:
+def stands(
+    scene: Surroundings, start: Array, stated: Sequence[Constraint], bounds: Sequence[Bound], goals: Sequence[Goal]
+) -> bool:
     """Whether a person stands: both feet are held where they are at the start, and nothing else carries it.
 
     Args:
@@ -72,11 +79,14 @@ def stands(scene: Surroundings, start: Array, stated: Sequence[Constraint], boun
         start: (nq,) the start.
         stated: resolved constraints.
         bounds: resolved bounds.
+        goals: resolved goals.
     """
     figure = scene.figure
     if figure.root != "free" or not figure.ranges or not set(FEET) <= set(figure.segments):
         return False
     if any(isinstance(bound, Freeze) and "root" in figure.joint_names(bound.joints) for bound in bounds):
+        return False
+    if any(isinstance(term, (Sit, Lean)) for term in (*stated, *goals)):
         return False
     feet = {int(scene.model.frames[figure.frame_id(foot)].parentJoint) for foot in FEET}
     held, state = set(), State(scene.model).update(start)

@@ -105,20 +105,20 @@ class Rhythm(Measure):
     def gradient(self, state: State) -> Array:
         """(nv,) derivative [1/rad]."""
         result = np.zeros(state.model.nv)
-        for weight, excess, places, slopes in self._parts(state.q):
+        for weight, excess, places, slopes in self.parts(state.q):
             result[places] += 2.0 * weight * excess * slopes
         return result
 
     def curvature(self, state: State) -> Array:
         """(nv,) row sums of the absolute second derivative of the squares, which bound it [1/rad^2]."""
         result = np.full(state.model.nv, LEAST_CURVATURE)
-        for weight, _, places, slopes in self._parts(state.q):
+        for weight, _, places, slopes in self.parts(state.q):
             steep = np.abs(slopes)
             result[places] += 2.0 * weight * steep * steep.sum()
         return result
 
-    def _parts(self, q: Array) -> list[tuple[float, float, list[int], Array]]:
-        """Weight, excess, places in the tangent and slopes there of each part."""
+    def parts(self, q: Array) -> list[tuple[float, float, list[int], Array]]:
+        """Weight, excess, places in the tangent and slopes there of each square."""
         found: list[tuple[float, float, list[int], Array]] = []
         for girdle in self.girdles:
             excess, slopes = _beyond(q, girdle)

@@ -116,7 +116,7 @@ def standing_problem(
 ) -> wb.Problem:
     """What is asked of a person: both feet stay where they are at the start (nq,), and all pairs `CLEARANCE` apart.
 
-    What a person keeps by default is left out, because most tools cannot be told of it, and known answers do not keep it.
+    What a person keeps by default is left out: most tools cannot be told of it, and known answers do not keep it.
     """
     feet = [wb.Hold(foot) for foot in FEET]
     return wb.Problem(

@@ -12,8 +12,8 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.methods.ccd.cones import guards
-from wholebody.methods.ccd.ranges import range_guards
 from wholebody.methods.ccd.limbs import Limbs, Placement, compiled_kernel, floats, moved, rotated
+from wholebody.methods.ccd.ranges import range_guards
 from wholebody.methods.ccd.sweep import Aims, sweep
 from wholebody.methods.ccd.terms import GoalPlace, Request
 from wholebody.methods.control import Control
