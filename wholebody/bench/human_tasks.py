@@ -245,18 +245,16 @@ def _largest(angles: Mapping[str, float], ending: str) -> float:
 def _draw(problem: Problem, q: Array, path: Path) -> None:
     from wholebody.view import Viewer
 
-    with Viewer(
-        problem.scene, contact_distance=-1.0, see_through=[n for n in problem.scene.objects if n == "door"]
-    ) as v:
-        v.show(q, problem=problem)
-        eye = np.array([2.9, -2.4, 1.75])
-        v.look(eye, (0.1, 0.0, 0.95))
-        v.picture(path, SIZE)
-        _smaller(path)
+    glass = [name for name in problem.scene.objects if name == "door"]
+    with Viewer(problem.scene, contact_distance=-1.0, see_through=glass) as viewer:
+        viewer.show(q)
+        viewer.look((3.5, -2.9, 1.9), (0.05, 0.0, 1.08))
+        viewer.picture(path, SIZE)
+    _smaller(path)
 
 
 def _smaller(path: Path) -> None:
-    """Reduce a picture to 128 colours, which is a third of its bytes."""
+    """Reduce a picture to 256 colours, which is half of its bytes."""
     from PIL import Image
 
-    Image.open(path).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(path, optimize=True)
+    Image.open(path).convert("RGB").quantize(256).save(path, optimize=True)
