@@ -25,6 +25,7 @@ Show in a browser. The command waits for the first tab, and ends when the last o
 EPILOG = """\
 examples:
   wholebody show human --posture sitting
+  wholebody show human --pieces                    # what contacts are measured with, instead of the body's surface
   wholebody show out/shelf/result.json
   wholebody show shelf.toml --port 7777            # on another machine: ssh -L 7777:localhost:7777 HOST, then this
   wholebody show shelf.toml --save shelf.png"""
@@ -36,6 +37,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     parser = commands.add_parser("show", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
     parser.add_argument("what", metavar="FIGURE|TASK|RESULT", help="what to show")
     parser.add_argument("--posture", metavar="NAME", help="name of a posture of the figure")
+    parser.add_argument("--pieces", action="store_true", help="draw the pieces that contacts are measured with")
     parser.add_argument("--save", type=Path, metavar="FILE", help="write FILE.html or FILE.png; open no browser")
     parser.add_argument(
         "--port", type=int, default=0, metavar="N", help="port of the live page (default: a free one from 7000)"
@@ -61,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.posture is not None:
         q = problem.scene.figure.posture(arguments.posture)
     with viewer_of(problem, view, title, host=arguments.host, port=arguments.port) as viewer:
-        viewer.show(q, problem=problem)
+        viewer.show(q, problem=problem, pieces=arguments.pieces)
         if save is None:
             print(f"showing {title} at {viewer.url}; Ctrl-C ends it", flush=True)
             viewer.open()

@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.errors import InputError
+from wholebody.figures.anthropometry import Body
 
 
 class Solid(NamedTuple):
@@ -75,7 +76,8 @@ class BodySpec:
         links: the root link first.
         joints: in the order of the links they end in.
         landmarks: frames for goals.
-        solids: collision pieces, which are also drawn.
+        solids: collision pieces.
+        person: whose body it is.
     """
 
     name: str
@@ -84,6 +86,7 @@ class BodySpec:
     joints: tuple[Joint, ...]
     landmarks: tuple[Landmark, ...]
     solids: tuple[Solid, ...]
+    person: Body | None = None
 
 
 def place(x: float = 0.0, y: float = 0.0, z: float = 0.0, rotation: Array | None = None) -> pin.SE3:

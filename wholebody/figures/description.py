@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array, Indices
+from wholebody.figures.anthropometry import Body
 from wholebody.figures.motion_ranges import MotionRange
 from wholebody.figures.reach_cones import ReachCone
 
@@ -146,6 +147,7 @@ class Description(NamedTuple):
         ranges: ranges of motion that more than one joint angle decides; a problem takes them by default.
         root_effort: weight of the root's position [rad^2/m^2] and of its rotation in the effort.
         notes: sentences on what had to be changed about the geometry of a file.
+        person: sex, stature and mass of the figure or of the hand's owner; None for a figure of a file.
     """
 
     groups: Mapping[str, tuple[str, ...]]
@@ -160,6 +162,7 @@ class Description(NamedTuple):
     ranges: Mapping[str, MotionRange] = MappingProxyType({})
     root_effort: tuple[float, float] = (0.0, 0.0)
     notes: tuple[str, ...] = ()
+    person: Body | None = None
 
 
 def limits_of(model: pin.Model) -> Limits:

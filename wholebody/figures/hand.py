@@ -88,6 +88,7 @@ def hand_spec(side: str = "right", person: Body | None = None) -> BodySpec:
         joints=tuple(joints),
         landmarks=tuple(marks),
         solids=tuple(solids),
+        person=person,
     )
 
 
@@ -99,7 +100,12 @@ def hand_figure(
     percentile: float | None = None,
 ) -> Figure:
     """Return a hand with a free root at the wrist; arguments as for `hand_spec` and the person."""
-    spec = hand_spec(side, body(sex, stature, mass, percentile))
+    return hand_figure_of(body(sex, stature, mass, percentile), side)
+
+
+def hand_figure_of(person: Body, side: str) -> Figure:
+    """Return the hand of a person; the side as for `hand_spec`."""
+    spec = hand_spec(side, person)
     model = model_of(spec)
     tested, excluded = _pairs(spec.solids)
     names = tuple(joint.name for joint in spec.joints)
@@ -111,6 +117,7 @@ def hand_figure(
         segments=tuple(solid.segment for solid in spec.solids),
         postures={name: partial(_posture, side=side, degrees=degrees) for name, degrees in POSTURES.items()},
         excluded=excluded,
+        person=spec.person,
     )
     return Figure(spec.name, model, geometry_of(model, spec.solids, tested), "hulls", description)
 

@@ -43,6 +43,7 @@ def human_spec(person: Body | None = None, detail: str = "capsules") -> BodySpec
         joints=_joints(person),
         landmarks=landmarks(Dimensions(person)),
         solids=human_solids(person, detail),
+        person=person,
     )
 
 

@@ -71,6 +71,7 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
         collision_groups={segment: collision_group(segment) for segment in segments},
         effort={row["name"]: float(row["effort_weight"]) for row in table("joints")},
         excluded=(*(ExcludedPair(*entry) for entry in excluded), *rigid),
+        person=spec.person,
         ranges={} if sex is None else human_ranges(sex, joints),
         root_effort=(0.0, 0.0) if sex is None else ROOT_EFFORT,
     )

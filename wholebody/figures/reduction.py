@@ -67,6 +67,7 @@ def reduced_parts(figure: Articulated, keep: tuple[str, ...], q: Array) -> Reduc
         ranges=_ranges(old.ranges, names, figure.joint_values(q), frames),
         root_effort=old.root_effort,
         notes=old.notes,
+        person=old.person,
     )
     return ReducedParts(small, geometry, visual, description)
 

@@ -1,4 +1,4 @@
-"""Cache of convex pieces of meshes on disk: loading an entry takes milliseconds, making it takes seconds.
+"""Cache of convex pieces of meshes, and of what else takes seconds to make, on disk: loading takes milliseconds.
 
 An entry is one file, named by a hash of the mesh and the settings. It is written under a temporary name and renamed, so
 any number of processes may read and write at once. It begins with its checksum; an entry whose checksum does not match
@@ -15,7 +15,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -23,6 +23,8 @@ import pinocchio as pin
 from wholebody.geometry.hull import coal_convex
 from wholebody.geometry.pieces import Piece
 from wholebody.version import __version__
+
+T = TypeVar("T")
 
 VARIABLE = "WHOLEBODY_CACHE"
 """Environment variable that names another folder for the cache."""
@@ -44,6 +46,7 @@ STALE = 600.0
 
 _FORMAT = "1"
 _SUFFIX = ".pieces"
+_OTHER = ".made"
 _PART = ".part"
 _CHECKSUM = hashlib.sha256().digest_size
 
@@ -70,7 +73,7 @@ class CacheState(NamedTuple):
 
     Attributes:
         folder: its folder.
-        entries: number of cached meshes.
+        entries: number of cached meshes and surfaces.
         size: bytes.
         writable: whether this process can write there.
     """
@@ -104,12 +107,30 @@ def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[
     for part in content:
         digest.update(hashlib.sha256(part).digest())
     path = cache_folder() / f"{digest.hexdigest()}{_SUFFIX}"
-    found = _read(path)
+    found = _read(path, _unpacked)
     if found is not None:
         return found._replace(notes=tuple(what + note for note in found.notes))
     made = make()
-    _write(path, made._replace(notes=tuple(note.removeprefix(what) for note in made.notes)))
+    _write(path, _packed(made._replace(notes=tuple(note.removeprefix(what) for note in made.notes))))
     return made
+
+
+def cached_entry(key: str, make: Callable[[], T], packed: Callable[[T], bytes], unpacked: Callable[[bytes], T]) -> T:
+    """Return something from the cache, or make and cache it; both times it is what `unpacked` reads.
+
+    Args:
+        key: hexadecimal digest of what it is made from, and of the way it is made.
+        make: makes it.
+        packed: its bytes.
+        unpacked: what the bytes say.
+    """
+    path = cache_folder() / f"{key}{_OTHER}"
+    found = _read(path, unpacked)
+    if found is not None:
+        return found
+    data = packed(make())
+    _write(path, data)
+    return unpacked(data)
 
 
 def cache_state() -> CacheState:
@@ -125,12 +146,12 @@ def cache_state() -> CacheState:
 def clear_cache() -> CacheState:
     """Remove all entries; return the state before."""
     state = cache_state()
-    for file in [*state.folder.glob(f"*{_SUFFIX}"), *state.folder.glob(f"*{_PART}")]:
+    for file in [file for ending in (_SUFFIX, _OTHER, _PART) for file in state.folder.glob(f"*{ending}")]:
         file.unlink(missing_ok=True)
     return state
 
 
-def _read(path: Path) -> ConvexPieces | None:
+def _read(path: Path, unpacked: Callable[[bytes], T]) -> T | None:
     try:
         data = path.read_bytes()
     except OSError:
@@ -138,8 +159,8 @@ def _read(path: Path) -> ConvexPieces | None:
     try:
         if hashlib.sha256(data[_CHECKSUM:]).digest() != data[:_CHECKSUM]:
             raise ValueError("the checksum does not match")
-        found = _unpacked(data[_CHECKSUM:])
-    except Exception:  # another program's file, or a faulty disk: make the pieces anew
+        found = unpacked(data[_CHECKSUM:])
+    except Exception:  # another program's file, or a faulty disk: make it anew
         path.unlink(missing_ok=True)
         return None
     try:
@@ -150,9 +171,8 @@ def _read(path: Path) -> ConvexPieces | None:
     return found
 
 
-def _write(path: Path, pieces: ConvexPieces) -> None:
+def _write(path: Path, packed: bytes) -> None:
     global _writes
-    packed = _packed(pieces)
     part: str | None = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -194,7 +214,7 @@ def _evict(folder: Path) -> None:
 def _entries(folder: Path) -> list[tuple[float, int, Path]]:
     """Time of last use, size and path of every entry; another process may remove some meanwhile."""
     found = []
-    for file in folder.glob(f"*{_SUFFIX}"):
+    for file in [file for ending in (_SUFFIX, _OTHER) for file in folder.glob(f"*{ending}")]:
         try:
             status = file.stat()
         except OSError:

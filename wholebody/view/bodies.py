@@ -1,4 +1,4 @@
-"""The figure's pieces and the things around it: one node per joint, its pieces fixed children."""
+"""The figure's body or pieces, and the things around it: one node per joint, its pieces fixed children."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.view import drawing, style
 from wholebody.view.scene_graph import Keyframe, SceneGraph
+from wholebody.view.skin import Skin, Skinned, path_of
 from wholebody.view.style import Color
+from wholebody.view.surface import surface_of
 from wholebody.view.viewed_scene import ViewedScene
 
 
@@ -46,12 +48,13 @@ class Body:
 class Bodies:
     """All pieces of a scene in the scene graph, in the order of its geometry model."""
 
-    def __init__(self, scene: ViewedScene, see_through: Collection[str]) -> None:
+    def __init__(self, scene: ViewedScene, see_through: Collection[str], pieces: bool) -> None:
         """Read the scene.
 
         Args:
             scene: the scene to draw.
             see_through: names of things to draw transparent.
+            pieces: draw the figure's pieces even if its body has a surface.
         """
         self.scene = scene
         self.see_through = frozenset(see_through)
@@ -68,6 +71,14 @@ class Bodies:
             plate = type(piece.geometry).__name__ == "Halfspace"
             self.all.append(Body(carrier, f"{carrier}/{node(piece.name)}", int(piece.parentJoint), thing, color, plate))
         self.carriers = {body.carrier: body.joint for body in self.all}
+        self.pieces = pieces
+        surface = None if pieces else surface_of(scene.figure)
+        self._skin = Skin(surface, scene.figure) if surface is not None else None
+        self._nodes: dict[str, str] = {}
+        for joint in self._skin.joints if self._skin is not None else ():
+            self._nodes[joint] = f"{style.FIGURE_NODE}/{node(joint)}"
+            self.carriers[self._nodes[joint]] = int(scene.model.getJointId(joint))
+        self._patches: list[Skinned] = []
         self._things = [index for index, body in enumerate(self.all) if body.thing is not None]
 
     def _thing_color(self, thing: str, number: int, piece: Any) -> Color:
@@ -85,7 +96,11 @@ class Bodies:
         """Put every piece in the scene graph, in place of earlier ones."""
         graph.remove(style.FIGURE_NODE)
         graph.remove(style.OBJECT_NODE)
+        if self._skin is not None:
+            self._patches = self._skin.build(graph, path_of(""), self._nodes, None)
         for body, piece in zip(self.all, self.scene.geometry.geometryObjects, strict=True):
+            if self._hidden(body):
+                continue
             graph.put(body.path, drawing.piece(piece.geometry, body.path, body.color))
             graph.place(body.path, piece.placement.homogeneous)
         floor = next(
@@ -101,6 +116,20 @@ class Bodies:
         grid[:3, 3] += 0.0015 * grid[:3, 2]  # m: above the floor, otherwise the two flicker
         graph.place("/Grid", grid)
 
+    def _hidden(self, body: Body) -> bool:
+        """Whether a piece is not drawn, because the surface of its body is."""
+        return self._skin is not None and body.thing is None
+
+    def paint(self, keyframe: Keyframe, index: int, state: Color) -> None:
+        """Give a piece the colour of a state, or the patches of the surface on its segment."""
+        body = self.all[index]
+        if not self._hidden(body):
+            keyframe.colors[body.path] = body.state_color(state)
+            return
+        for patch in self._patches:
+            if patch.segment == self.scene.piece_owner[index]:
+                keyframe.colors[patch.path] = style.tinted(patch.color, state, style.PAINT)
+
     def pose(self, keyframe: Keyframe, data: Any) -> None:
         """Place the joints by `data`, and the things at their present placements."""
         for path, joint in self.carriers.items():
@@ -109,13 +138,20 @@ class Bodies:
         for index in self._things:
             keyframe.transforms[self.all[index].path] = pieces[index].placement.homogeneous
         for body in self.all:
-            keyframe.colors[body.path] = body.color
+            if not self._hidden(body):
+                keyframe.colors[body.path] = body.color
+        for patch in self._patches:
+            keyframe.colors[patch.path] = patch.color
 
     def ghost(self, graph: SceneGraph, number: int, data: Any, color: Color) -> None:
         """Draw the figure and what it carries once more, transparent, at the posture of `data`."""
         root = f"{style.GHOST_NODE}/{number}"
+        if self._skin is not None:
+            self._skin.build(graph, path_of(root), {joint: root + path for joint, path in self._nodes.items()}, color)
+            for path in self._nodes.values():
+                graph.place(f"{root}{path}", data.oMi[self.carriers[path]].homogeneous)
         for body, piece in zip(self.all, self.scene.geometry.geometryObjects, strict=True):
-            if body.joint == 0 and body.thing is not None:
+            if (body.joint == 0 and body.thing is not None) or self._hidden(body):
                 continue
             path = f"{root}{body.path}"
             graph.put(path, drawing.piece(piece.geometry, path, color))

@@ -10,6 +10,7 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.view.server import ANIMATION, DELETE, OBJECT, PROPERTY, STOP, TRANSFORM, Command
+from wholebody.view.surface import Patch
 
 _FLOATS, _INTEGERS = 0x17, 0x16  # msgpack extension types: Float32Array, Uint32Array
 
@@ -39,6 +40,61 @@ def label(path: str, text: str, color: str, size: float) -> Command:
         size: height, as a fraction of the distance from the camera.
     """
     return Command(OBJECT, path, "", pack({"type": "label", "path": path, "text": text, "color": color, "size": size}))
+
+
+def set_skeleton(
+    path: str, carriers: Sequence[str], offsets: Array, inverses: Array, halves: Sequence[tuple[int, int, int]]
+) -> Command:
+    """Put a skeleton at a node: bones that follow other nodes, and bend the skins that name it.
+
+    Args:
+        path: the node.
+        carriers: for each of n bones the node that it follows.
+        offsets: (n, 4, 4) placement of each bone relative to its carrier.
+        inverses: (n, 4, 4) inverse of each bone's placement where the skin was bound to it.
+        halves: bones that turn half way between two others: index of the bone, of the first and of the second, at
+            whose origin it is.
+    """
+    message = {
+        "type": "skeleton",
+        "path": path,
+        "carriers": list(carriers),
+        "offsets": _numbers(np.swapaxes(offsets, 1, 2), "<f4"),
+        "inverses": _numbers(np.swapaxes(inverses, 1, 2), "<f4"),
+        "halves": [list(half) for half in halves],
+    }
+    return Command(OBJECT, path, "", pack(message))
+
+
+def set_skin(path: str, skeleton: str, patch: Patch, color: tuple[float, ...], unit: float) -> Command:
+    """Put a patch of a body's surface at a node.
+
+    Args:
+        path: the node.
+        skeleton: node of its skeleton, which is put before it.
+        patch: the patch; at most 65,536 vertices and 256 bones.
+        color: red, green, blue, alpha.
+        unit: metres; positions are rounded to it.
+    """
+    weights = np.round(255.0 * patch.weights).astype(int)
+    weights[:, 0] += 255 - weights.sum(axis=1)  # the strongest takes the rounding: the page adds them up unscaled
+    message = {
+        "type": "skin",
+        "path": path,
+        "skeleton": skeleton,
+        "unit": unit,
+        "position": _numbers(np.round(patch.vertices / unit), "<i2"),
+        "normal": _numbers(np.round(127.0 * patch.normals), "i1"),
+        "bones": _numbers(patch.bones, "u1"),
+        "weights": _numbers(weights, "u1"),
+        "index": _numbers(patch.faces, "<u2"),
+        "color": [float(part) for part in color],
+    }
+    return Command(OBJECT, path, "", pack(message))
+
+
+def _numbers(values: Any, kind: str) -> bytes:
+    return np.ascontiguousarray(values).astype(kind).tobytes()
 
 
 def set_transform(path: str, matrix: Array) -> Command:

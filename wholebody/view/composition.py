@@ -41,6 +41,7 @@ class Composition:
         self._scene, self._graph = scene, graph
         self._contact_distance, self._see_through, self._names = contact_distance, see_through, names
         self._state = State(scene.model)
+        self.pieces = False
         self._bodies: Bodies | None = None
         self._goals: Goals | None = None
         self._frames: tuple[str, ...] = ()
@@ -64,11 +65,12 @@ class Composition:
 
     @property
     def bodies(self) -> Bodies:
-        """The pieces; drawn when they are first needed, and again after things were added or removed."""
-        if self._bodies is None or self._bodies.revision != self._scene.revision:
-            self._bodies = Bodies(self._scene, self._see_through)
-            self._bodies.build(self._graph)
-        return self._bodies
+        """The body or pieces, and things; drawn when first needed, and again after things were added or removed."""
+        drawn = self._bodies
+        if drawn is None or drawn.revision != self._scene.revision or drawn.pieces != self.pieces:
+            drawn = self._bodies = Bodies(self._scene, self._see_through, self.pieces)
+            drawn.build(self._graph)
+        return drawn
 
     def checked(self, q: Any) -> Array:
         """Copy of a posture (nq,).

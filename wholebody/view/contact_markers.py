@@ -29,8 +29,7 @@ def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts)
         (contacts.pair[np.asarray(contacts.distance) < -PENETRATION], style.PENETRATION),
     ):
         for index in np.unique(pairs):
-            body = bodies.all[int(index)]
-            keyframe.colors[body.path] = body.state_color(state)
+            bodies.paint(keyframe, int(index), state)
 
 
 def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) -> None:

@@ -89,6 +89,56 @@
     viewer.set_object(cmd.path.split("/").filter(x => x), sprite);
   }
 
+  // Bones follow nodes of the scene; some turn half way between two others. Bodies are bent by them.
+  const skeletons = new Map();
+  const parts = path => path.split("/").filter(x => x);
+  const numbers = (Kind, bytes) => new Kind(new Uint8Array(bytes).buffer);
+  const matrices = bytes => {
+    const values = numbers(Float32Array, bytes), found = [];
+    for (let at = 0; at < values.length; at += 16) found.push(new THREE.Matrix4().fromArray(values, at));
+    return found;
+  };
+
+  function skeleton(cmd) {
+    const nodes = cmd.carriers.map(path => viewer.scene_tree.find(parts(path)).object);
+    const offsets = matrices(cmd.offsets);
+    const made = new THREE.Skeleton(nodes.map(() => new THREE.Bone()), matrices(cmd.inverses));
+    const first = new THREE.Quaternion(), second = new THREE.Quaternion();
+    const at = new THREE.Vector3(), size = new THREE.Vector3(), nowhere = new THREE.Vector3();
+    const update = made.update.bind(made);
+    made.update = function () {
+      nodes.forEach((node, k) => made.bones[k].matrixWorld.multiplyMatrices(node.matrixWorld, offsets[k]));
+      for (const [half, from, to] of cmd.halves) {
+        made.bones[from].matrixWorld.decompose(nowhere, first, size);
+        made.bones[to].matrixWorld.decompose(at, second, size);
+        made.bones[half].matrixWorld.compose(at, first.slerp(second, 0.5), size);
+      }
+      update();
+    };
+    skeletons.set(cmd.path, made);
+  }
+
+  function skin(cmd) {
+    const shape = new THREE.BufferGeometry();
+    const position = Float32Array.from(numbers(Int16Array, cmd.position), x => x * cmd.unit);
+    shape.setAttribute("position", new THREE.BufferAttribute(position, 3));
+    const normal = Float32Array.from(numbers(Int8Array, cmd.normal), x => x / 127);
+    shape.setAttribute("normal", new THREE.BufferAttribute(normal, 3));
+    shape.setAttribute("skinIndex", new THREE.BufferAttribute(numbers(Uint8Array, cmd.bones), 4));
+    shape.setAttribute("skinWeight", new THREE.BufferAttribute(numbers(Uint8Array, cmd.weights), 4, true));
+    shape.setIndex(new THREE.BufferAttribute(numbers(Uint16Array, cmd.index), 1));
+    const [r, g, b, alpha] = cmd.color;
+    const material = new THREE.MeshPhongMaterial({
+      color: new THREE.Color(r, g, b), opacity: alpha, transparent: alpha < 1, shininess: 10, specular: 0x141414,
+      polygonOffset: alpha < 1, polygonOffsetFactor: 2, polygonOffsetUnits: 8,
+    });
+    const mesh = new THREE.SkinnedMesh(shape, material);
+    mesh.frustumCulled = false; // its box is that of the binding posture
+    mesh.castShadow = mesh.receiveShadow = alpha === 1;
+    mesh.bind(skeletons.get(cmd.skeleton), new THREE.Matrix4());
+    viewer.set_object(parts(cmd.path), mesh);
+  }
+
   // Lifts labels that would cover each other, the lower ones first in place, by whole label heights.
   function arrange() {
     const up = Math.tan(viewer.camera.fov * Math.PI / 360);
@@ -158,6 +208,8 @@
   viewer.handle_command = function (cmd) {
     if (cmd.type === "label") label(cmd);
     else if (cmd.type === "look") look(cmd);
+    else if (cmd.type === "skeleton") skeleton(cmd);
+    else if (cmd.type === "skin") skin(cmd);
     else obey(cmd);
     if (cmd.type === "set_animation") show_bar(cmd.animations.length > 0);
     viewer.set_dirty();

@@ -101,17 +101,19 @@ class Viewer:
 
     # ---- content
 
-    def show(self, q: ArrayLike, *, problem: Any = None) -> None:
+    def show(self, q: ArrayLike, *, problem: Any = None, pieces: bool = False) -> None:
         """Show a posture. Only changes are sent to the live page; it can be called sixty times a second.
 
         Args:
             q: (nq,) posture.
             problem: a `wholebody.Problem`, whose goals are drawn with their remaining errors and their
                 blockers.
+            pieces: draw the figure's pieces, with which contacts are measured, instead of its body's surface.
 
         Raises:
             InputError: q has the wrong shape or is not finite.
         """
+        self._composition.pieces = checks.flag(pieces, "pieces")
         posture = self._composition.checked(q)
         blockers = assess(problem, posture).blockers if isinstance(problem, Problem) else ()
         keyframe = self._composition.keyframe(posture, problem, blockers)
@@ -121,7 +123,14 @@ class Viewer:
         self._graph.show(keyframe)
 
     def play(
-        self, motion: Any, dt: float | None = None, *, problem: Any = None, ghost: Any = None, repeat: float = 1
+        self,
+        motion: Any,
+        dt: float | None = None,
+        *,
+        problem: Any = None,
+        ghost: Any = None,
+        repeat: float = 1,
+        pieces: bool = False,
     ) -> None:
         """Let the page play a motion; returns at once. The page has a bar to pause and scrub.
 
@@ -131,10 +140,12 @@ class Viewer:
             problem: a `wholebody.Problem` whose goals are drawn.
             ghost: the same number of postures, shown transparent; they replace earlier ghosts.
             repeat: number of times it is played; `math.inf` for ever.
+            pieces: draw the figure's pieces instead of its body's surface.
 
         Raises:
             InputError: there is no posture, one has the wrong shape, or the time step or the repeats are not positive.
         """
+        self._composition.pieces = checks.flag(pieces, "pieces")
         given = checks.listed(getattr(motion, "q", motion), "motion", "postures, each of shape (nq,)")
         postures = [self._composition.checked(q) for q in given]
         if not postures:
@@ -188,7 +199,7 @@ class Viewer:
         self._composition.frames(given, checks.number(length, "length", 1e-3, FARTHEST, "m"))
         if self._shown is not None:
             q, problem = self._shown
-            self.show(q, problem=problem)
+            self.show(q, problem=problem, pieces=self._composition.pieces)
 
     def look(self, eye: ArrayLike | None = None, target: ArrayLike | None = None) -> None:
         """Set the camera; without arguments it looks at the figure.

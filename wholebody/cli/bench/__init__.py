@@ -11,6 +11,7 @@ from wholebody.cli.bench import (
     compare,
     detail,
     export,
+    human,
     judge,
     leaderboard,
     loads,
@@ -60,5 +61,6 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         ablation,
         regress,
         world,
+        human,
     ):
         command.add_to(kinds)

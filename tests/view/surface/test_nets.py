@@ -1,0 +1,61 @@
+"""Surfaces of fields whose volume and area are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from wholebody.view.surface.fields import ball, box, ellipsoid, half_space, intersection, round_cone, union, without
+from wholebody.view.surface.nets import triangles
+
+LOW, HIGH = np.full(3, -0.2), np.full(3, 0.2)
+
+
+def test_a_ball_has_its_volume_its_area_and_its_normals() -> None:
+    found = triangles(ball((0.01, 0.0, 0.02), 0.1), LOW, HIGH, 0.01)
+    mesh = trimesh.Trimesh(found.vertices, found.faces, process=False)
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(4 / 3 * np.pi * 0.1**3, rel=0.01)
+    assert mesh.area == pytest.approx(4 * np.pi * 0.1**2, rel=0.01)
+    outward = (found.vertices - [0.01, 0.0, 0.02]) / 0.1
+    np.testing.assert_allclose(found.normals, outward, atol=1e-3)
+    np.testing.assert_allclose(np.linalg.norm(outward, axis=1), 1.0, atol=1e-6)
+
+
+def test_a_round_cone_is_the_hull_of_its_two_balls() -> None:
+    a, b = np.array([0.0, 0.0, -0.05]), np.array([0.02, 0.03, 0.08])
+    points = np.random.default_rng(1).uniform(-0.2, 0.2, (2000, 3))
+    shares = np.linspace(0.0, 1.0, 4001)
+    centers, radii = a + shares[:, None] * (b - a), 0.06 + shares * (0.03 - 0.06)
+    nearest = np.array([(np.linalg.norm(centers - point, axis=1) - radii).min() for point in points])
+    np.testing.assert_allclose(round_cone(a, b, 0.06, 0.03)(points), nearest, atol=1e-6)
+    np.testing.assert_allclose(round_cone(b, a, 0.03, 0.06)(points), nearest, atol=1e-6)
+
+
+def test_a_ball_within_the_other_is_left_out() -> None:
+    points = np.random.default_rng(2).uniform(-0.2, 0.2, (100, 3))
+    large = ball((0.0, 0.0, 0.0), 0.1)(points)
+    np.testing.assert_allclose(round_cone((0.0, 0.0, 0.0), (0.02, 0.0, 0.0), 0.1, 0.05)(points), large)
+    np.testing.assert_allclose(round_cone((0.02, 0.0, 0.0), (0.0, 0.0, 0.0), 0.05, 0.1)(points), large)
+
+
+def test_union_and_difference_divide_the_volume() -> None:
+    first, second = ball((0.0, 0.0, 0.0), 0.1), half_space((0.0, 0.0, 0.03), (0.0, 0.0, 1.0))
+    cap = np.pi * 0.07**2 * (3 * 0.1 - 0.07) / 3
+    for field, volume in (
+        (without(first, second), cap),
+        (intersection(first, second), 4 / 3 * np.pi * 0.1**3 - cap),
+        (union([first, box((0.0, 0.0, 0.0), (0.02, 0.02, 0.02))]), 4 / 3 * np.pi * 0.1**3),
+    ):
+        found = triangles(field, LOW, HIGH, 0.008)
+        mesh = trimesh.Trimesh(found.vertices, found.faces, process=False)
+        assert mesh.volume == pytest.approx(volume, rel=0.02)
+
+
+def test_a_smooth_union_only_adds() -> None:
+    points = np.random.default_rng(3).uniform(-0.2, 0.2, (1000, 3))
+    parts = [ball((-0.05, 0.0, 0.0), 0.07), ellipsoid((0.06, 0.0, 0.0), (0.08, 0.05, 0.04))]
+    sharp, smooth = union(parts)(points), union(parts, 0.04)(points)
+    assert (smooth <= sharp).all()
+    assert (sharp - smooth).max() <= 0.01 + 1e-12

@@ -1,0 +1,212 @@
+"""The body's surface: closed, near the pieces, moved as the segments move, and kept on disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from wholebody.figures import load
+from wholebody.geometry.mesh_cache import VARIABLE, cache_state
+from wholebody.view.surface import Surface, surface_of
+from wholebody.view.surface import surface as surfaces
+
+PEOPLE: dict[str, dict[str, Any]] = {
+    "median man": {},
+    "small woman": {"sex": "female", "stature": 1.525, "mass": 51.3},
+    "heavy man": {"sex": "male", "stature": 1.87, "mass": 125.0},
+}
+
+NEAR = 0.020
+"""Metres: no piece comes farther out of the surface than this; hands, feet and head are shaped on their own."""
+
+SHARE = 0.05
+"""Share of the pieces' points that come out by more than 3 mm, at most."""
+
+
+def bent(figure: Any, surface: Surface, q: Any) -> list[Any]:
+    """Vertices (n, 3) of every part at a posture, by linear blend skinning as the page does it."""
+    data = figure.model.createData()
+    pin.framesForwardKinematics(figure.model, data, q)
+    moved = {}
+    for number, bone in enumerate(surface.bones):
+        if bone.segment in figure.segments:
+            place = data.oMf[figure.frame_id(bone.segment)].homogeneous
+        else:
+            place = data.oMf[figure.frame_id(bone.instead)].homogeneous @ bone.rest
+        if bone.parent is not None:
+            place = surfaces.halfway(data.oMf[figure.frame_id(bone.parent)].homogeneous, place)
+        moved[number] = place @ np.linalg.inv(bone.bind)
+    every = np.array([moved[number] for number in range(len(surface.bones))])
+    found = []
+    for part in surface.parts:
+        blend = np.einsum("nk,nkij->nij", part.weights, every[part.bones])
+        ones = np.column_stack([part.surface.vertices, np.ones(len(part.surface.vertices))])
+        found.append(np.einsum("nij,nj->ni", blend, ones)[:, :3])
+    return found
+
+
+def is_closed(faces: Any) -> bool:
+    """Whether every directed edge is there as often as its reverse."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    size = int(faces.max()) + 1
+    forth = np.sort(edges[:, 0] * size + edges[:, 1])
+    back = np.sort(edges[:, 1] * size + edges[:, 0])
+    return bool((forth == back).all())
+
+
+def sample(piece: Any, count: int = 60) -> Any:
+    """Points on a capsule's, sphere's or box's surface, in its own frame."""
+    directions = np.random.default_rng(0).normal(size=(count, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    shape = piece.geometry
+    kind = type(shape).__name__
+    if kind == "Box":
+        return directions / np.abs(directions / np.asarray(shape.halfSide)).max(axis=1, keepdims=True)
+    points = float(shape.radius) * directions
+    if kind == "Capsule":
+        points[:, 2] += np.linspace(-1.0, 1.0, count) * float(shape.halfLength)
+    return points
+
+
+@pytest.mark.parametrize("who", PEOPLE)
+def test_every_part_is_closed_and_weights_add_up(who: str) -> None:
+    surface = surface_of(load("human", **PEOPLE[who]))
+    assert surface is not None
+    assert {part.name for part in surface.parts} >= {"shirt", "trousers", "head", "hair", "left_hand", "right_shoe"}
+    for part in surface.parts:
+        assert is_closed(part.surface.faces), part.name
+        assert part.surface.faces.max() == len(part.surface.vertices) - 1
+        np.testing.assert_allclose(part.weights.sum(axis=1), 1.0, atol=1e-5)
+        np.testing.assert_allclose(np.linalg.norm(part.surface.normals, axis=1), 1.0, atol=1e-3)
+        assert np.isfinite(part.surface.vertices).all()
+
+
+@pytest.mark.parametrize("who", PEOPLE)
+def test_the_pieces_are_near_the_surface(who: str) -> None:
+    from scipy.spatial import cKDTree
+
+    figure = load("human", **PEOPLE[who])
+    surface = surface_of(figure)
+    assert surface is not None
+    q = figure.posture("a_pose")
+    data = figure.model.createData()
+    pin.forwardKinematics(figure.model, data, q)
+    moved = bent(figure, surface, q)
+    tree = cKDTree(np.concatenate(moved))
+    out = []
+    for piece in figure.geometry.geometryObjects:
+        if any(part in piece.name for part in ("hand", "head", "foot", "toes", "thumb", "finger")):
+            continue
+        place = data.oMi[piece.parentJoint] * piece.placement
+        places = sample(piece) @ place.rotation.T + place.translation
+        outside = np.ones(len(places), dtype=bool)
+        for part, points in zip(surface.parts, moved, strict=True):
+            if part.name in ("shirt", "trousers", "head"):
+                outside &= turns(places, points[part.surface.faces]) < 0.5
+        distance, _ = tree.query(places)
+        out.append(np.where(outside, distance, 0.0))
+    above = np.concatenate(out)
+    assert above.max() < NEAR
+    assert np.mean(above > 0.003) < SHARE
+
+
+def turns(points: Any, corners: Any) -> Any:
+    """Winding numbers (n,) of a closed surface of triangles (m, 3, 3) around points: 1 inside, 0 outside.
+
+    By the solid angles of its triangles (van Oosterom & Strackee, IEEE Trans. Biomed. Eng. 30(2), 1983).
+    """
+    found = np.empty(len(points))
+    for number, point in enumerate(points):
+        a, b, c = np.moveaxis(corners - point, 1, 0)
+        la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+        ab, bc, ca = (np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a)))
+        volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+        found[number] = np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2.0 * np.pi)
+    return found
+
+
+def test_the_patches_cover_every_part_once() -> None:
+    surface = surface_of(load("human"))
+    assert surface is not None
+    patches = surface.patches()
+    assert len({patch.name for patch in patches}) == len(patches)
+    for part in surface.parts:
+        own = [patch for patch in patches if patch.name.startswith(f"{part.name}:")]
+        corners = np.concatenate([patch.vertices[patch.faces].reshape(-1, 9) for patch in own])
+        whole = part.surface.vertices[part.surface.faces].reshape(-1, 9)
+        assert len(corners) == len(whole)
+        np.testing.assert_array_equal(corners[np.lexsort(corners.T)], whole[np.lexsort(whole.T)])
+    assert max(len(patch.vertices) for patch in patches) < 2**16
+    assert {patch.segment for patch in patches} >= {"head", "thorax", "pelvis", "left_thigh", "right_forearm"}
+
+
+@pytest.mark.parametrize("name", ["human", "avatar"])
+def test_what_is_far_from_a_joint_moves_with_its_segment(name: str) -> None:
+    figure = load(name)
+    surface = surface_of(figure)
+    assert surface is not None
+    q = figure.with_joints(figure.posture("standing"), {"left_elbow_flexion": 1.5, "right_knee_flexion": 1.2})
+    data = figure.model.createData()
+    pin.framesForwardKinematics(figure.model, data, q)
+    names = [bone.segment for bone in surface.bones]
+    for part, moved in zip(surface.parts, bent(figure, surface, q), strict=True):
+        firm = part.weights[:, 0] > 0.999
+        for segment in ("left_forearm", "right_shank", "head"):
+            number = names.index(segment)
+            chosen = firm & (part.bones[:, 0] == number)
+            placement = data.oMf[figure.frame_id(segment)].homogeneous @ np.linalg.inv(surface.bones[number].bind)
+            expected = part.surface.vertices[chosen] @ placement[:3, :3].T + placement[:3, 3]
+            np.testing.assert_allclose(moved[chosen], expected, atol=2e-3)
+
+
+def test_the_index_finger_ends_where_the_frame_is() -> None:
+    figure = load("human")
+    surface = surface_of(figure)
+    assert surface is not None
+    q = figure.posture("t_pose")
+    for part, moved in zip(surface.parts, bent(figure, surface, q), strict=True):
+        if part.name.endswith("_hand"):
+            side = part.name.partition("_")[0]
+            frame = figure.placement(q, f"{side}_index_tip")
+            local = (moved - frame.translation) @ frame.rotation
+            finger = np.hypot(local[:, 1], local[:, 2]) < 0.008
+            assert local[finger, 0].max() == pytest.approx(0.0, abs=0.002)
+
+
+def test_a_hand_has_a_surface_and_other_figures_have_none(tmp_path: Path) -> None:
+    hand = load("hand")
+    surface = surface_of(hand)
+    assert surface is not None
+    tips = {name: hand.placement(hand.neutral, name).translation for name in hand.frames if name.endswith("_tip")}
+    (moved,) = bent(hand, surface, hand.neutral)
+    for tip in tips.values():
+        assert np.linalg.norm(moved - tip, axis=1).min() < 0.004
+    assert surface_of(None) is None
+    assert surface_of(load("human").reduced("left_arm")) is not None
+
+
+def test_what_is_kept_equals_what_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    surfaces._hand_surface.cache_clear()
+    first = surface_of(load("hand", side="left"))
+    assert cache_state().entries == 1
+    surfaces._hand_surface.cache_clear()
+    monkeypatch.setattr(surfaces, "_make_hand", None)  # it is not made again
+    second = surface_of(load("hand", side="left"))
+    assert first is not None
+    assert second is not None
+    for one, other in zip(first.parts, second.parts, strict=True):
+        np.testing.assert_array_equal(one.surface.vertices, other.surface.vertices)
+        np.testing.assert_array_equal(one.surface.faces, other.surface.faces)
+        np.testing.assert_array_equal(one.weights, other.weights)
+    assert [bone.segment for bone in first.bones] == [bone.segment for bone in second.bones]
+    next(tmp_path.iterdir()).write_bytes(b"spoilt")
+    surfaces._hand_surface.cache_clear()
+    monkeypatch.undo()
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    assert surface_of(load("hand", side="left")) is not None
+    surfaces._hand_surface.cache_clear()

@@ -1,0 +1,260 @@
+"""Thirteen everyday tasks of a person, each solved by qp with the terms that a person has by default."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wholebody.arrays import Array
+
+if TYPE_CHECKING:
+    from wholebody.figures.figure import Figure
+    from wholebody.problem import Problem
+
+UP, DOWN, FRONT, LEFT, RIGHT = (0, 0, 1), (0, 0, -1), (1, 0, 0), (0, 1, 0), (0, -1, 0)
+WOOD = (0.60, 0.48, 0.36, 1.0)
+KEPT = -1e-3
+"""Least value of a range of motion's row that counts as kept, radians."""
+
+SIZE = (360, 400)
+"""Pixels of a task's picture."""
+
+
+@dataclass(frozen=True)
+class TaskRow:
+    """What became of one task.
+
+    Attributes:
+        task: its name.
+        status: of the solution.
+        seconds: CPU time of the solve.
+        ranges: least value of all ranges of motion, degrees; negative beyond one.
+        balance: least distance of the centre of mass from the edges of the feet's polygon, mm, negative outside; None
+            where a seat carries the person.
+        miss: largest distance of a point from its goal, mm.
+        hips, knees, spine: largest flexion of a hip and a knee, and the spine's in total, degrees.
+        picture: its file's name.
+    """
+
+    task: str
+    status: str
+    seconds: float
+    ranges: float
+    balance: float | None
+    miss: float
+    hips: float
+    knees: float
+    spine: float
+    picture: str
+
+    @property
+    def plausible(self) -> bool:
+        """Whether it is solved within the ranges of motion, and the centre of mass is above the feet."""
+        return self.status == "solved" and np.radians(self.ranges) >= KEPT and (self.balance or 0.0) >= -0.1
+
+
+def tasks(figure: Figure) -> dict[str, Callable[[], Problem]]:
+    """Return the tasks by name: functions that state the problem for a person of about the median man's size.
+
+    Places scale with the person's stature.
+    """
+    import wholebody as wb
+
+    high = float(figure.placement(figure.posture("standing"), "head_top").translation[2])
+    scale = high / 1.755
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+
+    def at(x: float, y: float, z: float) -> Array:
+        return scale * np.array([x, y, z])
+
+    def room() -> wb.Scene:
+        return wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+
+    def point(frame: str, x: float, y: float, z: float, look: bool = True, **added: Any) -> Problem:
+        place = at(x, y, z)
+        goals: list[Any] = [wb.Point(frame, place)]
+        if look:
+            goals.append(wb.Axis("gaze", FRONT, toward=place, weight=0.02))
+        return wb.Problem(room(), goals=goals, constraints=feet, **added)
+
+    def box_from_the_floor() -> Problem:
+        scene = room()
+        scene.add(wb.Box(tuple(at(0.30, 0.30, 0.25))), name="box", at=at(0.42, 0.0, 0.1255), color=WOOD)
+        goals = [
+            wb.Point("left_palm", at(0.42, 0.1505, 0.16)),
+            wb.Point("right_palm", at(0.42, -0.1505, 0.16)),
+            wb.Axis("left_palm", UP, direction=RIGHT, weight=0.1),
+            wb.Axis("right_palm", UP, direction=LEFT, weight=0.1),
+        ]
+        return wb.Problem(scene, goals=goals, constraints=feet)
+
+    def typing() -> Problem:
+        scene, q = room(), figure.posture("sitting")
+        seat = _seat(scene, figure, q)
+        top = seat + 0.27 * scale
+        scene.add(
+            wb.Box((0.7 * scale, 1.2 * scale, 0.03)), name="desk", at=(0.62 * scale, 0.0, top - 0.015), color=WOOD
+        )
+        goals: list[Any] = [
+            wb.Point(f"{side}_index_tip", (0.42 * scale, sign * 0.06 * scale, top + 0.02)) for side, sign in _SIDES
+        ]
+        goals += [wb.Axis(f"{side}_palm", UP, direction=DOWN, weight=0.01) for side, _ in _SIDES]
+        goals.append(wb.Axis("gaze", FRONT, toward=(0.75 * scale, 0.0, top + 0.3), weight=0.02))
+        return wb.Problem(scene, start=q, goals=goals, constraints=[wb.Hold("pelvis"), *feet])
+
+    def door() -> Problem:
+        scene = room()
+        scene.add(wb.Box(tuple(at(0.04, 0.9, 2.0))), name="door", at=at(0.52, 0.0, 1.001), color=WOOD)
+        goals = []
+        for side, sign in _SIDES:
+            goals += [
+                wb.Point(f"{side}_palm", at(0.4995, sign * 0.2, 1.30)),
+                wb.Axis(f"{side}_palm", UP, direction=FRONT, weight=0.1),
+            ]
+        return wb.Problem(scene, goals=goals, constraints=feet)
+
+    def shoulder() -> Problem:
+        goals = [wb.Axis("gaze", FRONT, direction=(-0.77, 0.64, 0.0))]
+        return wb.Problem(room(), goals=goals, constraints=feet)
+
+    def shoe() -> Problem:
+        goals: list[Any] = [
+            wb.Point(f"{side}_index_tip", at(0.12, -0.085 + sign * 0.035, 0.115)) for side, sign in _SIDES
+        ]
+        goals.append(wb.Axis("gaze", FRONT, toward=at(0.12, -0.085, 0.1), weight=0.01))
+        return wb.Problem(room(), start="squatting", goals=goals, constraints=feet)
+
+    def sit() -> Problem:
+        scene, q = room(), figure.posture("standing")
+        below = -_underside(figure)
+        height = 0.43 * scale
+        scene.add(
+            wb.Box(tuple(at(0.42, 0.5, 0.04))), name="seat", at=(-0.42 * scale, 0.0, height - 0.02 * scale), color=WOOD
+        )
+        pelvis = (-0.40 * scale, 0.0, height + below + 0.010)
+        goals = [wb.Point("pelvis", pelvis), wb.Axis("pelvis", UP, direction=UP, weight=0.1)]
+        goals.append(wb.Axis("thorax", UP, direction=UP, weight=0.05))
+        return wb.Problem(scene, start=q, goals=goals, constraints=feet, balance=False)
+
+    def mouth() -> Problem:
+        face = figure.placement(figure.neutral, "gaze")
+        head = figure.placement(figure.neutral, "head")
+        place = head.actInv(face.translation) + scale * np.array([0.012, 0.0, -0.068])
+        goal = wb.Relative("right_index_tip", "head", place, orientation=False)
+        return wb.Problem(room(), goals=[goal], constraints=feet)
+
+    def overhead() -> Problem:
+        goals = [wb.Point(f"{side}_index_tip", at(0.15, sign * 0.15, 2.08)) for side, sign in _SIDES]
+        return wb.Problem(room(), goals=goals, constraints=feet)
+
+    return {
+        "reach high": lambda: point("right_index_tip", 0.30, -0.25, 2.05),
+        "reach low": lambda: point("right_index_tip", 0.45, -0.20, 0.30),
+        "reach to the side": lambda: point("right_index_tip", 0.0, -1.0, 1.20),
+        "reach behind": lambda: point("right_index_tip", -0.45, -0.40, 1.10),
+        "box from the floor": box_from_the_floor,
+        "typing": typing,
+        "push a door": door,
+        "look over the shoulder": shoulder,
+        "tie a shoe": shoe,
+        "sit down": sit,
+        "hand to mouth": mouth,
+        "both hands overhead": overhead,
+        "reach across": lambda: point("left_index_tip", 0.45, -0.50, 1.10),
+    }
+
+
+_SIDES = (("left", 1.0), ("right", -1.0))
+
+
+def _underside(figure: Figure) -> float:
+    """Height of the lowest point of pelvis and thighs below the pelvis' frame, thighs level, negative."""
+    from wholebody.figures.measuring import measure
+
+    sizes = measure(figure)
+    q = figure.with_joints(figure.neutral, {})
+    vertex = figure.placement(q, "head_top").translation[2] - figure.placement(q, "pelvis").translation[2]
+    return float(vertex - sizes["sitting_height"])
+
+
+def _seat(scene: Any, figure: Figure, q: Array) -> float:
+    """Put a seat below who sits; return the height of its top."""
+    import wholebody as wb
+
+    pelvis = figure.placement(q, "pelvis").translation
+    top = float(pelvis[2]) + _underside(figure) - 0.001
+    scene.add(wb.Box((0.42, 0.5, 0.04)), name="seat", at=(float(pelvis[0]) + 0.10, 0.0, top - 0.02), color=WOOD)
+    return top
+
+
+def solve_task(name: str, problem: Problem, pictures: Path | None) -> tuple[TaskRow, Array]:
+    """Solve a task, judge the posture, and draw it.
+
+    Args:
+        name: of the task.
+        problem: the task.
+        pictures: folder for its picture; None for no picture.
+
+    Returns:
+        What became of it, and the posture (nq,).
+    """
+    import wholebody as wb
+    from wholebody.figures.state import State
+
+    began = time.process_time()
+    solution = wb.solve(problem)
+    seconds = time.process_time() - began
+    scene, q = problem.scene, solution.q
+    state = State(scene.model).update(q)
+    ranges = wb.RangeOfMotion().resolve(scene, problem.start).value(state)
+    balance: float | None = None
+    if "seat" not in scene.objects:
+        balance = 1e3 * float(wb.Balance().resolve(scene, problem.start).value(state).min())
+    figure: Any = scene.figure
+    angles: Mapping[str, float] = figure.joint_values(q)
+    misses = [
+        float(np.linalg.norm(g.error(state)[:3])) for g in problem.goals if isinstance(g, (wb.Point, wb.Relative))
+    ]
+    picture = f"{name.replace(' ', '_')}.png"
+    if pictures is not None:
+        _draw(problem, q, pictures / picture)
+    row = TaskRow(
+        task=name,
+        status=str(solution.status),
+        seconds=seconds,
+        ranges=float(np.degrees(ranges.min())),
+        balance=balance,
+        miss=1e3 * max(misses, default=0.0),
+        hips=_largest(angles, "hip_flexion"),
+        knees=_largest(angles, "knee_flexion"),
+        spine=float(np.degrees(sum(v for j, v in angles.items() if j.startswith("spine") and j.endswith("flexion")))),
+        picture=picture,
+    )
+    return row, q
+
+
+def _largest(angles: Mapping[str, float], ending: str) -> float:
+    return float(np.degrees(max(value for joint, value in angles.items() if joint.endswith(ending))))
+
+
+def _draw(problem: Problem, q: Array, path: Path) -> None:
+    from wholebody.view import Viewer
+
+    glass = [name for name in problem.scene.objects if name == "door"]
+    with Viewer(problem.scene, contact_distance=-1.0, see_through=glass) as viewer:
+        viewer.show(q)
+        viewer.look((3.5, -2.9, 1.9), (0.05, 0.0, 1.08))
+        viewer.picture(path, SIZE)
+    _smaller(path)
+
+
+def _smaller(path: Path) -> None:
+    """Reduce a picture to 256 colours, which is half of its bytes."""
+    from PIL import Image
+
+    Image.open(path).convert("RGB").quantize(256).save(path, optimize=True)

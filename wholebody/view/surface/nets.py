@@ -1,0 +1,149 @@
+"""The surface of a field as triangles: one vertex in each cell of a grid that the surface crosses (surface nets).
+
+After Gibson, "Constrained elastic surface nets", MICCAI 1998. Vertices are then moved onto the surface along the
+field's gradient. Each edge of the grid that the surface crosses gives one quadrilateral, so the surface is closed.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.arrays import Array
+from wholebody.view.surface.fields import Field
+
+NEWTON_STEPS = 2
+"""Steps of every vertex towards the surface; the fields are nearly distances, so a step removes most of the error."""
+
+LARGEST_STEP = 0.5
+"""Of the cells' size: a vertex that moves farther could pass another one."""
+
+BLOCK = 4
+"""Cells along the side of a block; blocks that the surface cannot cross are looked at in their middle alone."""
+
+STEEPEST = 1.8
+"""Largest slope of a field near its surface; of a distance it is 1."""
+
+PROBE = 1e-5
+"""Metres between the points of which the gradient is measured."""
+
+
+class Triangles(NamedTuple):
+    """A closed surface.
+
+    Attributes:
+        vertices: (n, 3) metres.
+        normals: (n, 3) outward unit vectors.
+        faces: (m, 3) indices of vertices, wound outwards.
+    """
+
+    vertices: Array
+    normals: Array
+    faces: NDArray[np.int64]
+
+
+def triangles(field: Field, low: Array, high: Array, cell: float) -> Triangles:
+    """Return the surface of a field.
+
+    Args:
+        field: negative inside; positive on the boundary of the box.
+        low: (3,) least corner of a box that contains the solid.
+        high: (3,) greatest corner.
+        cell: size of the grid's cells, metres.
+    """
+    blocks = np.ceil((high - low) / cell / BLOCK).astype(int) + 1
+    values = _values(field, low - cell, blocks, cell)
+    values[values == 0.0] = 1e-12
+    inside = values < 0.0
+
+    corners = np.stack([_cut(inside, offset) for offset in _CORNERS])
+    crossed = corners.any(axis=0) & ~corners.all(axis=0)
+    number = np.full(crossed.shape, -1, dtype=np.int64)
+    number[crossed] = np.arange(int(crossed.sum()))
+    cells = np.argwhere(crossed)
+    vertices = _middles(values, cells, cell) + (low - cell)
+    faces = _faces(inside, number)
+    vertices = _moved(field, vertices, cell)
+    return Triangles(vertices, gradient(field, vertices), faces)
+
+
+def gradient(field: Field, points: Array) -> Array:
+    """Unit vectors (n, 3) along which the field grows."""
+    slopes = _slopes(field, points, field(points))
+    return np.asarray(slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-12))
+
+
+def _values(field: Field, start: Array, blocks: NDArray[np.int64], cell: float) -> Array:
+    """The field on the grid; in blocks that are far from the surface, its value in the block's middle."""
+    numbers = np.argwhere(np.ones(tuple(blocks), dtype=bool))
+    middles = start + (numbers + 0.5) * BLOCK * cell - 0.5 * cell
+    coarse = field(middles)
+    near = np.abs(coarse) < STEEPEST * 0.5 * np.sqrt(3.0) * BLOCK * cell
+    steps = np.argwhere(np.ones((BLOCK, BLOCK, BLOCK), dtype=bool))
+    found = np.repeat(coarse[:, None], BLOCK**3, axis=1)
+    points = start + cell * (BLOCK * numbers[near][:, None, :] + steps)
+    found[near] = field(points.reshape(-1, 3)).reshape(-1, BLOCK**3)
+    shape = (*blocks, BLOCK, BLOCK, BLOCK)
+    whole: Array = found.reshape(shape).transpose(0, 3, 1, 4, 2, 5).reshape(tuple(blocks * BLOCK))
+    return whole
+
+
+_CORNERS = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+_EDGES = [(a, b) for a in range(8) for b in range(8) if a < b and bin(a ^ b).count("1") == 1]
+
+
+def _cut(values: NDArray[np.generic], offset: tuple[int, int, int]) -> NDArray[np.generic]:
+    """The values at one corner of every cell."""
+    x, y, z = offset
+    nx, ny, nz = values.shape
+    return values[x : nx - 1 + x, y : ny - 1 + y, z : nz - 1 + z]
+
+
+def _middles(values: Array, cells: NDArray[np.int64], cell: float) -> Array:
+    """Means of the crossings of each cell's edges, relative to the grid's first corner."""
+    total, hits = np.zeros((len(cells), 3)), np.zeros(len(cells))
+    at = [values[tuple((cells + corner).T)] for corner in _CORNERS]
+    for a, b in _EDGES:
+        crossing = (at[a] < 0.0) != (at[b] < 0.0)
+        share = np.where(crossing, at[a] / np.where(crossing, at[a] - at[b], 1.0), 0.0)
+        start, end = np.array(_CORNERS[a]), np.array(_CORNERS[b])
+        total += crossing[:, None] * (start + share[:, None] * (end - start))
+        hits += crossing
+    return np.asarray((cells + total / hits[:, None]) * cell)
+
+
+def _faces(inside: NDArray[np.bool_], number: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Two triangles for each edge of the grid with one end inside, around it the four cells that share it."""
+    found = []
+    for axis in range(3):
+        other, last = (axis + 1) % 3, (axis + 2) % 3
+        order = (axis, other, last)
+        here = np.transpose(inside, order)
+        cells = np.transpose(number, order)
+        a, b = here[:-1, 1:-1, 1:-1], here[1:, 1:-1, 1:-1]
+        for leaving in (True, False):
+            along, side, up = np.nonzero((a & ~b) if leaving else (~a & b))
+            quad = [cells[along, side, up], cells[along, side + 1, up], cells[along, side + 1, up + 1]]
+            quad.append(cells[along, side, up + 1])
+            ring = quad if leaving else quad[::-1]
+            found += [np.stack(ring[:3], axis=1), np.stack([ring[0], ring[2], ring[3]], axis=1)]
+    return np.concatenate(found)
+
+
+def _slopes(field: Field, points: Array, values: Array) -> Array:
+    return np.column_stack([(field(points + PROBE * axis) - values) / PROBE for axis in np.eye(3)])
+
+
+def _moved(field: Field, vertices: Array, cell: float) -> Array:
+    """The vertices moved to the surface."""
+    start, points = vertices, vertices
+    for _ in range(NEWTON_STEPS):
+        values = field(points)
+        slopes = _slopes(field, points, values)
+        step = values[:, None] * slopes / np.maximum(np.einsum("ij,ij->i", slopes, slopes), 1e-2)[:, None]
+        away = points - step - start
+        far = np.maximum(np.linalg.norm(away, axis=1, keepdims=True) / (LARGEST_STEP * cell), 1.0)
+        points = start + away / far
+    return np.asarray(points)

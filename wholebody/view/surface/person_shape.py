@@ -1,0 +1,330 @@
+"""The parts of a person's surface: clothes, head, hands and shoes around the person's pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.figures.anthropometry import Body
+from wholebody.figures.body_spec import Solid
+from wholebody.figures.dimensions import Dimensions
+from wholebody.figures.human import human_spec
+from wholebody.figures.human_figure import figure_of
+from wholebody.view.surface.fields import (
+    Field,
+    ball,
+    ellipsoid,
+    grown,
+    half_space,
+    intersection,
+    placed,
+    round_cone,
+    union,
+)
+from wholebody.view.surface.garments import Claim, Garment, bounds
+from wholebody.view.surface.hand_shape import hand_shape
+from wholebody.view.surface.head_shape import head_shape
+from wholebody.view.surface.profile import caps, limb, piece_field, trunk
+
+SKIN, HAIR, LIPS = (0.86, 0.66, 0.54), (0.25, 0.17, 0.12), (0.72, 0.42, 0.38)
+SHIRT, TROUSERS, SHOES = (0.42, 0.55, 0.68), (0.27, 0.30, 0.38), (0.22, 0.18, 0.16)
+WHITE, IRIS = (0.95, 0.95, 0.94), (0.20, 0.24, 0.26)
+
+CLOTH, TUCKED = 0.006, 0.003
+"""Metres of cloth over the pieces: the shirt, and the trousers below its hem."""
+
+BINDING = {"shoulder_abduction": 42.0, "hip_abduction": 7.0, "elbow_flexion": 12.0}
+"""Degrees of both sides in the binding posture: half way between the ends of what people do, and no limbs touch."""
+
+TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax")
+SIDES = (("left", 1.0), ("right", -1.0))
+HALVES = {"upper_arm": "clavicle", "forearm": "upper_arm", "hand": "forearm", "thigh": "pelvis", "shank": "thigh"}
+"""Segments with a bone that turns half as much as they do against the segment named here: joints keep their volume."""
+
+
+class PersonShape:
+    """The garments of a person in the binding posture.
+
+    Attributes:
+        bind: placement (4, 4) of every segment in the world in the binding posture.
+    """
+
+    def __init__(self, person: Body) -> None:
+        """Read the person's pieces and joints."""
+        spec = human_spec(person)
+        figure = figure_of(spec, "capsules")
+        degrees = {f"{side}_{name}": angle for side, _ in SIDES for name, angle in BINDING.items()}
+        q = figure.with_joints(pin.neutral(figure.model), {name: np.radians(angle) for name, angle in degrees.items()})
+        data = figure.model.createData()
+        pin.framesForwardKinematics(figure.model, data, q)
+        self.person, self.size = person, Dimensions(person)
+        self.solids: tuple[Solid, ...] = spec.solids
+        self.bind = {name: np.array(data.oMf[figure.frame_id(name)].homogeneous) for name in figure.segments}
+        self._marks = {name: np.array(data.oMf[figure.frame_id(name)].translation) for name in figure.frames}
+        self._trunk = self._trunk_field()
+        self._limbs = {segment: self._limb_field(segment) for segment in self.bind if self._is_limb(segment)}
+
+    def garments(self) -> Iterator[Garment]:
+        """Make the fields of all parts."""
+        yield self._shirt()
+        yield self._trousers()
+        yield from self._head()
+        for side, sign in SIDES:
+            yield self._hand(side)
+            yield self._shoe(side, sign)
+
+    def at(self, segment: str, point: Sequence[float] | Array = (0.0, 0.0, 0.0)) -> Array:
+        """A point (3,) of a segment in the world."""
+        return np.asarray(self.bind[segment][:3, :3] @ np.asarray(point) + self.bind[segment][:3, 3])
+
+    # ---- fields of segments
+
+    def _is_limb(self, segment: str) -> bool:
+        return segment.partition("_")[2] in ("clavicle", "upper_arm", "forearm", "thigh", "shank")
+
+    def _trunk_field(self) -> Field:
+        pieces = [
+            placed(piece_field(solid), self.bind[solid.segment]) for solid in self.solids if solid.segment in TRUNK
+        ]
+        hips, neck = self.bind["pelvis"][2, 3], self.bind["neck"][2, 3]
+        return trunk(union(pieces), hips - 0.2, neck + 0.1, float(self.bind["upper_lumbar"][0, 3]))
+
+    def _limb_field(self, segment: str) -> Field:
+        """Round cones through the balls of a segment's pieces, from joint to joint."""
+        side, _, part = segment.partition("_")
+        balls = caps(self.solids, segment)
+        if part == "clavicle":
+            return placed(limb(balls), self.bind[segment])
+        child = {"upper_arm": "forearm", "forearm": "hand", "thigh": "shank", "shank": "foot"}[part]
+        end = np.linalg.inv(self.bind[segment]) @ [*self.at(f"{side}_{child}"), 1.0]
+        first, last = balls[0][1], balls[-1][1]
+        start = 0.86 * first if part == "thigh" else first
+        if part == "upper_arm":
+            last = 0.5 * (last + caps(self.solids, f"{side}_forearm")[0][1])
+        elif part == "forearm":
+            start = 0.5 * (first + caps(self.solids, f"{side}_upper_arm")[-1][1])
+        return placed(limb([(np.zeros(3), start), *balls, (end[:3], last)]), self.bind[segment])
+
+    def _claims(self, segments: Sequence[str]) -> list[Claim]:
+        """Claims of limbs by their fields, of the trunk's segments by their heights, of halves at the joints."""
+        found = []
+        edges = [*(float(self.bind[name][2, 3]) for name in TRUNK), np.inf]
+        edges[0] = -np.inf
+        for name, low, high in zip(TRUNK, edges, edges[1:], strict=False):
+            if name in segments:
+                found.append(Claim(name, _between(self._trunk, low, high)))
+        for segment in segments:
+            if segment in self._limbs:
+                found.append(Claim(segment, self._limbs[segment]))
+            part = segment.partition("_")[2]
+            if part in HALVES:
+                radius = {"upper_arm": 0.050, "forearm": 0.040, "hand": 0.026, "thigh": 0.085, "shank": 0.055}[part]
+                reach = radius * self.size.stature / 1.75
+                found.append(Claim(f"{segment}/half", grown(ball(self.at(segment), reach), 0.006)))
+        return found
+
+    # ---- garments
+
+    def _shirt(self) -> Garment:
+        size, scale = self.size, self.size.stature / 1.75
+        neck = self.at("neck")
+        solids = [self._trunk]
+        for side, sign in SIDES:
+            shoulder = self.at(f"{side}_upper_arm")
+            solids += [
+                self._limbs[f"{side}_clavicle"],
+                union([self._limbs[f"{side}_upper_arm"], self._limbs[f"{side}_forearm"]], 0.008),
+                round_cone(
+                    neck + np.array([-0.030, sign * 0.030, 0.012]) * scale,
+                    shoulder + np.array([-0.004, -sign * 0.012, 0.012]) * scale,
+                    0.046 * scale,
+                    0.036 * scale,
+                ),
+            ]
+            solids.append(
+                ellipsoid(
+                    (shoulder[0] + 0.018 * scale, shoulder[1] - sign * 0.062 * scale, shoulder[2] - 0.085 * scale),
+                    np.array([0.075, 0.050, 0.100]) * scale,
+                )
+            )
+            if size.body.sex == "female":
+                chest = self.at("thorax", (0.0, 0.0, 0.0))
+                front = self._front(float(chest[2]) - 0.01 * scale)
+                solids.append(
+                    ellipsoid(
+                        (front - 0.036 * scale, sign * 0.076 * scale, chest[2] - 0.012 * scale),
+                        np.array([0.066, 0.062, 0.062]) * scale,
+                    )
+                )
+        collar = 0.94 * size.body.radius("neck") + 0.006
+        solids.append(round_cone(neck - [0.0, 0.0, 0.05], neck + [0.004, 0.0, 0.03], 1.15 * collar, collar))
+        body = grown(union(solids, 0.035 * scale), CLOTH)
+        hem = half_space((0.0, 0.0, self._belt() - 0.022 * scale), (0.0, 0.0, -1.0))
+        opening = half_space(neck + [0.0, 0.0, 0.022 * scale], (0.42, 0.0, 1.0))
+        cut = intersection(intersection(body, hem, 0.006), opening, 0.006)
+        for side, _ in SIDES:
+            wrist, elbow = self.at(f"{side}_hand"), self.at(f"{side}_forearm")
+            along = (wrist - elbow) / np.linalg.norm(wrist - elbow)
+            cut = intersection(cut, half_space(wrist - 0.022 * scale * along, along), 0.012)
+        segments = [*TRUNK, "neck", *self._sided("clavicle", "upper_arm", "forearm")]
+        points = [self.at(name) for name in [*segments, *self._sided("hand")]]
+        points += [np.array([0.1, 0.0, self._belt() - 0.04]), np.array([-0.1, 0.0, neck[2] + 0.06])]
+        low, high = bounds(points, 0.085 * scale + 0.05)
+        claims = self._claims([name for name in segments if name != "neck"])
+        return Garment("shirt", SHIRT, cut, low, high, 0.010, claims)
+
+    def _trousers(self) -> Garment:
+        scale = self.size.stature / 1.75
+        hips = self.at("pelvis")
+        solids = [self._trunk]
+        for side, sign in SIDES:
+            back = self._back(float(hips[2]) - 0.01 * scale)
+            legs = [self._limbs[f"{side}_thigh"], self._limbs[f"{side}_shank"], self._calf(side, sign)]
+            solids.append(union(legs, 0.03))
+            solids.append(
+                ellipsoid(
+                    (back + 0.075 * scale, sign * 0.072 * scale, hips[2] - 0.030 * scale),
+                    np.array([0.080, 0.078, 0.085]) * scale,
+                )
+            )
+        body = grown(union(solids, 0.04 * scale), TUCKED)
+        body = intersection(body, half_space((0.0, 0.0, self._belt()), (0.0, 0.0, 1.0)), 0.004)
+        for side, _ in SIDES:
+            knee, ankle = self.at(f"{side}_shank"), self.at(f"{side}_foot")
+            along = (ankle - knee) / np.linalg.norm(ankle - knee)
+            body = union(
+                [body, round_cone(ankle - 0.20 * scale * along, ankle, 0.050 * scale, 0.058 * scale)], 0.06 * scale
+            )
+            body = intersection(body, half_space(ankle + 0.012 * scale * along, along), 0.004)
+        segments = ["pelvis", "lower_lumbar", *self._sided("thigh", "shank")]
+        points = [self.at(name) for name in [*segments, *self._sided("foot")]]
+        low, high = bounds([*points, np.array([0.0, 0.0, self._belt()])], 0.13 * scale + 0.04)
+        return Garment("trousers", TROUSERS, body, low, high, 0.012, self._claims(segments))
+
+    def _calf(self, side: str, sign: float) -> Field:
+        """The muscle behind the shank."""
+        length, radius = self.person.length("left_shank"), self.person.radius("calf")
+        shape = ellipsoid(
+            (-0.20 * radius, sign * 0.02 * radius, -0.27 * length), (0.90 * radius, 0.90 * radius, 0.24 * length)
+        )
+        return placed(shape, self.bind[f"{side}_shank"])
+
+    def _head(self) -> Iterator[Garment]:
+        shape, frame = head_shape(self.size), self.bind["head"]
+        scale = self.size.stature / 1.75
+        bottom, top = self.at("neck", (0.0, 0.0, -0.04)), self.at("head", (self.size.head_x, 0.0, self.size.head_top))
+        radius = 0.9 * self.person.radius("neck")
+        throat = self.at("head", (self.size.head_x - 0.030 * scale, 0.0, self.size.head_bottom + 0.06 * scale))
+        neck = round_cone(bottom, throat, 1.06 * radius, 0.97 * radius)
+        skin = union([placed(shape.skin, frame), neck], 0.022)
+        low, high = bounds([bottom, top], 0.15 * scale)
+        low[2], high[2] = bottom[2] - radius - 0.02, top[2] + 0.03
+        atlas = self.at("head")
+        claims = [
+            Claim("thorax", half_space(self.at("neck"), (0.0, 0.0, 1.0)), 0.015),
+            Claim("neck", _slab(self.at("neck")[2], atlas[2]), 0.015),
+            Claim("head", union([half_space(atlas, (0.0, 0.0, -1.0)), placed(shape.skin, frame)]), 0.012),
+        ]
+        rigid = [Claim("head", lambda points: np.zeros(len(points)))]
+        yield Garment("head", SKIN, skin, low, high, 0.0058, claims)
+        low[2] = self.at("head", (0.0, 0.0, self.size.head_bottom))[2] - 0.06
+        yield Garment("hair", HAIR, placed(shape.hair, frame), low, high, 0.006, rigid)
+        eye = self.at("head", (self.size.eye_x, 0.0, self.size.eye_z))
+        around = bounds([eye], 0.075 * scale)
+        yield Garment("eyes", WHITE, placed(shape.eyes, frame), *around, 0.0035, rigid)
+        yield Garment("irises", IRIS, placed(shape.irises, frame), *around, 0.0025, rigid)
+        yield Garment("brows", HAIR, placed(shape.brows, frame), *around, 0.0022, rigid)
+        mouth = bounds([eye - np.array([0.0, 0.0, 0.075]) * scale], 0.05 * scale)
+        yield Garment("lips", LIPS, placed(shape.lips, frame), *mouth, 0.003, rigid)
+
+    def _hand(self, side: str) -> Garment:
+        shape, frame = hand_shape(self.person, side), self.bind[f"{side}_hand"]
+        corners = [self.at(f"{side}_hand", corner) for corner in shape.corners]
+        low, high = bounds(corners, 0.035)
+        claims = [Claim(claim.bone, placed(claim.field, frame), claim.softness) for claim in shape.claims]
+        return Garment(f"{side}_hand", SKIN, placed(shape.field, frame), low, high, 0.0034, claims)
+
+    def _shoe(self, side: str, sign: float) -> Garment:
+        size, scale = self.size, self.size.stature / 1.75
+        toe, heel, sole = size.toe_joint_x, size.heel_x, size.sole
+        tip, wide = toe + size.toe_length, size.foot_half_width
+        ankle = 0.036 * scale
+        last = [
+            round_cone((0.0, 0.0, 0.035), (-0.006, 0.0, -0.02), ankle, 0.98 * ankle),
+            round_cone((-0.006, 0.0, -0.02), (heel + 0.036, 0.0, sole + 0.034), 0.98 * ankle, 0.032 * scale),
+            round_cone((0.0, 0.0, -0.012), (toe - 0.02, sign * 0.003, sole + 0.034), 0.96 * ankle, 0.033 * scale),
+            round_cone(
+                (heel + 0.034, 0.0, sole + 0.026), (toe, -sign * 0.006, sole + 0.024), 0.032 * scale, 0.034 * scale
+            ),
+        ]
+        front = [
+            round_cone(
+                (toe - 0.01, -sign * 0.012, sole + 0.026), (tip - 0.032, sign * -0.012, sole + 0.022), 0.033, 0.026
+            ),
+            round_cone(
+                (toe - 0.012, sign * 0.014, sole + 0.024), (tip - 0.052, sign * 0.016, sole + 0.020), 0.031, 0.024
+            ),
+        ]
+        hind = intersection(
+            ellipsoid((0.5 * (heel + toe), 0.0, sole + 0.006), (0.5 * (toe - heel) + 0.024, 0.80 * wide, 0.05)),
+            half_space((0.0, 0.0, sole + 0.02), (0.0, 0.0, 1.0)),
+            0.006,
+        )
+        fore = intersection(
+            ellipsoid((toe - 0.008, 0.0, sole + 0.006), (tip - toe + 0.006, 0.98 * wide, 0.05)),
+            half_space((0.0, 0.0, sole + 0.018), (0.0, 0.0, 1.0)),
+            0.006,
+        )
+        back_field, front_field = union([*last, hind], 0.02), union([*front, fore], 0.012)
+        body = intersection(
+            union([back_field, front_field], 0.02), half_space((0.0, 0.0, sole), (0.0, 0.0, -1.0)), 0.004
+        )
+        frame = self.bind[f"{side}_foot"]
+        corners = [self.at(f"{side}_foot", (x, y, z)) for x in (heel, tip) for y in (-wide, wide) for z in (sole, 0.04)]
+        low, high = bounds(corners, 0.035)
+        claims = [
+            Claim(f"{side}_shank", placed(half_space((0.0, 0.0, 0.02), (0.0, 0.0, -1.0)), frame)),
+            Claim(
+                f"{side}_foot", placed(intersection(back_field, half_space((toe, 0.0, 0.0), (1.0, 0.0, 0.0))), frame)
+            ),
+            Claim(f"{side}_toes", placed(half_space((toe, 0.0, 0.0), (-1.0, 0.0, 0.0)), frame), 0.010),
+        ]
+        return Garment(f"{side}_shoe", SHOES, placed(body, frame), low, high, 0.006, claims)
+
+    # ---- places
+
+    def _belt(self) -> float:
+        """Height of the trousers' upper edge."""
+        return float(self.bind["lower_lumbar"][2, 3]) + 0.005 * self.size.stature
+
+    def _front(self, height: float) -> float:
+        """X of the trunk's front at a height."""
+        return float(self._trunk_ends(height)[1])
+
+    def _back(self, height: float) -> float:
+        return float(self._trunk_ends(height)[0])
+
+    def _trunk_ends(self, height: float) -> tuple[float, float]:
+        x = np.arange(-0.4, 0.4, 0.002)
+        inside = x[self._trunk(np.column_stack([x, np.zeros_like(x), np.full_like(x, height)])) < 0.0]
+        return float(inside[0]), float(inside[-1])
+
+    @staticmethod
+    def _sided(*parts: str) -> list[str]:
+        return [f"{side}_{part}" for side, _ in SIDES for part in parts]
+
+
+def _between(field: Field, low: float, high: float) -> Field:
+    """Distance from the part of a solid between two heights."""
+    return lambda points: np.maximum(field(points), 0.0) + _outside(points[:, 2], low, high)
+
+
+def _slab(low: float, high: float) -> Field:
+    return lambda points: _outside(points[:, 2], low, high)
+
+
+def _outside(heights: Array, low: float, high: float) -> Array:
+    return np.asarray(np.maximum(np.maximum(low - heights, heights - high), 0.0))

@@ -1,0 +1,134 @@
+"""The trunk's outline: a stack of ovals around the trunk's pieces, and the balls that limbs' pieces are hulls of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import coal
+import numpy as np
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+
+from wholebody.arrays import Array
+from wholebody.figures.body_spec import Solid
+from wholebody.view.surface.fields import Field, ball, box, ellipsoid, placed, round_cone
+
+LEVEL = 0.005
+"""Metres between two ovals."""
+
+SMOOTHING = 0.028
+"""Standard deviation, metres, of the smoothing of the outline along the trunk and the limbs."""
+
+ROUNDNESS = 2.3
+"""Exponent of the ovals: 2 is an ellipse, more is nearer to a rectangle."""
+
+RAYS = np.arange(-0.4, 0.4, 0.002)
+"""Metres from the middle at which the pieces are looked for."""
+
+
+def piece_field(solid: Solid) -> Field:
+    """The signed distance of a piece in its segment's frame."""
+    shape: Any = solid.geometry
+    if isinstance(shape, coal.Capsule):
+        half = float(shape.halfLength)
+        found = round_cone((0.0, 0.0, -half), (0.0, 0.0, half), float(shape.radius), float(shape.radius))
+    elif isinstance(shape, coal.Sphere):
+        found = ball(np.zeros(3), float(shape.radius))
+    elif isinstance(shape, coal.Ellipsoid):
+        found = ellipsoid(np.zeros(3), np.asarray(shape.radii))
+    else:
+        found = box(np.zeros(3), np.asarray(shape.halfSide))
+    return placed(found, np.asarray(solid.placement.homogeneous))
+
+
+def caps(solids: Iterable[Solid], segment: str) -> list[tuple[Array, float]]:
+    """Centres (3,), in the segment's frame, and radii of the balls around which a limb's pieces lie, highest first."""
+    found: list[tuple[Array, float]] = []
+    own = [s for s in solids if s.segment == segment and isinstance(s.geometry, (coal.Capsule, coal.Sphere))]
+    for solid in own:
+        others = [piece_field(other) for other in own if other is not solid]
+        if any(_contains(other, solid) for other in others):
+            continue  # a core within the flesh
+        half = float(solid.geometry.halfLength) if isinstance(solid.geometry, coal.Capsule) else 0.0
+        for end in {half, -half}:
+            center = solid.placement.act(np.array([0.0, 0.0, end]))
+            found.append((np.asarray(center), float(solid.geometry.radius)))
+    return sorted(found, key=lambda entry: -float(entry[0][2]))
+
+
+def _contains(outer: Field, solid: Solid) -> bool:
+    """Whether a capsule or a ball is within another piece."""
+    half = float(solid.geometry.halfLength) if isinstance(solid.geometry, coal.Capsule) else 0.0
+    ends = np.array([solid.placement.act(np.array([0.0, 0.0, end])) for end in (half, -half)])
+    return bool((outer(ends) + float(solid.geometry.radius) < 1e-6).all())
+
+
+def limb(balls: Sequence[tuple[Array, float]]) -> Field:
+    """A smooth solid around balls in a row: its middle line and its radius run evenly from one to the next.
+
+    Args:
+        balls: centres (3,) and radii, from one end to the other; at least two places.
+    """
+    centers, radii = np.array([center for center, _ in balls]), np.array([radius for _, radius in balls])
+    start, span = centers[0], centers[-1] - centers[0]
+    length = float(np.linalg.norm(span))
+    along = span / length
+    at = np.maximum.accumulate((centers - start) @ along)
+    places = np.arange(0.0, length + LEVEL, LEVEL)
+    sigma = SMOOTHING / LEVEL
+    radius = gaussian_filter1d(np.interp(places, at, radii), sigma, mode="nearest")
+    middle = np.column_stack([np.interp(places, at, centers[:, k]) for k in range(3)])
+    middle = gaussian_filter1d(middle - np.outer(places, along), sigma, axis=0, mode="nearest")
+
+    def field(points: Array) -> Array:
+        place = np.clip((points - start) @ along, 0.0, length)
+        axis = np.column_stack([np.interp(place, places, middle[:, k]) for k in range(3)]) + np.outer(place, along)
+        return np.asarray(np.linalg.norm(points - axis, axis=1) - np.interp(place, places, radius))
+
+    return field
+
+
+def trunk(pieces: Field, low: float, high: float, x: float) -> Field:
+    """A smooth solid around the trunk's pieces.
+
+    Args:
+        pieces: signed distance of the pieces, in the world.
+        low: height at which the looking begins, metres.
+        high: height at which it ends.
+        x: a place inside the trunk at every height.
+    """
+    heights = np.arange(low, high, LEVEL)
+    front, back = np.empty(len(heights)), np.empty(len(heights))
+    side = np.empty(len(heights))
+    for number, height in enumerate(heights):
+        along = np.column_stack([x + RAYS, np.zeros_like(RAYS), np.full_like(RAYS, height)])
+        inside = RAYS[pieces(along) < 0.0]
+        front[number], back[number] = (x + inside[-1], x + inside[0]) if len(inside) else (np.nan, np.nan)
+        middle = 0.5 * (front[number] + back[number])
+        across = np.column_stack([np.full_like(RAYS, middle), RAYS, np.full_like(RAYS, height)])
+        wide = RAYS[pieces(across) < 0.0] if len(inside) else RAYS[:0]
+        side[number] = wide[-1] if len(wide) else np.nan
+    found = ~np.isnan(side)
+    heights, front, back, side = heights[found], front[found], back[found], side[found]
+    depth, middle = 0.5 * (front - back), 0.5 * (front + back)
+    wide_enough = int(2 * SMOOTHING / LEVEL)
+
+    def smooth(values: Array, *, around: bool) -> Array:
+        kept = maximum_filter1d(values, wide_enough) if around else values
+        return np.asarray(gaussian_filter1d(kept, SMOOTHING / LEVEL, mode="nearest"))
+
+    depth, side, middle = smooth(depth, around=True), smooth(side, around=True), smooth(middle, around=False)
+
+    def field(points: Array) -> Array:
+        height = np.clip(points[:, 2], heights[0], heights[-1])
+        b, a, c = (np.interp(height, heights, values) for values in (depth, side, middle))
+        u, v = np.abs(points[:, 0] - c) / b, np.abs(points[:, 1]) / a
+        reach = (u**ROUNDNESS + v**ROUNDNESS) ** (1.0 / ROUNDNESS)
+        # Distance along the ray from the axis, shortened where the ray meets the oval at a slant.
+        radial = np.hypot(points[:, 0] - c, points[:, 1])
+        flat = np.where(reach > 1e-6, radial * (1.0 - 1.0 / np.maximum(reach, 1e-6)), -np.minimum(a, b))
+        flat = np.maximum(flat, -np.minimum(a, b))
+        beyond = np.abs(points[:, 2] - height)
+        return np.asarray(np.where(beyond > 0.0, np.hypot(np.maximum(flat, 0.0), beyond), flat))
+
+    return field
