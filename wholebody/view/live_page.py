@@ -19,7 +19,9 @@ from wholebody.tracking.drag import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
 
 SKIN, FREE, HELD, GRIP = (214, 180, 150), (70, 130, 220), (225, 90, 40), (90, 170, 90)
-RADIUS = 0.035  # m: of a handle
+EYE = (2.2, -1.6, 0.6)  # m: of the camera, from the figure's centre of mass
+RADIUS = 0.04  # m: of a handle
+THROUGH = 0.7  # opacity of the figure, so that the handles in it are seen
 GROUND = 6.0  # m: of the piece of a half-space that is drawn
 SECTIONS = (24, 24)  # of what is round
 
@@ -30,6 +32,7 @@ class LivePage:
     Attributes:
         drag: what is dragged.
         url: where browsers find the page.
+        server: the viser.ViserServer.
         frames: frames that were made.
     """
 
@@ -56,9 +59,10 @@ class LivePage:
         self._lock = threading.RLock()
         self._target: Any = None
         self._stopped = threading.Event()
-        self._server: Any = viser.ViserServer(host="127.0.0.1", port=port, label="wholebody drag", verbose=False)
-        self.url = f"http://127.0.0.1:{self._server.get_port()}"
-        self._server.scene.set_up_direction("+z")
+        self.server: Any = viser.ViserServer(host="127.0.0.1", port=port, label="wholebody drag", verbose=False)
+        self.url = f"http://127.0.0.1:{self.server.get_port()}"
+        self.server.scene.set_up_direction("+z")
+        self._look()
         self._pieces = self._draw()
         self._handles = {name: self._handle(name) for name in (*drag.handles, *drag.things)}
         self._panel()
@@ -70,12 +74,18 @@ class LivePage:
         """End the page and its thread."""
         self._stopped.set()
         self._loop.join(timeout=5.0)
-        self._server.stop()
+        self.server.stop()
 
     def wait(self) -> None:
         """Wait until the page is stopped, or Ctrl-C."""
         while not self._stopped.wait(0.2):
             pass
+
+    def _look(self) -> None:
+        """Look at the whole figure from the front right."""
+        middle = self.drag.scene.state(self.drag.q).center_of_mass()
+        self.server.initial_camera.position = middle + np.array(EYE)
+        self.server.initial_camera.look_at = middle
 
     def _draw(self) -> list[Any]:
         scene = self.drag.scene
@@ -85,17 +95,17 @@ class LivePage:
             color = SKIN if thing is None else _bytes(thing.color, number)
             mesh = triangles(piece.geometry)
             pieces.append(
-                self._server.scene.add_mesh_simple(
+                self.server.scene.add_mesh_simple(
                     f"/pieces/{number}", np.asarray(mesh.vertices), np.asarray(mesh.faces), color=color,
-                    opacity=None if thing is None or thing.color is None else thing.color[3],
+                    opacity=THROUGH if thing is None else None if thing.color is None else thing.color[3],
                 )
             )  # fmt: skip
         return pieces
 
     def _handle(self, name: str) -> Any:
         color = GRIP if name in self.drag.things else HELD if name in self.drag.held else FREE
-        ball = self._server.scene.add_icosphere(
-            f"/handles/{name}", RADIUS, color=color, opacity=0.85, position=self.drag.place(name), cast_shadow=False
+        ball = self.server.scene.add_icosphere(
+            f"/handles/{name}", RADIUS, color=color, position=self.drag.place(name), cast_shadow=False
         )
         offset = np.zeros(3)
 
@@ -127,7 +137,7 @@ class LivePage:
             self._boxes[name].value = held
 
     def _panel(self) -> None:
-        gui = self._server.gui
+        gui = self.server.gui
         self._status, self._numbers = gui.add_markdown(""), gui.add_markdown("")
         self._method = gui.add_dropdown("method", tuple(METHODS), initial_value=self.drag.method.name)
         self._method.on_update(self._choose)
@@ -176,7 +186,7 @@ class LivePage:
     def _show(self, frame: LiveFrame) -> None:
         scene = self.drag.scene
         data = scene.state(frame.q).data
-        with self._server.atomic():
+        with self.server.atomic():
             for handle, piece in zip(self._pieces, scene.geometry.geometryObjects, strict=True):
                 place = data.oMi[piece.parentJoint] * piece.placement
                 handle.position, handle.wxyz = place.translation, _wxyz(place)
