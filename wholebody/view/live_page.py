@@ -19,6 +19,7 @@ from wholebody.tracking.drag import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
 
 SKIN, FREE, HELD, GRIP = (214, 180, 150), (70, 130, 220), (225, 90, 40), (90, 170, 90)
+STILL = 1e-5  # m, rad: what moves less is not sent
 EYE = (2.2, -1.6, 0.6)  # m: of the camera, from the figure's centre of mass
 RADIUS = 0.04  # m: of a handle
 THROUGH = 0.7  # opacity of the figure, so that the handles in it are seen
@@ -58,10 +59,13 @@ class LivePage:
         self._save_to, self._save = save_to, save
         self._lock = threading.RLock()
         self._target: Any = None
+        self._reached: Any = None
+        self._sent: dict[int, Any] = {}
         self._stopped = threading.Event()
         self.server: Any = viser.ViserServer(host="127.0.0.1", port=port, label="wholebody drag", verbose=False)
         self.url = f"http://127.0.0.1:{self.server.get_port()}"
         self.server.scene.set_up_direction("+z")
+        self.server.scene.configure_default_lights(cast_shadow=False)  # shadows cost most of a frame without a GPU
         self._look()
         self._pieces = self._draw()
         self._handles = {name: self._handle(name) for name in (*drag.handles, *drag.things)}
@@ -97,7 +101,7 @@ class LivePage:
             pieces.append(
                 self.server.scene.add_mesh_simple(
                     f"/pieces/{number}", np.asarray(mesh.vertices), np.asarray(mesh.faces), color=color,
-                    opacity=THROUGH if thing is None else None if thing.color is None else thing.color[3],
+                    cast_shadow=False, receive_shadow=False, opacity=THROUGH if thing is None else None if thing.color is None else thing.color[3],
                 )
             )  # fmt: skip
         return pieces
@@ -178,18 +182,25 @@ class LivePage:
         while not self._stopped.is_set():
             began = time.perf_counter()
             with self._lock:
-                if self._target is not None:
-                    self._show(self.drag.move(self._target))
+                if self._target is not None and (self._target is not self._reached):
+                    target, before = self._target, self.drag.q
+                    frame = self.drag.move(target)
+                    self._show(frame)
                     self.frames += 1
+                    if np.abs(frame.q - before).max() < STILL:
+                        self._reached = target  # nothing to send until the mouse moves on
             self._stopped.wait(max(FRAME - (time.perf_counter() - began), 0.001))
 
     def _show(self, frame: LiveFrame) -> None:
         scene = self.drag.scene
         data = scene.state(frame.q).data
         with self.server.atomic():
-            for handle, piece in zip(self._pieces, scene.geometry.geometryObjects, strict=True):
+            for number, piece in enumerate(scene.geometry.geometryObjects):
                 place = data.oMi[piece.parentJoint] * piece.placement
-                handle.position, handle.wxyz = place.translation, _wxyz(place)
+                known = self._sent.get(number)
+                if known is None or not place.isApprox(known, STILL):
+                    handle, self._sent[number] = self._pieces[number], place
+                    handle.position, handle.wxyz = place.translation, _wxyz(place)
             for name, ball in self._handles.items():
                 ball.position = self.drag.place(name)
         self._status.content = f"**{frame.status}**"
