@@ -288,6 +288,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         return wb.Scene(arm).add(wb.Sphere(0.1), name="ball", at=(1.0, 1.0, 1.0), body=body)
 
     yield "Body", Call(wb.Body, body, lambda made: RigidBodies(loose(made)).advance(0.1))
+    for joint in (wb.BallJoint, wb.Hinge):
+        hung = {"at": (0.0, 0.0, 0.1), "to": None, **({"axis": (0.0, 1.0, 0.0)} if joint is wb.Hinge else {})}
+        yield joint.__name__, Call(joint, hung, lambda made: RigidBodies(loose(wb.Body(joints=[made]))).advance(0.1))
+    yield "Body(joints)", Call(wb.Body, {"joints": ()}, lambda made: RigidBodies(loose(made)).advance(0.1))
     yield "Body(density)", Call(wb.Body, {"density": 500.0}, lambda made: RigidBodies(loose(made)).advance(0.1))
     material = {"name": "glass", "against": {"wood": (0.5, 0.1)}, "others": (0.5, 0.1)}
     yield "Material", Call(wb.Material, material, lambda made: RigidBodies(loose(wb.Body(material=made))))
@@ -360,6 +364,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Plane", Call(wb.Plane, plane, solve_it)
     yield "Balance", Call(wb.Balance, {"feet": ["left_foot"], "margin": 0.0}, on_a_person)
     yield "ReachCones", Call(wb.ReachCones, {"names": ["left_shoulder"]}, on_a_person)
+    yield "RangeOfMotion", Call(wb.RangeOfMotion, {"names": ["neck"]}, on_a_person)
     yield "Cylinder", Call(wb.Cylinder, {"radius": 0.1, "length": 0.2}, lambda shape: shape.pieces())
     yield "Torus", Call(wb.Torus, {"radius": 0.1, "tube": 0.02}, lambda shape: shape.pieces())
     task = wb.read_task(path / "task.toml")
@@ -639,6 +644,15 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     clip.write(path / "read.npz")
     files = {"files": [path / "read.npz"], "folder": path / "many", "figure": arm, "jobs": 1, "progress": print}
     yield "read_many", Call(wb.read_many, files)
+    at_once: dict[str, Any] = {"method": "qp", "jobs": 1, "seconds": 9.0, "warm_start": True}
+    at_once |= {"folder": path / "records", "progress": lambda told: True}
+    yield "solve_many", Call(wb.solve_many, {"problems": [], **at_once})
+    varied = {"task": path / "task.toml", "layouts": {"as it is": {}}, **at_once}
+    yield "study", Call(wb.study, varied)
+    anything = partial(wb.study, lambda *given: ask, progress=lambda told: True)
+    yield "study(function)", Call(anything, {"people": [arm], "targets": [places[0]], "layouts": [None]})
+    record = wb.SolveRecord("a")
+    yield "Records", Call(wb.Records, {"records": [record]}, lambda made: (repr(made), made.counts(), made.rows()))
     for method in (wb.Trajectory, wb.PerFrame, wb.Fade, wb.Bisection):
         yield f"{method.__name__}.avoid", Call(method().avoid, avoided)
     settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "solver": "osqp", "iterations": 10}

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         Torus,
     )
     from wholebody.matter.body import Body
+    from wholebody.matter.joints import BallJoint, Hinge
     from wholebody.matter.materials import Material
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
@@ -74,6 +75,11 @@ if TYPE_CHECKING:
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
     from wholebody.solution import Solution
+    from wholebody.studies.many import SolveProgress, solve_many
+    from wholebody.studies.reach_map import reach_map
+    from wholebody.studies.reach_result import ReachMap
+    from wholebody.studies.records import Records, SolveRecord
+    from wholebody.studies.study import study
     from wholebody.taskfile import Result, Task, read_result, read_task, write_result, write_task
     from wholebody.tasks import (
         Axis,
@@ -96,8 +102,10 @@ if TYPE_CHECKING:
         Point,
         Posture,
         PotentialEnergy,
+        RangeOfMotion,
         ReachCones,
         Relative,
+        Rhythm,
         Sit,
         Stand,
         StepLimit,
@@ -119,6 +127,7 @@ __all__ = [
     "AvoidedCase",
     "Axis",
     "Balance",
+    "BallJoint",
     "BatchProgress",
     "Bisection",
     "Body",
@@ -146,6 +155,7 @@ __all__ = [
     "Goal",
     "Grasp",
     "HalfSpace",
+    "Hinge",
     "Hold",
     "Hull",
     "InputError",
@@ -163,14 +173,20 @@ __all__ = [
     "Posture",
     "PotentialEnergy",
     "Problem",
+    "RangeOfMotion",
     "ReachCones",
+    "ReachMap",
+    "Records",
     "Relative",
     "Result",
+    "Rhythm",
     "Scene",
     "Shape",
     "Sit",
     "SkeletonMotion",
     "Solution",
+    "SolveProgress",
+    "SolveRecord",
     "Sphere",
     "Spring",
     "StanceFeet",
@@ -195,6 +211,7 @@ __all__ = [
     "equipment",
     "follow_path",
     "load",
+    "reach_map",
     "read_clip",
     "read_many",
     "read_result",
@@ -203,6 +220,8 @@ __all__ = [
     "retarget",
     "simplify",
     "solve",
+    "solve_many",
+    "study",
     "torques",
     "write_result",
     "write_task",
@@ -216,6 +235,7 @@ _MODULES = {
     "wholebody.dynamics.coupling": "Spring",
     "wholebody.dynamics.world": "World",
     "wholebody.matter.body": "Body",
+    "wholebody.matter.joints": "BallJoint Hinge",
     "wholebody.matter.materials": "Material",
     "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
@@ -249,10 +269,15 @@ _MODULES = {
     "wholebody.scene": "Scene",
     "wholebody.simplification.simplify": "simplify",
     "wholebody.solution": "Solution",
+    "wholebody.studies.many": "SolveProgress solve_many",
+    "wholebody.studies.records": "Records SolveRecord",
+    "wholebody.studies.reach_map": "reach_map",
+    "wholebody.studies.reach_result": "ReachMap",
+    "wholebody.studies.study": "study",
     "wholebody.taskfile": "Result Task read_result read_task write_result write_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
-    "Hold Measure Orientation Plane Point Posture PotentialEnergy ReachCones Relative StepLimit "
-    "Grasp Lean Sit Stand Touch",
+    "Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
+    "StepLimit Grasp Lean Sit Stand Touch",
     "wholebody.view": "Viewer",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}

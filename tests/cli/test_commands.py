@@ -327,7 +327,12 @@ def test_completion_names_commands_and_options(capsys: pytest.CaptureFixture[str
 
 @pytest.mark.parametrize(("package", "command"), [("shtab", ["completion", "bash"]), ("viser", ["drag", "--live"])])
 def test_a_package_that_is_missing_is_named(
-    package: str, command: list[str], root: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any, tmp_path: Path
+    package: str,
+    command: list[str],
+    root: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
     if command[0] == "drag":

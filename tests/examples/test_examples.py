@@ -172,7 +172,7 @@ def sits(problem: wb.Problem, solution: wb.Solution) -> None:
     place = places(problem, solution.q)
     for side in ("left", "right"):
         thigh = place(f"{side}_thigh").actInv(place(f"{side}_palm")).translation
-        np.testing.assert_allclose(thigh, [0.067, 0.0, -0.32], atol=1e-5)
+        np.testing.assert_allclose(thigh, [0.067, 0.0, -0.34], atol=1e-5)
 
 
 def test_chair_of_boxes(example: Example, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:

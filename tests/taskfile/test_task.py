@@ -80,10 +80,11 @@ def test_terms_are_those_that_python_makes(everything: wb.Task) -> None:
             wb.Balance(("left_foot", "right_foot"), margin=0.01),
             wb.Freeze("lower_body", "root"),
             wb.ReachCones(["right_shoulder"]),
+            wb.RangeOfMotion(["neck", "left_hamstrings"]),
             wb.Stand("ground", feet=["left_foot"], balance=False),
             wb.Grasp("right", "rod", "power"),
         ],
-        measures=[wb.Effort(), wb.Discomfort(0.1), wb.Displacement(), wb.PotentialEnergy(0.01)],
+        measures=[wb.Effort(), wb.Discomfort(0.1), wb.Displacement(), wb.PotentialEnergy(0.01), wb.Rhythm(2.0)],
     )
     q = pin.integrate(problem.scene.model, problem.start, np.linspace(-0.1, 0.1, 55))
     state = State(problem.scene.model).update(q)
@@ -112,7 +113,8 @@ def test_what_is_left_out_is_what_python_leaves_out(tmp_path: Path) -> None:
     task = wb.read_task(tmp_path / "least.toml")
     assert task.title == "least"
     np.testing.assert_array_equal(task.problem.start, wb.load("human").posture("standing"))
-    assert [type(measure) for measure in task.problem.measures] == [wb.Effort]
+    assert [type(measure) for measure in task.problem.measures] == [wb.Effort, wb.Rhythm]
+    assert [type(term) for term in task.problem.defaults] == [wb.RangeOfMotion, wb.ReachCones]
     assert task.problem.goals == ()
     assert task.problem.clearance == 0.0
 

@@ -73,11 +73,10 @@ def test_mouse_drags_holds_undoes_and_saves(page: LivePage, tmp_path: Path) -> N
         until(lambda: drag.place("right_palm")[2] > before[2] + 0.05)
         time.sleep(1.0)
         browser.mouse("mouseReleased", x + 12, y - 24)
-        moved = until(lambda: (way := drag.place("right_palm") - before)[2] > 0.05 and way)
+        until(lambda: drag.place("right_palm")[2] > before[2] + 0.05)
         assert np.linalg.norm(drag.place("left_sole") - drag.place_at(start, "left_sole")) < 2e-3
         seen = pixel(drag.place("right_palm"), client.camera.fov)
         assert np.hypot(seen[0] - x - 12, seen[1] - y + 24) < 8  # it is under the mouse
-        assert moved[2] > 0.05
 
         browser.mouse("mouseMoved", *seen)
         browser.mouse("mousePressed", *seen, pressed=True)

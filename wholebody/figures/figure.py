@@ -75,13 +75,14 @@ class Figure:
         frames: names of frames for goals.
         segments: names of the links; they are frames too.
         cones: reach cones of shoulders and hips.
+        ranges: ranges of motion that more than one joint angle decides, by name; see `figures.motion_ranges`.
         collision_groups: segment to collision group ("torso_head", "left_arm", ...).
         excluded_pairs: pairs of pieces that are never tested, with the reason.
         notes: sentences on what had to be changed about the geometry of a file.
         limits: joint limits as arrays.
         loaded_as: name or path and options by which `wb.load` made it; None for one made in another way.
         followers: joint to the law by which it follows another (mimic).
-        effort_weights: (nv,) weight of each degree of freedom in the effort; 0 for the root.
+        effort_weights: (nv,) weight of each degree of freedom in the effort.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
     """
 
@@ -106,6 +107,7 @@ class Figure:
         self.chains = MappingProxyType(dict(description.chains))
         self.frames, self.segments = description.frames, description.segments
         self.cones = MappingProxyType(dict(description.cones))
+        self.ranges = MappingProxyType(dict(description.ranges))
         self.collision_groups = MappingProxyType(dict(description.collision_groups))
         self.excluded_pairs, self.notes = description.excluded, description.notes
         self.loaded_as: tuple[str, dict[str, Any]] | None = None
@@ -118,13 +120,14 @@ class Figure:
         self._joints = tuple(name for name in self._joint_ids if name != ROOT_JOINT)
         self.limits = limits_of(model)
         self.followers = MappingProxyType(followers_of(model))
-        root = slice(0, 6 if self.root == "free" else 0)
+        root = 6 if self.root == "free" else 0
         self.effort_weights = np.ones(model.nv)
         for joint, weight in description.effort.items():
             if joint in self._joint_ids:
                 self.effort_weights[self.dofs([joint])] = weight
         self.neutral_weights = np.ones(model.nv)
-        self.effort_weights[root] = self.neutral_weights[root] = 0.0
+        self.neutral_weights[:root] = 0.0
+        self.effort_weights[:root] = np.repeat(description.root_effort, 3)[:root]
 
     def __repr__(self) -> str:
         return (

@@ -101,8 +101,9 @@ def leave_out(problem: Problem, parts: Parts) -> Simplified:
     kept = _kept_pieces(whole, numbers) if parts.pairs else list(range(geometry.ngeoms))
     small = _scene(whole, figure, geometry, kept, numbers, pieces)
     made = Problem(
-        small, start, goals=terms[0], constraints=[*terms[1], *terms[2]], measures=terms[3], clearance=problem.clearance
-    )
+        small, start, goals=terms[0], constraints=[*terms[1], *terms[2]], measures=terms[3],
+        clearance=problem.clearance, range_of_motion=False, balance=False,
+    )  # fmt: skip
     made.clearances = problem.clearances[numbers]
     made.measures_given = problem.measures_given
     return Simplified(made, problem, _left_out(problem, made, part, len(numbers), rigid, grown), embedding)

@@ -268,3 +268,4 @@ FRAME = Name("frame", lambda figure: {*figure.frames, *figure.segments, *figure.
 SEGMENT = Name("segment", lambda figure: figure.segments)
 POSTURE = Name("posture", lambda figure: figure.postures)
 CONE = Name("reach cone", lambda figure: figure.cones)
+RANGE = Name("range of motion", lambda figure: figure.ranges)

@@ -77,7 +77,19 @@ def read_task(path: str | PathLike[str]) -> Task:
         InputError: values that contradict each other.
     """
     file = checked_path(path, "path")
-    contents = read_contents(file)
+    return task_from(read_contents(file), file)
+
+
+def task_from(contents: Contents, file: Path) -> Task:
+    """The task that the contents of a file state.
+
+    Args:
+        contents: of the file, or changed since.
+        file: which paths are relative to.
+
+    Raises:
+        FileFormatError, UnknownNameError, InputError: as for `read_task`.
+    """
     figure = _figure(contents)
     for entries in contents.tables.values():
         for entry in entries:
@@ -97,6 +109,8 @@ def read_task(path: str | PathLike[str]) -> Task:
             measures=terms["measure"] or None,
             clearance=top.values.get("clearance", 0.0),
             touching=top.values.get("touching", ()),
+            range_of_motion=top.values.get("range_of_motion", True),
+            balance=top.values.get("balance"),
         ),
     )
     method = contents.one("method")

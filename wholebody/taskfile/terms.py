@@ -181,6 +181,11 @@ CONSTRAINTS = {
         (Key("names", kinds.Several(kinds.CONE), "which cones; all if left out"),),
         tasks.ReachCones,
     ),
+    "range_of_motion": Form(
+        "Keep two-joint muscles, upper arms and neck within their ranges.",
+        (Key("names", kinds.Several(kinds.RANGE), "which ranges; all if left out"),),
+        tasks.RangeOfMotion,
+    ),
     "stand": Form(
         "Stand with flat soles on a thing; the feet may slide, and the centre of mass stays over them.",
         (
@@ -200,6 +205,9 @@ MEASURES = {
         "Distance of joints from neutral, and nearness to their limits.", (_weight("no unit"),), tasks.Discomfort
     ),
     "displacement": Form("Displacement from the neutral posture.", (_weight("1/rad^2"),), tasks.Displacement),
+    "rhythm": Form(
+        "How clavicles follow the arms, and the lumbar spine the pelvis.", (_weight("no unit"),), tasks.Rhythm
+    ),
     "potential_energy": Form("Lifting and lowering of segments.", (_weight("1/J^2"),), tasks.PotentialEnergy),
 }
 

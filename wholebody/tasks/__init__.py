@@ -15,8 +15,10 @@ from wholebody.tasks.plane import Plane
 from wholebody.tasks.point import Point
 from wholebody.tasks.posture import Posture
 from wholebody.tasks.potential_energy import PotentialEnergy
+from wholebody.tasks.range_of_motion import RangeOfMotion
 from wholebody.tasks.reach_cones import ReachCones
 from wholebody.tasks.relative import Relative
+from wholebody.tasks.rhythm import Rhythm
 from wholebody.tasks.sit import Sit
 from wholebody.tasks.stand import Stand
 from wholebody.tasks.touch import Lean, Touch
@@ -42,8 +44,10 @@ __all__ = [
     "Point",
     "Posture",
     "PotentialEnergy",
+    "RangeOfMotion",
     "ReachCones",
     "Relative",
+    "Rhythm",
     "Sit",
     "Stand",
     "StepLimit",

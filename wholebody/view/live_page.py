@@ -97,11 +97,12 @@ class LivePage:
         for number, piece in enumerate(scene.geometry.geometryObjects):
             thing = scene.objects.get(scene.piece_owner[number])
             color = SKIN if thing is None else _bytes(thing.color, number)
+            opacity = THROUGH if thing is None else None if thing.color is None else thing.color[3]
             mesh = triangles(piece.geometry)
             pieces.append(
                 self.server.scene.add_mesh_simple(
-                    f"/pieces/{number}", np.asarray(mesh.vertices), np.asarray(mesh.faces), color=color,
-                    cast_shadow=False, receive_shadow=False, opacity=THROUGH if thing is None else None if thing.color is None else thing.color[3],
+                    f"/pieces/{number}", np.asarray(mesh.vertices), np.asarray(mesh.faces),
+                    color=color, opacity=opacity, cast_shadow=False, receive_shadow=False,
                 )
             )  # fmt: skip
         return pieces
