@@ -315,3 +315,27 @@ def test_what_takes_long_is_told_on_stderr_once_and_the_cache_is_cleared(
     cleared = subprocess.run([*command, "doctor", "--clear-cache"], capture_output=True, text=True, check=True)
     assert "threw away 1 meshes" in cleared.stdout
     assert not list(tmp_path.iterdir())
+
+
+def test_completion_names_commands_and_options(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("shtab")
+    assert main(["completion", "bash"]) == 0
+    script = capsys.readouterr().out
+    assert "--live" in script
+    assert "doctor" in script
+
+
+@pytest.mark.parametrize(("package", "command"), [("shtab", ["completion", "bash"]), ("viser", ["drag", "--live"])])
+def test_a_package_that_is_missing_is_named(
+    package: str,
+    command: list[str],
+    root: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    if command[0] == "drag":
+        command = ["drag", str(root / "examples" / "tasks" / "shelf.toml"), "--live", "--out", str(tmp_path)]
+    assert main(command) == 2
+    assert f"{package}, which is not installed; run: pip install 'wholebody[" in capsys.readouterr().err

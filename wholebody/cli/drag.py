@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from wholebody.problem import Problem
     from wholebody.taskfile import Task
     from wholebody.tracking.dragging import Dragged, DragJudgement
+    from wholebody.tracking.live import LiveDrag
 
 HELP = "drag a goal of a task along a path, frame by frame"
 DESCRIPTION = """\
@@ -27,7 +29,11 @@ paths:
   circle    from the start to a circle of radius --size around the goal's target, normal to --normal
   FILE      from the start through the points of a text file: x y z in metres, one point a line"""
 EPILOG = """\
+--live opens a page instead: drag the handles on hands, feet, pelvis, head and things with the mouse, click one to
+hold it; "undo" goes back, "save" writes the posture as a task file into the folder.
+
 examples:
+  wholebody drag shelf.toml --live
   wholebody drag sit_on_chair.toml --path line --method newton
   wholebody drag shelf.toml --path circle --size 0.05 --method qp
   wholebody drag shelf.toml --path corners.csv --frames 300 --out out/shelf
@@ -39,8 +45,13 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("drag", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
     parser.add_argument("task", type=Path, metavar="TASK.toml", help="the task file")
-    parser.add_argument("--path", required=True, metavar="FILE|circle|line", help="path of the goal")
-    parser.add_argument("--method", default="newton", metavar="NAME", help=f"{', '.join(METHODS)} (default: newton)")
+    way = parser.add_mutually_exclusive_group(required=True)
+    way.add_argument("--path", metavar="FILE|circle|line", help="path of the goal")
+    way.add_argument("--live", action="store_true", help="drag handles with the mouse in a browser (needs viser)")
+    parser.add_argument(
+        "--method", metavar="NAME", help=f"{', '.join(METHODS)} (default: newton along a path, qp with --live)"
+    )
+    parser.add_argument("--port", type=int, default=8080, metavar="N", help="of the live page (default: 8080)")
     parser.add_argument("--goal", type=int, metavar="N", help="which goal, from 0 (default: first point or frame)")
     parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: 0.5 m/s)")
     parser.add_argument("--size", type=float, default=0.1, metavar="M", help="radius of a circle, m (default: 0.1)")
@@ -55,6 +66,9 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 
 def run(arguments: argparse.Namespace) -> int:
     """Drag, assess, report and write; 1 if the end is not met or something was penetrated."""
+    if arguments.live:
+        return live(arguments)
+    arguments.method = arguments.method or "newton"
     from wholebody.bench.drag import drag_chart, drag_frames, drag_report, drag_summary
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_rows, write_text
@@ -80,6 +94,39 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"end: {dragged.end.message}")
     print(f"wrote {out}")
     return 0 if row.clean and dragged.end.solved else 1
+
+
+def live(arguments: argparse.Namespace) -> int:
+    """Let the figure be dragged in a browser until Ctrl-C."""
+    from functools import partial
+
+    from wholebody.cli.picture import make_folder
+    from wholebody.errors import InputError
+    from wholebody.taskfile import read_task, write_task
+    from wholebody.tracking.live import LiveDrag
+    from wholebody.view.live_page import LivePage
+
+    if not 1024 <= arguments.port <= 65535:
+        raise InputError(f"--port is {arguments.port}; give a number from 1024 to 65535")
+    task = read_task(arguments.task)
+    drag = LiveDrag(task.problem, arguments.method or "qp")
+    out = arguments.out or Path("out") / "drag" / arguments.task.stem
+    make_folder(out)
+    saved = partial(_save_posture, drag, write_task, f"{task.title}, dragged")
+    page = LivePage(drag, out / "posture.toml", arguments.port, saved)
+    print(f"drag the handles at {page.url}; Ctrl-C ends", flush=True)
+    try:
+        page.wait()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        page.stop()
+    return 0
+
+
+def _save_posture(drag: LiveDrag, write: Callable[..., Path], title: str, path: Path) -> Path:
+    """Write the present posture with its things and holds as a task file."""
+    return write(drag.stated(goals=drag.problem.goals), path, title=title)
 
 
 def followed(problem: Problem, places: Any, method: str, goal: int, label: str) -> tuple[Dragged, DragJudgement]:

@@ -144,6 +144,25 @@ class Browser:
             self._receive(end)
         self.until("window.wholebody !== undefined && window.wholebody.ready")
 
+    def visit(self, url: str, ready: str = "document.readyState === 'complete'") -> None:
+        """Open a page that is no viewer's, and wait until a JavaScript expression is true."""
+        self.errors.clear()
+        if error := self._call("Page.navigate", url=url).get("errorText"):
+            raise BrowserError(f"the browser could not open {url}: {error}")
+        self.until(ready)
+
+    def mouse(self, kind: str, x: float, y: float, pressed: bool = False) -> None:
+        """Send a mouse event at a pixel: "mousePressed", "mouseMoved" or "mouseReleased", of the left button."""
+        button = "left" if pressed or kind != "mouseMoved" else "none"
+        count = 0 if kind == "mouseMoved" else 1
+        self._call(
+            "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=int(pressed), clickCount=count
+        )
+
+    def screenshot(self) -> bytes:
+        """PNG of the whole page, controls included."""
+        return base64.b64decode(self._call("Page.captureScreenshot", format="png")["data"])
+
     def open_html(self, page: str) -> None:
         """Open a page from its HTML, as a file without network."""
         path = self._folder / "page.html"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import math
 import os
 import sys
@@ -267,6 +268,13 @@ class Viewer:
         """
         place = checks.path(path, "path")
         return write(place, static_page(self._commands(), self.title))
+
+    def _repr_html_(self) -> str:
+        """The scene in a notebook: a frame with the page that `save` writes; a sentence if nothing is shown yet."""
+        if not self._seen:
+            return "<p>nothing is shown yet; call show(q) or play(motion) first</p>"
+        page = html.escape(static_page(self._commands(), self.title), quote=True)
+        return f'<iframe srcdoc="{page}" style="width: 100%; height: 480px; border: 0"></iframe>'
 
     def picture(self, path: str | os.PathLike[str], size: tuple[int, int] = (960, 720)) -> Path:
         """Write the scene as a PNG, drawn by a headless Chromium. A motion is shown at its beginning.

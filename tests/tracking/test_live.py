@@ -1,0 +1,84 @@
+"""Dragging by hand without a page: handles, holds, things, undo, and what is saved."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.tracking.live import LiveDrag
+
+
+@pytest.fixture
+def drag() -> LiveDrag:
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.4, 0.8, 0.04)), name="table", at=(0.6, 0.0, 0.75))
+    return LiveDrag(wb.Problem(scene, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")]))
+
+
+def along(drag: LiveDrag, name: str, way: Any, frames: int = 30) -> Any:
+    start = drag.place(name)
+    drag.take(name)
+    for share in np.linspace(0.0, 1.0, frames)[1:]:
+        frame = drag.move(start + share * np.array(way))
+    drag.let_go()
+    return frame
+
+
+@pytest.mark.parametrize("method", ["qp", "newton"])
+def test_the_hand_follows_and_the_feet_stay(drag: LiveDrag, method: str) -> None:
+    drag.choose(method)
+    before = drag.place("right_palm"), drag.place("left_sole")
+    frame = along(drag, "right_palm", (0.15, -0.05, 0.2))
+    np.testing.assert_allclose(drag.place("right_palm"), before[0] + (0.15, -0.05, 0.2), atol=2e-3)
+    np.testing.assert_allclose(drag.place("left_sole"), before[1], atol=1e-3)
+    assert frame.overlap < 1e-4
+    assert frame.status == f"dragging right_palm, by {drag.method.name}"
+
+
+def test_holds_are_those_of_the_problem_and_can_be_released(drag: LiveDrag) -> None:
+    assert drag.held == {"left_sole", "right_sole"}
+    before = drag.place("left_sole")
+    along(drag, "left_sole", (0.0, 0.1, 0.1))  # a held handle that is taken is free while it is dragged
+    np.testing.assert_allclose(drag.place("left_sole"), before + (0.0, 0.1, 0.1), atol=3e-3)
+    assert drag.toggle("left_palm")
+    palm = drag.place("left_palm")
+    along(drag, "pelvis", (0.0, 0.05, -0.1))
+    np.testing.assert_allclose(drag.place("left_palm"), palm, atol=2e-3)
+    assert not drag.toggle("left_palm")
+
+
+def test_a_thing_pushes_the_hand_away_and_undo_brings_both_back(drag: LiveDrag) -> None:
+    q = drag.q.copy()
+    along(drag, "table", (-0.5, 0.0, 0.0), 60)
+    assert drag.scene.objects["table"].placement.translation[0] == pytest.approx(0.1, abs=1e-9)
+    assert drag.report().overlap < 2e-3
+    assert not np.allclose(drag.q, q)
+    assert drag.problem.scene.objects["table"].placement.translation[0] == pytest.approx(0.6)  # the caller's own stays
+    assert drag.undo()
+    np.testing.assert_array_equal(drag.q, q)
+    assert drag.scene.objects["table"].placement.translation[0] == pytest.approx(0.6)
+    assert not drag.undo()
+
+
+def test_the_posture_is_a_task(drag: LiveDrag, tmp_path: Any) -> None:
+    along(drag, "right_palm", (0.1, 0.0, 0.2))
+    task = wb.read_task(wb.write_task(drag.stated(), tmp_path / "posture.toml"))
+    np.testing.assert_allclose(task.problem.start, drag.q, atol=1e-12)
+    assert len(task.problem.constraints) == 2
+
+
+def test_mistakes_are_named(drag: LiveDrag) -> None:
+    with pytest.raises(wb.UnknownNameError, match="right_palm"):
+        drag.take("right_plam")
+    with pytest.raises(wb.InputError, match="take one first"):
+        drag.move((0.0, 0.0, 0.0))
+    drag.choose("ccd")
+    drag.problem.scene.figure  # noqa: B018
+    frame_with_trouble = LiveDrag(
+        wb.Problem(drag.scene, goals=[wb.Lean("table")], constraints=[wb.Hold("left_foot")]), "ccd"
+    )
+    frame_with_trouble.take("right_palm")
+    assert "cannot take" in frame_with_trouble.move(frame_with_trouble.place("right_palm")).status

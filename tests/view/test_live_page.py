@@ -1,0 +1,101 @@
+"""The page of a live drag in a real Chromium, driven by mouse events."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.tracking.live import LiveDrag
+from wholebody.view.browser import Browser
+from wholebody.view.live_page import LivePage, triangles
+
+pytestmark = pytest.mark.browser
+EYE, TARGET = np.array((2.2, -1.6, 1.4)), np.array((0.0, 0.0, 0.9))
+SIZE = (760, 320)  # small: without a GPU a frame of a large page takes a second
+
+
+@pytest.fixture
+def page(tmp_path: Path) -> Iterator[LivePage]:
+    pytest.importorskip("viser")
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.4, 0.8, 0.04)), name="table", at=(0.6, 0.3, 0.75))
+    drag = LiveDrag(wb.Problem(scene, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")]))
+    made = LivePage(drag, tmp_path / "posture.toml", 8377, lambda path: wb.write_task(drag.stated(), path))
+    yield made
+    made.stop()
+
+
+def until(true: Callable[[], Any], seconds: float = 240.0) -> Any:
+    end = time.monotonic() + seconds
+    while not (found := true()):
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.05)
+    return found
+
+
+def pixel(place: Any, fov: float) -> tuple[float, float]:
+    """Where a pinhole camera with z upright sees a place."""
+    forward = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    away = np.asarray(place) - EYE
+    scale = SIZE[1] / 2 / np.tan(fov / 2) / (away @ forward)
+    return SIZE[0] / 2 + scale * (away @ right), SIZE[1] / 2 - scale * (away @ np.cross(right, forward))
+
+
+def press(browser: Browser, text: str) -> None:
+    script = f"[...document.querySelectorAll('button')].find(b => b.textContent.includes('{text}')).click()"
+    browser.evaluate(script)
+
+
+@pytest.mark.timeout(600)
+def test_mouse_drags_holds_undoes_and_saves(page: LivePage, tmp_path: Path) -> None:
+    drag, start = page.drag, page.drag.q.copy()
+    with Browser(SIZE, timeout=240.0) as browser:
+        browser.visit(page.url)
+        client = until(lambda: list(page.server.get_clients().values()))[0]
+        client.camera.position, client.camera.look_at = EYE, TARGET
+        until(lambda: np.allclose(client.camera.position, EYE, atol=1e-3))
+        time.sleep(3.0)  # the page fades in, and the pieces arrive
+        before = drag.place("right_palm")
+        x, y = pixel(before, client.camera.fov)
+        browser.mouse("mouseMoved", x, y)
+        browser.mouse("mousePressed", x, y, pressed=True)
+        for share in np.linspace(0.0, 1.0, 7)[1:]:
+            browser.mouse("mouseMoved", x + 12 * share, y - 24 * share, pressed=True)
+        until(lambda: drag.place("right_palm")[2] > before[2] + 0.05)
+        time.sleep(1.0)
+        browser.mouse("mouseReleased", x + 12, y - 24)
+        until(lambda: drag.place("right_palm")[2] > before[2] + 0.05)
+        assert np.linalg.norm(drag.place("left_sole") - drag.place_at(start, "left_sole")) < 2e-3
+        seen = pixel(drag.place("right_palm"), client.camera.fov)
+        assert np.hypot(seen[0] - x - 12, seen[1] - y + 24) < 8  # it is under the mouse
+
+        browser.mouse("mouseMoved", *seen)
+        browser.mouse("mousePressed", *seen, pressed=True)
+        browser.mouse("mouseReleased", *seen)
+        until(lambda: "right_palm" in drag.held)
+
+        press(browser, "save")
+        until((tmp_path / "posture.toml").exists)
+        assert len(wb.read_task(tmp_path / "posture.toml").problem.constraints) == 3
+        press(browser, "undo")
+        until(lambda: np.array_equal(drag.q, start))
+        assert not browser.errors
+
+
+@pytest.mark.parametrize(
+    "shape", [coal.Box(0.1, 0.2, 0.3), coal.Sphere(0.1), coal.Capsule(0.1, 0.3), coal.Ellipsoid(0.1, 0.2, 0.3)]
+)
+def test_what_is_drawn_has_the_size_of_what_is_tested(shape: Any) -> None:
+    mesh = triangles(shape)
+    shape.computeLocalAABB()
+    np.testing.assert_allclose(mesh.bounds, (shape.aabb_local.min_, shape.aabb_local.max_), atol=1e-2)
+    assert mesh.is_watertight

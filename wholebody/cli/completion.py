@@ -1,0 +1,42 @@
+"""`wholebody completion`: print a script that completes commands, options and files in a shell."""
+
+from __future__ import annotations
+
+import argparse
+
+SHELLS = ("bash", "zsh", "tcsh")
+HELP = "print the completion script of a shell"
+DESCRIPTION = """\
+Print a script with which a shell completes the commands and options of wholebody. It needs shtab:
+pip install 'wholebody[completion]'. The script itself needs nothing and costs no time when the command starts."""
+EPILOG = """\
+examples:
+  wholebody completion bash > ~/.local/share/bash-completion/completions/wholebody
+  wholebody completion zsh > ~/.zfunc/_wholebody"""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser("completion", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
+    parser.add_argument("shell", choices=SHELLS, help="the shell")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the script.
+
+    Raises:
+        MissingPackageError: shtab is not installed.
+    """
+    from wholebody.cli.main import parser
+    from wholebody.errors import MissingPackageError
+
+    try:
+        import shtab
+    except ImportError:
+        raise MissingPackageError(
+            "completion scripts need shtab, which is not installed; run: pip install 'wholebody[completion]'"
+        ) from None
+    print(shtab.complete(parser(), shell=arguments.shell))
+    return 0

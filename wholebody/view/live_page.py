@@ -1,0 +1,248 @@
+"""The page of a live drag: viser shows the figure and its handles, the mouse moves them. Needs the extra `drag`."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wholebody.errors import MissingPackageError, WholebodyError
+from wholebody.methods import METHODS
+from wholebody.tracking.drag import FRAME
+from wholebody.tracking.live import LiveDrag, LiveFrame
+
+SKIN, FREE, HELD, GRIP = (214, 180, 150), (70, 130, 220), (225, 90, 40), (90, 170, 90)
+STILL = 1e-5  # m, rad: what moves less is not sent
+EYE = (2.2, -1.6, 0.6)  # m: of the camera, from the figure's centre of mass
+RADIUS = 0.04  # m: of a handle
+THROUGH = 0.7  # opacity of the figure, so that the handles in it are seen
+GROUND = 6.0  # m: of the piece of a half-space that is drawn
+SECTIONS = (24, 24)  # of what is round
+
+
+class LivePage:
+    """Shows a live drag in browsers until it is stopped.
+
+    Attributes:
+        drag: what is dragged.
+        url: where browsers find the page.
+        server: the viser.ViserServer.
+        frames: frames that were made.
+    """
+
+    def __init__(self, drag: LiveDrag, save_to: Path, port: int = 8080, save: Callable[[Path], Path] | None = None):
+        """Open the page.
+
+        Args:
+            drag: what is dragged.
+            save_to: file that the button "save" writes.
+            port: of the page on this machine; the next free one if it is taken.
+            save: writes the present posture to a file.
+
+        Raises:
+            MissingPackageError: viser is not installed.
+        """
+        try:
+            import viser
+        except ImportError:
+            raise MissingPackageError(
+                "dragging in a browser needs viser, which is not installed; run: pip install 'wholebody[drag]'"
+            ) from None
+        self.drag, self.frames = drag, 0
+        self._save_to, self._save = save_to, save
+        self._lock = threading.RLock()
+        self._target: Any = None
+        self._reached: Any = None
+        self._sent: dict[int, Any] = {}
+        self._stopped = threading.Event()
+        self.server: Any = viser.ViserServer(host="127.0.0.1", port=port, label="wholebody drag", verbose=False)
+        self.url = f"http://127.0.0.1:{self.server.get_port()}"
+        self.server.scene.set_up_direction("+z")
+        self.server.scene.configure_default_lights(cast_shadow=False)  # shadows cost most of a frame without a GPU
+        self._look()
+        self._pieces = self._draw()
+        self._handles = {name: self._handle(name) for name in (*drag.handles, *drag.things)}
+        self._panel()
+        self._show(drag.report())
+        self._loop = threading.Thread(target=self._run, name="wholebody drag", daemon=True)
+        self._loop.start()
+
+    def stop(self) -> None:
+        """End the page and its thread."""
+        self._stopped.set()
+        self._loop.join(timeout=5.0)
+        self.server.stop()
+
+    def wait(self) -> None:
+        """Wait until the page is stopped, or Ctrl-C."""
+        while not self._stopped.wait(0.2):
+            pass
+
+    def _look(self) -> None:
+        """Look at the whole figure from the front right."""
+        middle = self.drag.scene.state(self.drag.q).center_of_mass()
+        self.server.initial_camera.position = middle + np.array(EYE)
+        self.server.initial_camera.look_at = middle
+
+    def _draw(self) -> list[Any]:
+        scene = self.drag.scene
+        pieces = []
+        for number, piece in enumerate(scene.geometry.geometryObjects):
+            thing = scene.objects.get(scene.piece_owner[number])
+            color = SKIN if thing is None else _bytes(thing.color, number)
+            opacity = THROUGH if thing is None else None if thing.color is None else thing.color[3]
+            mesh = triangles(piece.geometry)
+            pieces.append(
+                self.server.scene.add_mesh_simple(
+                    f"/pieces/{number}", np.asarray(mesh.vertices), np.asarray(mesh.faces),
+                    color=color, opacity=opacity, cast_shadow=False, receive_shadow=False,
+                )
+            )  # fmt: skip
+        return pieces
+
+    def _handle(self, name: str) -> Any:
+        color = GRIP if name in self.drag.things else HELD if name in self.drag.held else FREE
+        ball = self.server.scene.add_icosphere(
+            f"/handles/{name}", RADIUS, color=color, position=self.drag.place(name), cast_shadow=False
+        )
+        offset = np.zeros(3)
+
+        async def dragged(event: Any) -> None:
+            nonlocal offset
+            with self._lock:
+                if event.phase == "start":
+                    self.drag.take(name)
+                    offset = self.drag.place(name) - np.array(event.start_position)
+                if event.phase == "end":
+                    self.drag.let_go()
+                    self._target = None
+                else:
+                    self._target = np.array(event.end_position) + offset
+
+        async def clicked(_: Any) -> None:
+            if name in self.drag.handles:
+                self.toggle(name)
+
+        ball.on_drag(dragged)
+        ball.on_click(clicked)
+        return ball
+
+    def toggle(self, name: str) -> None:
+        """Hold or release a frame."""
+        with self._lock:
+            held = self.drag.toggle(name)
+            self._handles[name].color = HELD if held else FREE
+            self._boxes[name].value = held
+
+    def _panel(self) -> None:
+        gui = self.server.gui
+        self._status, self._numbers = gui.add_markdown(""), gui.add_markdown("")
+        self._method = gui.add_dropdown("method", tuple(METHODS), initial_value=self.drag.method.name)
+        self._method.on_update(self._choose)
+        self._boxes: dict[str, Any] = {}
+        for name in self.drag.handles:
+            self._boxes[name] = gui.add_checkbox(f"hold {name}", name in self.drag.held)
+            self._boxes[name].on_update(partial(self._ticked, name))
+        gui.add_button("undo").on_click(self._undo)
+        if self._save is not None:
+            gui.add_button(f"save as {self._save_to.name}").on_click(self._write)
+
+    def _choose(self, _: Any) -> None:
+        with self._lock:
+            self.drag.choose(self._method.value)
+
+    def _ticked(self, name: str, _: Any) -> None:
+        if self._boxes[name].value != (name in self.drag.held):
+            self.toggle(name)
+
+    def _undo(self, _: Any) -> None:
+        with self._lock:
+            self.drag.undo()
+            self._target = None
+            self._show(self.drag.report())
+
+    def _write(self, _: Any) -> None:
+        with self._lock:
+            self._status.content = self._saved()
+
+    def _saved(self) -> str:
+        assert self._save is not None
+        try:
+            return f"wrote {self._save(self._save_to)}"
+        except WholebodyError as error:
+            return str(error)
+
+    def _run(self) -> None:
+        while not self._stopped.is_set():
+            began = time.perf_counter()
+            with self._lock:
+                if self._target is not None and (self._target is not self._reached):
+                    target, before = self._target, self.drag.q
+                    frame = self.drag.move(target)
+                    self._show(frame)
+                    self.frames += 1
+                    if np.abs(frame.q - before).max() < STILL:
+                        self._reached = target  # nothing to send until the mouse moves on
+            self._stopped.wait(max(FRAME - (time.perf_counter() - began), 0.001))
+
+    def _show(self, frame: LiveFrame) -> None:
+        scene = self.drag.scene
+        data = scene.state(frame.q).data
+        with self.server.atomic():
+            for number, piece in enumerate(scene.geometry.geometryObjects):
+                place = data.oMi[piece.parentJoint] * piece.placement
+                known = self._sent.get(number)
+                if known is None or not place.isApprox(known, STILL):
+                    handle, self._sent[number] = self._pieces[number], place
+                    handle.position, handle.wxyz = place.translation, _wxyz(place)
+            for name, ball in self._handles.items():
+                ball.position = self.drag.place(name)
+        self._status.content = f"**{frame.status}**"
+        self._numbers.content = (
+            f"{frame.contacts} contacts, deepest overlap {1e3 * frame.overlap:.2f} mm  \n"
+            f"handle off by {1e3 * frame.error:.1f} mm; frame {1e3 * frame.seconds:.1f} ms"
+        )
+
+
+def _wxyz(place: pin.SE3) -> Any:
+    x, y, z, w = pin.Quaternion(place.rotation).coeffs()
+    return np.array((w, x, y, z))
+
+
+def _bytes(color: tuple[float, float, float, float] | None, number: int) -> tuple[int, int, int]:
+    from wholebody.view import style
+
+    red, green, blue = (style.object_color(number) if color is None else color)[:3]
+    return round(255 * red), round(255 * green), round(255 * blue)
+
+
+def triangles(shape: Any) -> Any:
+    """A trimesh of a coal shape, about the shape's own origin; a square of a half-space."""
+    import trimesh
+
+    if isinstance(shape, coal.Box):
+        return trimesh.creation.box(2.0 * np.array(shape.halfSide))
+    if isinstance(shape, coal.Sphere):
+        return trimesh.creation.icosphere(radius=shape.radius)
+    if isinstance(shape, coal.Capsule):
+        mesh = trimesh.creation.capsule(2.0 * shape.halfLength, shape.radius, count=SECTIONS)
+        mesh.apply_translation(-mesh.bounds.mean(axis=0))
+        return mesh
+    if isinstance(shape, coal.Ellipsoid):
+        mesh = trimesh.creation.icosphere()
+        mesh.apply_scale(np.array(shape.radii))
+        return mesh
+    if isinstance(shape, coal.Halfspace):
+        place = trimesh.geometry.align_vectors((0.0, 0.0, 1.0), np.array(shape.n))
+        mesh = trimesh.creation.box((GROUND, GROUND, 1e-3))
+        mesh.apply_transform(place)
+        mesh.apply_translation(np.array(shape.n) * (float(shape.d) - 1e-3))
+        return mesh
+    return trimesh.convex.convex_hull(np.array(shape.points()))
