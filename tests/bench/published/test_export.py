@@ -35,6 +35,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_gives_others(tmp_path: P
 def test_all_files_are_there(folder: Path) -> None:
     index = json.loads((folder / "index.json").read_text())
     assert list(index["sets"]) == list(SETS)
+    assert "nothing of wholebody is imported" in (folder / "clients" / "plain_pinocchio.py").read_text()
     assert (folder / "LICENSE").read_text().startswith("Creative Commons Legal Code\n\nCC0 1.0 Universal")
     for name, family in index["sets"].items():
         assert family["problems"] == [f"{name}/0000", f"{name}/0001"]

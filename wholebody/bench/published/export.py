@@ -78,6 +78,8 @@ def export(
         done.write(f"{name}.schema.json", read_text(STATIC / f"{name}.schema.json"))
     for name, source in (("LICENSE", "LICENSE.txt"), ("README.md", "README.txt")):
         done.write(name, read_text(STATIC / source))
+    for path in client_paths():
+        done.write(f"clients/{path.name}", read_text(path))
     index = {
         "format": "wholebody index",
         "version": VERSION,
@@ -89,6 +91,20 @@ def export(
     }
     write(folder / INDEX, dumped(index))  # last: a folder without it was not finished
     return folder / INDEX
+
+
+def client_paths() -> list[Path]:
+    """Return the example clients: inside an installed package, or among the examples of a checkout.
+
+    Raises:
+        WholebodyError: the installation lacks them.
+    """
+    here = Path(__file__).resolve().parent
+    for folder in (here / "clients", here.parents[2] / "examples" / "clients"):
+        found = sorted(folder.glob("*.py"))
+        if found:
+            return found
+    raise WholebodyError(f"there are no clients in {here} or beside the package; install wholebody again")
 
 
 def _written_set(
