@@ -23,6 +23,7 @@ from wholebody.bench.tables import programs_text
 from wholebody.compiled import compile_all
 from wholebody.errors import WholebodyError
 from wholebody.methods.base import SolvedStep, Tracker
+from wholebody.methods.differential import TOOL
 from wholebody.motion_assessment import third_differences
 from wholebody.problem import Problem
 from wholebody.runner import allow
@@ -154,7 +155,7 @@ def sentence(error: BaseException) -> str:
 
 
 def _once(method: Any, problem: Problem, empty: Record) -> Record:
-    worked, began = time.process_time(), time.perf_counter()
+    of_tool, worked, began = TOOL.seconds, time.process_time(), time.perf_counter()
     solution = method.solve(problem)
     spent = time.perf_counter() - began - solution.assessment.seconds
     worked = time.process_time() - worked
@@ -171,6 +172,7 @@ def _once(method: Any, problem: Problem, empty: Record) -> Record:
         said=" ".join(solution.message.split())[:300],
         seconds=max(spent, 0.0),
         cpu_seconds=max(worked, 0.0),
+        tool_seconds=TOOL.seconds - of_tool,
         iterations=float(solution.iterations),
         programs=programs_text(solution.programs),
     )

@@ -37,6 +37,7 @@ class Summary:
             that is not solved counts as long as a solve may take.
         kernels: the median in units of the reference kernel; NaN where that was not timed.
         cold_ms: median of the first solve in a process; NaN where no process was new.
+        tool: share of the time within calls of the tool behind an adapter, median; 0 for methods of our own.
         setup_ms, iterations: medians; the first to build a model of its own.
         programs: what closed its quadratic programs, of all problems together.
         worst_median: median of the worst error [m or rad].
@@ -68,6 +69,7 @@ class Summary:
     cold_ms: float
     p95_ms: float
     cpu_median_ms: float
+    tool: float
     setup_ms: float
     iterations: float
     programs: str
@@ -146,6 +148,7 @@ def _summary(
         cold_ms=1e3 * middle([seconds[adapter] for seconds in cold if adapter in seconds]),
         p95_ms=1e3 * middle([record.seconds for record in answered], 0.95),
         cpu_median_ms=1e3 * middle([record.cpu_seconds for record in answered]),
+        tool=middle([record.tool_seconds / max(record.seconds, 1e-9) for record in answered]),
         setup_ms=1e3 * middle([record.setup_seconds for record in answered]),
         iterations=middle([record.iterations for record in answered]),
         programs=summed_programs(record.programs for record in answered),
