@@ -35,6 +35,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_gives_others(tmp_path: P
 def test_all_files_are_there(folder: Path) -> None:
     index = json.loads((folder / "index.json").read_text())
     assert list(index["sets"]) == list(SETS)
+    assert "nothing of wholebody is imported" in (folder / "clients" / "plain_pinocchio.py").read_text()
     assert (folder / "LICENSE").read_text().startswith("Creative Commons Legal Code\n\nCC0 1.0 Universal")
     for name, family in index["sets"].items():
         assert family["problems"] == [f"{name}/0000", f"{name}/0001"]
@@ -87,7 +88,9 @@ def test_the_judge_of_the_files_agrees_with_the_assessment_of_the_package(folder
         assert found.overlap == pytest.approx(expected.penetration, abs=1e-6)
         assert found.clearance == pytest.approx(expected.clearance_violation, abs=1e-6)
         assert found.limits == pytest.approx(expected.limit_violation, abs=1e-9)
-        assert found.effort == pytest.approx(expected.measure, rel=1e-9, abs=1e-12)
+        (effort,) = (term for term in problem.measures if isinstance(term, wb.Effort))
+        state = problem.scene.state(q)
+        assert found.effort == pytest.approx(effort.value(state), rel=1e-9, abs=1e-12)
         # The package's figure is the largest row of a constraint, the files' the length of position and rotation.
         assert expected.constraint_violation - 1e-9 <= found.holds <= 1.8 * expected.constraint_violation + 1e-9
 

@@ -10,8 +10,9 @@ import pytest
 from published_helpers import answers
 
 from wholebody.bench.compare.statistics import NOTHING, share
+from wholebody.bench.plot_style import method_style
 from wholebody.bench.published.judging import NONE, Judged, set_score
-from wholebody.bench.published.leaderboard import Board, boards, judge_folder, publish, sentences
+from wholebody.bench.published.leaderboard import Board, boards, judge_folder, publish, sentences, styles
 from wholebody.cli import main
 from wholebody.errors import InputError
 
@@ -58,6 +59,13 @@ def test_a_folder_of_answers_becomes_a_page(folder: Path, tmp_path: Path, names:
     assert page.count("<svg") == 1
     assert not re.search(r'(?:src|href)="https?:', page)
     assert main(["bench", "leaderboard", str(place), "--problems", str(folder), "--out", str(tmp_path / "o")]) == 0
+
+
+def test_methods_that_are_not_known_have_colours_of_their_own() -> None:
+    names = [f"solver {number}" for number in range(8)]
+    found = styles(["qp", *names])
+    assert len({style.color for style in found.values()}) == 9
+    assert found["qp"] == method_style("qp")
 
 
 def test_folders_without_answers_and_methods_of_one_name_are_refused(folder: Path, tmp_path: Path) -> None:

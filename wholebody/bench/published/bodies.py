@@ -75,6 +75,7 @@ def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
         "coordinates": [*(ROOT if figure.root == "free" else ()), *joints],
         "limits": {joint: list(ends) for joint, ends in bounds.items()},
         "effort_weights": {joint: float(figure.effort_weights[place[joint].idx_v]) for joint in joints},
+        "root_effort_weights": [float(weight) for weight in figure.effort_weights[: 6 if figure.root == "free" else 0]],
         "pieces": [
             {
                 "name": piece.name,

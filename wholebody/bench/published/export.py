@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -78,6 +79,8 @@ def export(
         done.write(f"{name}.schema.json", read_text(STATIC / f"{name}.schema.json"))
     for name, source in (("LICENSE", "LICENSE.txt"), ("README.md", "README.txt")):
         done.write(name, read_text(STATIC / source))
+    for path in client_paths():
+        done.write(f"clients/{path.name}", read_text(path))
     index = {
         "format": "wholebody index",
         "version": VERSION,
@@ -89,6 +92,20 @@ def export(
     }
     write(folder / INDEX, dumped(index))  # last: a folder without it was not finished
     return folder / INDEX
+
+
+def client_paths() -> list[Path]:
+    """Return the example clients: inside an installed package, or among the examples of a checkout.
+
+    Raises:
+        WholebodyError: the installation lacks them.
+    """
+    here = Path(__file__).resolve().parent
+    for folder in (here / "clients", here.parents[2] / "examples" / "clients"):
+        found = sorted(folder.glob("*.py"))
+        if found:
+            return found
+    raise WholebodyError(f"there are no clients in {here} or beside the package; install wholebody again")
 
 
 def _written_set(
@@ -156,7 +173,9 @@ def _confirmed(rebuilt: Rebuilt, witness: Mapping[str, Any]) -> Score:
 
 def _best(case: Case, body: BodyFiles, rebuilt: Rebuilt, proof: Score) -> float:
     """Least effort known: of the witness, and of an exact answer of our own method, without a limit of time."""
-    found = wb.QP(tolerance=BEST_TOLERANCE, time_limit=math.inf).solve(case.problem)
+    problem = copy.copy(case.problem)
+    problem.measures = tuple(term for term in problem.measures if isinstance(term, wb.Effort))
+    found = wb.QP(tolerance=BEST_TOLERANCE, time_limit=math.inf).solve(problem)
     score = rebuilt.score(np.array(body.posture(found.q)))
     return min(proof.effort, score.effort) if score.worst <= EXACT else proof.effort
 

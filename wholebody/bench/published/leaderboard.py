@@ -12,7 +12,7 @@ from wholebody.bench import plot_style
 from wholebody.bench.compare.pages import drawn_within
 from wholebody.bench.compare.rankings import in_words
 from wholebody.bench.compare.statistics import Interval, Ranking, ranking, ratio
-from wholebody.bench.plot_style import method_style
+from wholebody.bench.plot_style import Style, method_style
 from wholebody.bench.published.answers import read_answers
 from wholebody.bench.published.judging import ANSWERED, Judged, SetScore, Verdict, judge, set_score
 from wholebody.bench.published.reading import read_index
@@ -25,6 +25,7 @@ from wholebody.files import is_folder
 
 PAGE = "leaderboard.html"
 MOST = 6  # methods in a chart
+SPARE = ("#882255", "#117733", "#999933", "#661100", "#aa4499", "#44aa99", "#332288", "#88ccee", "#cc6677", "#ddcc77")
 LEAST_TIME = 1e-6  # s: times below are not told apart
 
 
@@ -199,7 +200,7 @@ def _in_kernels(verdict: Verdict) -> float:
 def _charts(verdicts: Sequence[Verdict], found: Sequence[Board], out: Path) -> list[Path]:
     """One row a set and seed: shares and mean times with their intervals; at most six methods a chart."""
     names = [verdict.answers.method for verdict in verdicts]
-    drawn = []
+    seen, drawn = styles(names), []
     for first in range(0, len(names), MOST):
         part = names[first : first + MOST]
         chart, axes = plot_style.figure(1, 2, (11.0, 1.2 + 0.7 * len(found)))
@@ -211,7 +212,7 @@ def _charts(verdicts: Sequence[Verdict], found: Sequence[Board], out: Path) -> l
                     y = place + 0.7 * ((number + 0.5) / len(part) - 0.5)
                     spans = ((axes[0][0], rows[name].share, 100.0), (axes[0][1], rows[name].mean_seconds, 1e3))
                     for panel, span, scale in spans:
-                        handles[name] = _span(panel, y, span, scale, name) or handles.get(name)
+                        handles[name] = _span(panel, y, span, scale, seen[name]) or handles.get(name)
         labels = [f"{words(board.set)}, {board.seed}" for board in found]
         for panel, texts in zip(axes[0], (labels, [""] * len(labels)), strict=True):
             panel.set_yticks(range(len(found)), texts)
@@ -219,18 +220,28 @@ def _charts(verdicts: Sequence[Verdict], found: Sequence[Board], out: Path) -> l
         axes[0][0].set(xlabel="solved [%]", xlim=(-2.0, 102.0))
         plot_style.plain_log(axes[0][1])
         axes[0][1].set(xlabel="mean time; one that is not solved counts 10 s [ms]")
-        seen = {name: handle for name, handle in handles.items() if handle is not None}
-        if seen:
-            chart.legend(list(seen.values()), list(seen), loc="outside lower center", ncols=3, frameon=False)
+        known = {name: handle for name, handle in handles.items() if handle is not None}
+        if known:
+            chart.legend(list(known.values()), list(known), loc="outside lower center", ncols=3, frameon=False)
         drawn.append(plot_style.save(chart, out / "charts" / f"leaderboard-{first // MOST + 1}")[0])
     return drawn
 
 
-def _span(panel: Any, y: float, span: Interval, scale: float, name: str) -> Any:
+def styles(names: Sequence[str]) -> dict[str, Style]:
+    """A style for each method, its own where no method before it has the colour."""
+    found: dict[str, Style] = {}
+    for name in names:
+        style = method_style(name)
+        taken = {other.color for other in found.values()}
+        free = (other for other in SPARE if other not in taken)
+        found[name] = style if style.color not in taken else style._replace(color=next(free, style.color))
+    return found
+
+
+def _span(panel: Any, y: float, span: Interval, scale: float, style: Style) -> Any:
     """A figure and its interval as a band; None where there is none."""
     if not isfinite(span.value):
         return None
-    style = method_style(name)
     panel.plot([scale * span.low, scale * span.high], [y, y], color=style.color, linewidth=5.0, alpha=0.3)
     (line,) = panel.plot([scale * span.value], [y], color=style.color, marker=style.marker, linestyle="")
     return line

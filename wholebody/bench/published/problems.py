@@ -28,6 +28,8 @@ def problem_name(family: str, number: int) -> str:
 def problem_content(case: Case, body: BodyFiles, far: Array, meshes: Meshes) -> dict[str, Any]:
     """A case as the content of its file; hulls of things go to the meshes.
 
+    Of the measures that a problem has by default the effort is published, which any solver can be asked for.
+
     Args:
         case: the case.
         body: its figure, written.
@@ -38,8 +40,8 @@ def problem_content(case: Case, body: BodyFiles, far: Array, meshes: Meshes) -> 
         InputError: the case asks for something that the files have no word for.
     """
     problem, name = case.problem, problem_name(case.set, case.number)
-    if problem.bounds or [type(measure) for measure in problem.measures] != [wb.Effort]:
-        raise InputError(f"{name}: only problems without bounds, whose measure is the effort, are published")
+    if problem.bounds or problem.measures_given:
+        raise InputError(f"{name}: only problems without bounds and measures of their own are published")
     things, untested = _things(case, body, meshes)
     content: dict[str, Any] = {
         "format": "wholebody problem",

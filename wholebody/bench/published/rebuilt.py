@@ -35,7 +35,7 @@ class Score:
         clearance: largest shortfall of a pair from the distance that it must keep [m].
         limits: largest violation of a joint limit [rad, m].
         holds: largest violation of what is held, and of balance [m, rad].
-        effort: weighted squared displacement of the joints from the start [rad^2].
+        effort: weighted squared displacement of joints and root from the start [rad^2, m^2].
     """
 
     goal_error: float
@@ -97,7 +97,10 @@ class Rebuilt:
         self._required = self._pairs(path)
         self._results = pin.GeometryData(self._geometry)
         weights = self._body["effort_weights"]
-        self._weights = np.array([weights.get(name, 0.0) for name in self._body["coordinates"]])
+        self._weights = np.zeros(self.model.nv)
+        self._weights[: len(self._body["root_effort_weights"])] = self._body["root_effort_weights"]
+        for joint, weight in weights.items():
+            self._weights[self.model.joints[self.model.getJointId(joint)].idx_v] = weight
         self._effort_from = np.array(self.content["effort_from"])
         self._holds = [_Placement(self.model, hold) for hold in self.content["holds"]]
 
@@ -127,7 +130,7 @@ class Rebuilt:
             clearance=max(0.0, float((self._required - distance).max(initial=0.0))),
             limits=self._beyond(q),
             holds=max(held, default=0.0),
-            effort=float(self._weights @ (q - self._effort_from) ** 2),
+            effort=float(self._weights @ pin.difference(self.model, self._effort_from, q) ** 2),
         )
 
     def _pairs(self, path: Path) -> Array:
