@@ -31,7 +31,7 @@ def placo_adapter() -> Adapter:
         prepare=wb.Placo.prepare,
         loose=(*few(5, 10, 20), *LADDER),
         setup="wb.Placo(), all else as it comes: goals as soft tasks, holds and the self-collision constraint hard, "
-        "joint limits, at most 0.05 rad or m a program, joints tasks for the measures with a weight that fades; one "
+        "joint limits, at most 0.1 rad or m a program, joints tasks for the measures with a weight that fades; one "
         "start, at most 200 programs. The objects are added to its collision model, with the clearance of each pair. "
         "Building its robot is set-up.",
         differences=(

@@ -103,9 +103,10 @@ def _rows() -> dict[str, _Row]:
     mink = ("mink", "mujoco", "daqp"), "compare"
     rows["mink"] = _Row(partial(_outside, "mink"), *mink)
     rows["mink/hard"] = _Row(partial(_outside, "mink", "hard"), *mink)
+    rows["drake"] = _Row(partial(_outside, "drake"), ("pydrake",), "drake")
     for family in ("qp", "newton", "ccd"):
         rows[f"{family}/{ONE}"] = _Row(partial(one_start, family))
-    for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink"):
+    for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake"):
         row = rows.get(f"{family}/{ONE}", rows.get(family))
         assert row is not None
         rows[f"{family}/{FAMILY}"] = row._replace(build=partial(_restarted, row))

@@ -18,7 +18,7 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.workspace import Workspace
 
-STEP = 0.05  # rad, m: largest motion of a joint or the root in one iteration
+STEP = 0.1  # rad, m: largest motion of a joint or the root in one iteration; half of it takes a quarter longer
 NEAR = 0.1  # m: pairs nearer than this have a row; placo's trigger
 LET_IN = 0.4  # share of the tolerance by which pairs may be nearer than their clearance
 DECAY = 0.75  # of the measures' weight from one iteration to the next; less ends sooner and with more effort
