@@ -99,6 +99,7 @@ def _rows() -> dict[str, _Row]:
     rows["ccd"] = _Row(ccd_adapter)
     rows["dls"] = _Row(dls_adapter)
     rows["placo"] = _Row(partial(_outside, "placo"), ("placo",), "placo")
+    rows["placo/soft"] = _Row(partial(_outside, "placo", "soft"), ("placo",), "placo")
     rows["pink"] = _Row(partial(_outside, "pink"), ("pink", "daqp"), "compare")
     mink = ("mink", "mujoco", "daqp"), "compare"
     rows["mink"] = _Row(partial(_outside, "mink"), *mink)
