@@ -282,7 +282,7 @@ class _Program:
         program, variables = self._ik.prog(), self._ik.q()
         for bound in problem.bounds:
             if isinstance(bound, wb.Freeze):
-                chosen = dof[problem.scene.figure.dofs(bound.joints)]
+                chosen: Any = dof[problem.scene.figure.dofs(bound.joints)]
                 chosen = np.arange(7) if (chosen < 0).any() else chosen
                 program.AddBoundingBoxConstraint(start[chosen], start[chosen], variables[chosen])
         for pull in pulls(problem):

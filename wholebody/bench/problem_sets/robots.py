@@ -54,8 +54,9 @@ def folder() -> Path:
         InputError: the variable names no folder with them.
     """
     named = os.environ.get(VARIABLE, "")
-    for found in (Path(named), *(Path(named).glob("**/example-robot-data/robots") if named else ())):
-        if named and (found / ROBOTS[0]).is_file():
+    folders: list[Path] = [Path(named), *Path(named).glob("**/example-robot-data/robots")] if named else []
+    for found in folders:
+        if (found / ROBOTS[0]).is_file():
             return found
     raise InputError(
         f"the set robots needs public descriptions: unpack the wheel example-robot-data, and let {VARIABLE} name its "
