@@ -75,14 +75,21 @@ def built(which: Which) -> str | None:
     return None
 
 
-def warmed(which: Which, adapter: Adapter, cap: float) -> None:
-    """Let a method import and compile what it needs, before it is timed for the first time in this process."""
+def warmed(which: Which, adapter: Adapter, cap: float) -> float:
+    """Let a method import and compile what it needs, before it is timed for the first time in this process.
+
+    Returns:
+        Seconds of that first time, the building of a model of its own included; 0 where it has run before.
+    """
     made = case_of(which)
     key = (adapter.name, bool(made.case.frames))
-    if key not in _warm:
-        _warm.add(key)
-        allow(cap)
-        solve(adapter, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:GLIMPSE])))
+    if key in _warm:
+        return 0.0
+    _warm.add(key)
+    allow(cap)
+    began = time.perf_counter()
+    solve(adapter, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:GLIMPSE])))
+    return time.perf_counter() - began
 
 
 def solved(which: Which, adapter: Adapter, level: Budget, cap: float) -> Record:
