@@ -475,7 +475,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Newton.tracker", Call(wb.Newton().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
     yield "NewtonTracker.step", Call(wb.Newton().tracker(ask).step, {"q": q, "tolerance": 1e-4})
     yield "NewtonTracker.solve", Call(wb.Newton().tracker(ask).solve, {"q": q})
-    yield "Placo", Call(wb.Placo, {"tolerance": 1e-4, "iterations": 5, "time_limit": 1.0}, used)
+    yield "Placo", Call(wb.Placo, {"tolerance": 1e-4, "iterations": 5, "time_limit": 1.0, "holds": "soft"}, used)
     yield "Placo.solve", Call(wb.Placo().solve, {"problem": ask, "progress": print})
     yield "Placo.prepare", Call(wb.Placo().prepare, {"problem": ask})
     damped = {"tolerance": 1e-4, "iterations": 5, "damping": 1e-3, "time_limit": 1.0}

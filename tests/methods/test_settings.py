@@ -19,7 +19,7 @@ REAL = ("tolerance", "damping")
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_setting_that_is_a_number_is_checked(method: Any) -> None:
-    settings = {field.name for field in fields(method) if field.init} - {"solver", "algebra", "inequalities"}
+    settings = {field.name for field in fields(method) if field.init} - {"solver", "algebra", "inequalities", "holds"}
     assert settings - {"measures", "hot_start"} <= {*WHOLE, *REAL, "time_limit"}
     for name in settings & {*WHOLE, *REAL}:
         for wrong in (*NO_NUMBER, *((1.5, 2.0) if name in WHOLE else (0.0, 1e9))):
@@ -43,6 +43,8 @@ def test_names_are_texts(wrong: Any) -> None:
         wb.Newton(algebra=wrong)
     with pytest.raises(InputError, match=r"inequalities is .*'slack' or 'barrier'"):
         wb.Newton(inequalities=wrong)
+    with pytest.raises(InputError, match=r"holds is .*'hard' or 'soft'"):
+        wb.Placo(holds=wrong)
 
 
 def test_assemblies_are_told_where_they_are_taken() -> None:

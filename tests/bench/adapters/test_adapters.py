@@ -102,7 +102,7 @@ def test_what_it_cannot_express_is_refused_by_name(adapter: Adapter, table: wb.P
     with pytest.raises(InputError, match=r"Plane|ReachCones"):
         adapter.make(1e-4, None).solve(problem)
     method = adapter.make(1e-4, None)
-    if adapter.name in ("placo", "pink", "mink", "mink/hard"):
+    if adapter.name in ("placo", "placo/soft", "pink", "mink", "mink/hard"):
         with pytest.raises(InputError, match=r"Plane|ReachCones"):
             adapter.prepare(method, problem)
 

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
+from wholebody.bench.adapters.base import FIRST_FIT, LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
 from wholebody.bench.adapters.loop import Loop, Stepper, kept_apart, longest_moves, pulls, size
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 from wholebody.methods.differential import TOOL, StepError
@@ -29,14 +29,15 @@ def pink_adapter() -> Adapter:
     """The kinematics of pink in our loop."""
     return Adapter(
         name="pink",
-        make=PinkLoop,
+        make=_pink,
         prepare=PinkLoop.prepare,
-        loose=(*few(5, 10, 20), *LADDER),
+        loose=(*((tolerance, FIRST_FIT) for tolerance in (1e-2, 1e-3, 1e-4)), *few(5, 10, 20), *LADDER),
         setup="pink.solve_ik on our own Pinocchio model, with DAQP: FrameTask, RelativeFrameTask, ComTask and "
         "LinearHolonomicTask (posture and measures, with a weight that fades) as soft tasks, whole holds and frozen "
         f"joints as hard ones, ConfigurationLimit, VelocityLimit and FloatingBaseVelocityLimit of {PinkLoop.longest} "
         f"rad or, for each metre of the figure, m a step, SelfCollisionBarrier with the {NEAREST} nearest pairs, gain "
-        f"{GAIN} a step, no safe displacement, d_min {1e3 * PinkLoop.margin:g} mm for each metre of the figure more "
+        f"{GAIN} a step, safe_displacement_gain 0 (1, its default, in budgets of first fit), d_min "
+        f"{1e3 * PinkLoop.margin:g} mm for each metre of the figure more "
         "than the clearance; one start, at most 200 steps, the loop of our adapter to placo.",
         differences=(
             f"pink's barrier takes the {NEAREST} nearest pairs, whatever their distance",
@@ -50,23 +51,35 @@ def pink_adapter() -> Adapter:
     )
 
 
+def _pink(tolerance: float, iterations: int | None) -> Loop:
+    return SafePinkLoop(tolerance) if iterations == FIRST_FIT else PinkLoop(tolerance, iterations)
+
+
 class PinkLoop(Loop):
     """Steps of pink."""
 
     name = "pink"
+    safe: ClassVar[float] = 0.0  # gain of the barrier's cost of leaving a safe displacement, which here is no motion
     longest = 0.025  # twice that leaves pink no solution more often
     margin = 3.5e-4
 
     def build(self, problem: Problem) -> Stepper:
         """Copy our models."""
-        return _PinkStepper(problem, self.longest, self.margin * size(problem.scene.figure))
+        return _PinkStepper(problem, type(self))
+
+
+class SafePinkLoop(PinkLoop):
+    """The same with pink's default of that gain: faster, and of more effort."""
+
+    safe = 1.0
 
 
 class _PinkStepper:
-    def __init__(self, problem: Problem, longest: float, margin: float) -> None:
+    def __init__(self, problem: Problem, loop: type[PinkLoop]) -> None:
         from pink.limits import FloatingBaseVelocityLimit
 
-        self._problem, figure = problem, problem.scene.figure
+        self._problem, self._safe, figure = problem, loop.safe, problem.scene.figure
+        longest, margin = loop.longest, loop.margin * size(figure)
         self._model = model = figure.model.copy()  # pink hangs attributes onto it
         for goal in problem.goals:
             if isinstance(goal, wb.Point):
@@ -99,7 +112,11 @@ class _PinkStepper:
             self._comfort.append((self._joints(pull.reference, dofs, np.ones(len(dofs))), np.sqrt(pull.weights[dofs])))
         pairs = len(self._geometry.collisionPairs)
         self._barriers = (
-            [SelfCollisionBarrier(min(NEAREST, pairs), gain=GAIN, safe_displacement_gain=0.0, d_min=self._least + room)]
+            [
+                SelfCollisionBarrier(
+                    min(NEAREST, pairs), gain=GAIN, safe_displacement_gain=self._safe, d_min=self._least + room
+                )
+            ]
             if pairs
             else []
         )

@@ -23,17 +23,18 @@ SAMPLES = 2000
 ROOT_SPREAD = np.array([0.15, 0.15, 0.1, 0.2, 0.2, 0.2])  # m, rad
 
 
-def placo_adapter() -> Adapter:
-    """The adapter to placo's kinematics solver."""
+def placo_adapter(holds: str = "hard") -> Adapter:
+    """The adapter to placo's kinematics solver, with holds as hard tasks or as soft ones."""
+    said = "holds and" if holds == "hard" else "holds soft with weight 100,"
     return Adapter(
-        name="placo",
-        make=partial(made, wb.Placo, {}),
+        name="placo" if holds == "hard" else f"placo/{holds}",
+        make=partial(made, partial(wb.Placo, holds=holds), {}),
         prepare=wb.Placo.prepare,
         loose=(*few(5, 10, 20), *LADDER),
-        setup="wb.Placo(), all else as it comes: goals as soft tasks, holds and the self-collision constraint hard, "
-        "joint limits, at most 0.05 rad or m a program, joints tasks for the measures with a weight that fades; one "
-        "start, at most 200 programs. The objects are added to its collision model, with the clearance of each pair. "
-        "Building its robot is set-up.",
+        setup=f"wb.Placo(holds={holds!r}), all else as it comes: goals as soft tasks, {said} the self-collision "
+        "constraint hard, joint limits, at most 0.1 rad or m a program, joints tasks for the measures with a weight "
+        "that fades; one start, at most 200 programs. The objects are added to its collision model, with the clearance "
+        "of each pair. Building its robot is set-up.",
         differences=(
             "placo has no class for objects in the world: they are added to its collision model as parts of the robot",
             "placo minimises Effort and Displacement only",

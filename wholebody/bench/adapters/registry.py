@@ -99,13 +99,15 @@ def _rows() -> dict[str, _Row]:
     rows["ccd"] = _Row(ccd_adapter)
     rows["dls"] = _Row(dls_adapter)
     rows["placo"] = _Row(partial(_outside, "placo"), ("placo",), "placo")
+    rows["placo/soft"] = _Row(partial(_outside, "placo", "soft"), ("placo",), "placo")
     rows["pink"] = _Row(partial(_outside, "pink"), ("pink", "daqp"), "compare")
     mink = ("mink", "mujoco", "daqp"), "compare"
     rows["mink"] = _Row(partial(_outside, "mink"), *mink)
     rows["mink/hard"] = _Row(partial(_outside, "mink", "hard"), *mink)
+    rows["drake"] = _Row(partial(_outside, "drake"), ("pydrake",), "drake")
     for family in ("qp", "newton", "ccd"):
         rows[f"{family}/{ONE}"] = _Row(partial(one_start, family))
-    for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink"):
+    for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake"):
         row = rows.get(f"{family}/{ONE}", rows.get(family))
         assert row is not None
         rows[f"{family}/{FAMILY}"] = row._replace(build=partial(_restarted, row))

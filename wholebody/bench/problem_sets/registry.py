@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from wholebody.bench.problem_sets import balance, closed_loop, drag, passage, reaching, robot_arm, self_contact
+from wholebody.bench.problem_sets import balance, closed_loop, drag, passage, reaching, robot_arm, robots, self_contact
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.errors import UnknownNameError
 
@@ -15,6 +15,9 @@ _ALL = (
 )  # fmt: skip
 SETS: Mapping[str, ProblemSet] = MappingProxyType({each.name: each for each in _ALL})
 """By name, as they are listed in reports."""
+
+NAMED: Mapping[str, ProblemSet] = MappingProxyType({robots.SET.name: robots.SET})
+"""Sets that take part where they are named: they need files that are not a part of this package."""
 
 CASES = 200
 """Problems of a set, if nothing else is asked for."""
@@ -26,6 +29,7 @@ def problem_set(name: str) -> ProblemSet:
     Raises:
         UnknownNameError: with the nearest names.
     """
-    if name not in SETS:
-        raise UnknownNameError("problem set", name, SETS)
-    return SETS[name]
+    known = {**SETS, **NAMED}
+    if name not in known:
+        raise UnknownNameError("problem set", name, known)
+    return known[name]

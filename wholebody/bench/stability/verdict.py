@@ -150,7 +150,7 @@ ALONE: dict[tuple[str, str], str] = {
     ): "alone, pink solves it with d_min 0.5 mm; our margin of 1 mm is all the room of the slot",
     ("moving-obstacle", "pink"): "alone, pink solves it with its default d_min of 2 cm and 10 steps a frame",
 }
-"""What a tool does by itself, by case and method."""
+"""What a tool does by itself, by case and method: a wrong answer there is its adapter's fault, were there one again."""
 
 
 def audited(case: str, method: str, verdict: Verdict) -> Verdict:

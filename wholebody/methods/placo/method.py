@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wholebody.arrays import Array
+from wholebody.checks import choice
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
@@ -18,9 +19,11 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.workspace import Workspace
 
-STEP = 0.05  # rad, m: largest motion of a joint or the root in one iteration
+STEP = 0.1  # rad, m: largest motion of a joint or the root in one iteration; half of it takes a quarter longer
 NEAR = 0.1  # m: pairs nearer than this have a row; placo's trigger
 LET_IN = 0.4  # share of the tolerance by which pairs may be nearer than their clearance
+HOLDS = {"hard": 0.0, "soft": 100.0}
+"""What `Placo.holds` may be -> the weight of holds as soft tasks, 0 for hard ones."""
 DECAY = 0.75  # of the measures' weight from one iteration to the next; less ends sooner and with more effort
 
 
@@ -41,11 +44,14 @@ class Placo:
         iterations: most programs.
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
             ends after four seconds of processor time.
+        holds: "hard", or "soft" for holds of weight 100 against goals of weight 1: programs then have a solution where
+            hard tasks contradict each other or what keeps pairs apart.
     """
 
     tolerance: float = 1e-5
     iterations: int = 200
     time_limit: float | None = None
+    holds: str = "hard"
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -55,6 +61,7 @@ class Placo:
         """
         check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS)
         check_time_limit(self.time_limit)
+        choice(self.holds, HOLDS, "holds")
 
     @property
     def name(self) -> str:
@@ -95,7 +102,7 @@ class Placo:
             problem.scene.built.pool(_Room, _Room).borrow() as room,
             Control(self.time_limit, progress) as control,
         ):
-            stepper = _Programs(problem, room.robot(problem, workspace), self.tolerance)
+            stepper = _Programs(problem, room.robot(problem, workspace), self.tolerance, HOLDS[self.holds])
             settings = Settings(self.tolerance, self.iterations, STEP, DECAY)
             run = Iteration(problem, workspace, stepper, settings, control)
             run.go()
@@ -134,13 +141,13 @@ class _Room:
 class _Programs:
     """placo's programs for one problem."""
 
-    def __init__(self, problem: Problem, robot: Robot, tolerance: float) -> None:
+    def __init__(self, problem: Problem, robot: Robot, tolerance: float, holding: float) -> None:
         import placo
 
         self._robot = robot
         self._solver: Any = placo.KinematicsSolver(robot.wrapper)
         robot.couple(self._solver)
-        self._tasks = add_terms(self._solver, robot, problem)
+        self._tasks = add_terms(self._solver, robot, problem, holding)
         self._regular = self._solver.add_regularization_task(REGULAR * COMFORT)
         self._solver.dt = 1.0
         robot.wrapper.set_velocity_limits(STEP)

@@ -103,13 +103,16 @@ def _name(place: Place, offset: Array | None = None) -> str:
     return f"f{place.frame:05d} at {' '.join(repr(value) for value in offset.tolist())}"
 
 
-def add_terms(solver: Any, robot: Robot, problem: Problem) -> Tasks:
-    """Add the goals to placo's solver as soft tasks, constraints as hard ones, and the measures."""
+def add_terms(solver: Any, robot: Robot, problem: Problem, holding: float) -> Tasks:
+    """Add the goals to placo's solver as soft tasks, constraints as hard ones, and the measures.
+
+    `holding` is the weight of holds as soft tasks, 0 for hard ones.
+    """
     tasks = Tasks()
     for number, goal in enumerate(problem.goals):
         _goal(solver, robot, problem, f"goal {number}", goal)
     for number, term in enumerate(problem.constraints):
-        _constraint(solver, f"constraint {number}", term)
+        _constraint(solver, f"constraint {number}", term, holding)
     for bound in problem.bounds:
         if isinstance(bound, Freeze):  # a solve has no time step, so a step limit bounds nothing
             _freeze(solver, robot, problem, bound)
@@ -150,9 +153,9 @@ def _posture(solver: Any, robot: Robot, problem: Problem, name: str, goal: Postu
         solver.add_frame_task("base", base.homogeneous).configure(f"{name}, root", "soft", goal.weight, goal.weight)
 
 
-def _constraint(solver: Any, name: str, term: Any) -> None:
+def _constraint(solver: Any, name: str, term: Any, holding: float) -> None:
     if isinstance(term, Hold):
-        _placement(solver, name, term.residual, "hard", 1.0)
+        _placement(solver, name, term.residual, "soft" if holding else "hard", holding or 1.0)
     elif isinstance(term, Plane):
         task = solver.add_position_task(_name(term.place), term.height * np.array(term.resolved_normal))
         across = np.linalg.svd(term.resolved_normal[None])[2]  # rows: the normal, and two directions in the plane
