@@ -35,6 +35,7 @@ ROOMS = (
         "scene",
         "tasks",
         "derivatives",
+        "term_entries",
         "term_plan",
         "residual_kernel",
         "coordinate_kernel",
@@ -49,7 +50,7 @@ ROOMS = (
         "simplification",
         "methods",
     ),
-    *("tracking", "motion", "dynamics", "taskfile", "view", "bench", "doctor", "cli"),
+    *("tracking", "motion", "dynamics", "ergonomics", "taskfile", "view", "studies", "bench", "doctor", "cli"),
 )
 """From the ground up; a room imports only from those before it, also where only type checkers look."""
 DOCUMENTED = {"_replace", "_asdict", "_fields", "_exit", "_SubParsersAction"}

@@ -30,7 +30,18 @@ if TYPE_CHECKING:
     from wholebody.dynamics.coupling import Spring
     from wholebody.dynamics.world import World
     from wholebody.figures import Figure, load
-    from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+    from wholebody.geometry.shapes import (
+        Box,
+        Capsule,
+        Cylinder,
+        Ellipsoid,
+        HalfSpace,
+        Hull,
+        Mesh,
+        Shape,
+        Sphere,
+        Torus,
+    )
     from wholebody.matter.body import Body
     from wholebody.matter.joints import BallJoint, Hinge
     from wholebody.matter.materials import Material
@@ -64,7 +75,12 @@ if TYPE_CHECKING:
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
     from wholebody.solution import Solution
-    from wholebody.taskfile import Task, read_task
+    from wholebody.studies.many import SolveProgress, solve_many
+    from wholebody.studies.reach_map import reach_map
+    from wholebody.studies.reach_result import ReachMap
+    from wholebody.studies.records import Records, SolveRecord
+    from wholebody.studies.study import study
+    from wholebody.taskfile import Result, Task, read_result, read_task, write_result, write_task
     from wholebody.tasks import (
         Axis,
         Balance,
@@ -77,16 +93,23 @@ if TYPE_CHECKING:
         Frame,
         Freeze,
         Goal,
+        Grasp,
         Hold,
+        Lean,
         Measure,
         Orientation,
         Plane,
         Point,
         Posture,
         PotentialEnergy,
+        RangeOfMotion,
         ReachCones,
         Relative,
+        Rhythm,
+        Sit,
+        Stand,
         StepLimit,
+        Touch,
     )
     from wholebody.tracking.drag import Drag
     from wholebody.tracking.path_following import follow_path
@@ -115,6 +138,7 @@ __all__ = [
     "Clip",
     "ClipCheck",
     "Constraint",
+    "Cylinder",
     "DampedLeastSquares",
     "DerivativeCheck",
     "Discomfort",
@@ -129,11 +153,13 @@ __all__ = [
     "Frame",
     "Freeze",
     "Goal",
+    "Grasp",
     "HalfSpace",
     "Hinge",
     "Hold",
     "Hull",
     "InputError",
+    "Lean",
     "Material",
     "Measure",
     "Mesh",
@@ -147,19 +173,30 @@ __all__ = [
     "Posture",
     "PotentialEnergy",
     "Problem",
+    "RangeOfMotion",
     "ReachCones",
+    "ReachMap",
+    "Records",
     "Relative",
+    "Result",
+    "Rhythm",
     "Scene",
     "Shape",
+    "Sit",
     "SkeletonMotion",
     "Solution",
+    "SolveProgress",
+    "SolveRecord",
     "Sphere",
     "Spring",
     "StanceFeet",
+    "Stand",
     "StepLimit",
     "Strength",
     "Task",
     "Torques",
+    "Torus",
+    "Touch",
     "Trajectory",
     "UnknownNameError",
     "Viewer",
@@ -174,21 +211,27 @@ __all__ = [
     "equipment",
     "follow_path",
     "load",
+    "reach_map",
     "read_clip",
     "read_many",
+    "read_result",
     "read_skeleton",
     "read_task",
     "retarget",
     "simplify",
     "solve",
+    "solve_many",
+    "study",
     "torques",
+    "write_result",
+    "write_task",
 ]
 
 _MODULES = {
     "wholebody.assessment": "Assessment assess",
     "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
-    "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
+    "wholebody.geometry.shapes": "Box Capsule Cylinder Ellipsoid HalfSpace Hull Mesh Shape Sphere Torus",
     "wholebody.dynamics.coupling": "Spring",
     "wholebody.dynamics.world": "World",
     "wholebody.matter.body": "Body",
@@ -226,9 +269,15 @@ _MODULES = {
     "wholebody.scene": "Scene",
     "wholebody.simplification.simplify": "simplify",
     "wholebody.solution": "Solution",
-    "wholebody.taskfile": "Task read_task",
+    "wholebody.studies.many": "SolveProgress solve_many",
+    "wholebody.studies.records": "Records SolveRecord",
+    "wholebody.studies.reach_map": "reach_map",
+    "wholebody.studies.reach_result": "ReachMap",
+    "wholebody.studies.study": "study",
+    "wholebody.taskfile": "Result Task read_result read_task write_result write_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
-    "Hold Measure Orientation Plane Point Posture PotentialEnergy ReachCones Relative StepLimit",
+    "Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
+    "StepLimit Grasp Lean Sit Stand Touch",
     "wholebody.view": "Viewer",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}

@@ -145,7 +145,7 @@ class Child:
         if self._process is None:
             self._start()
         try:
-            self.ear.send((job.seconds, _dumps((job.function, job.arguments))))
+            self.ear.send((job.seconds, packed((job.function, job.arguments))))
         except (BrokenPipeError, ConnectionResetError):
             return  # the process ended after its last job: `listen` reports it
 
@@ -326,11 +326,11 @@ def _memory(process: int | None) -> float:
     return float(pages * os.sysconf("SC_PAGE_SIZE"))
 
 
-def _dumps(value: Any) -> bytes:
+def packed(value: Any) -> bytes:
     """Pickle by cloudpickle, which includes code that is not importable; by pickle if cloudpickle is missing."""
     try:
         import cloudpickle
     except ImportError:
         return pickle.dumps(value)
-    packed: bytes = cloudpickle.dumps(value)
-    return packed
+    made: bytes = cloudpickle.dumps(value)
+    return made

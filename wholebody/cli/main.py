@@ -12,7 +12,10 @@ from importlib import import_module
 from wholebody.errors import WholebodyError
 from wholebody.version import __version__
 
-COMMANDS = ("pose", "show", "figure", "demo", "interact", "drag", "world", "clip", "bench", "doctor")
+COMMANDS = (
+    *("pose", "show", "figure", "demo", "interact", "drag", "world", "clip"),
+    *("study", "reach", "bench", "doctor"),
+)
 """Each is a module of this folder."""
 
 DESCRIPTION = """\

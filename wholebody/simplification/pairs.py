@@ -50,7 +50,7 @@ def reachable_pairs(
     center = np.array([piece.placement.translation for piece in pieces]).reshape(-1, 3)
     reach = Reach(model, start, Balls(center, size, np.arange(len(pieces))), joint, frozen)
     views = [(seat, reach.seen_from(seat), 0.0) for seat in np.unique(joint[pairs]).tolist()]
-    views += [(0, balls, HELD_WITHIN) for balls in _held(figure, reach, constraints)]
+    views += [(0, balls, HELD_WITHIN) for balls in held_balls(figure, reach, constraints)]
     open_ = np.ones(len(pairs), dtype=bool)
     for seat, balls, slack in views:
         place, radius = _by_piece(balls, len(pieces))
@@ -66,7 +66,7 @@ def reachable_pairs(
     return open_
 
 
-def _held(figure: Figure, reach: Reach, constraints: Iterable[Constraint]) -> list[Balls]:
+def held_balls(figure: Figure, reach: Reach, constraints: Iterable[Constraint]) -> list[Balls]:
     """Balls of all pieces in the world, from each frame that is held there."""
     found = []
     for hold in constraints:

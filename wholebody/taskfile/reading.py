@@ -85,9 +85,8 @@ def read_contents(path: Path) -> Contents:
         FileFormatError: with file, line, key and correction.
         UnknownNameError: a table, key or type that does not exist, with the nearest ones.
     """
-    text = _text(path)
+    text, data = read_toml(path, "task file")
     where = Where(path, text)
-    data = _parse(path, text)
     plain = {name: value for name, value in data.items() if name not in TABLES}
     for name in plain:
         if name not in {key.name for key in TOP}:
@@ -99,16 +98,31 @@ def read_contents(path: Path) -> Contents:
     return Contents(top, tables)
 
 
-def _text(path: Path) -> str:
+def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
+    """The text of a TOML file and what it says.
+
+    Args:
+        path: the file.
+        kind: what it is, for the message: "task file".
+
+    Raises:
+        FileFormatError: it cannot be read or is no TOML.
+        UnknownNameError: there is no such file.
+    """
+    text = _text(path, kind)
+    return text, _parse(path, text)
+
+
+def _text(path: Path, kind: str) -> str:
     try:
-        return read_text(path, "task file").replace("\r\n", "\n")
+        return read_text(path, kind).replace("\r\n", "\n")
     except FileFormatError:
         if is_file(path):
             raise
         if os.path.lexists(path):
             raise
         there = sorted(file.name for file in path.parent.glob("*.toml")) if os.path.isdir(path.parent) else []
-        raise UnknownNameError("task file", path.name, there, one_line(str(path.parent))) from None
+        raise UnknownNameError(kind, path.name, there, one_line(str(path.parent))) from None
 
 
 def _parse(path: Path, text: str) -> dict[str, Any]:

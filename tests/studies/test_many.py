@@ -1,0 +1,135 @@
+"""Many problems at once: the answers do not depend on how many run, and what fails has a record."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+
+ARM = Path(__file__).resolve().parents[2] / "examples" / "tasks" / "arm.urdf"
+PLACES = [(0.4, 0.1 * k, 0.5) for k in range(-2, 3)]
+
+
+@pytest.fixture(scope="module")
+def arm() -> wb.Figure:
+    return wb.load(ARM)
+
+
+def problem(arm: wb.Figure, target: Any, **terms: Any) -> wb.Problem:
+    return wb.Problem(wb.Scene(arm), goals=[wb.Point("hand", target)], **terms)
+
+
+class Fatal(wb.Measure):
+    """A measure that ends the process of a solve."""
+
+    weight = 1.0
+
+    def __init__(self, parent: int) -> None:
+        self.parent = parent
+
+    def value(self, state: Any) -> float:
+        if os.getpid() != self.parent:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return 0.0
+
+    def gradient(self, state: Any) -> Any:
+        return np.zeros(state.model.nv)
+
+    def curvature(self, state: Any) -> Any:
+        return np.ones(state.model.nv)
+
+
+def test_answers_are_those_of_single_solves_whatever_jobs_is(arm: wb.Figure) -> None:
+    problems = [problem(arm, place) for place in PLACES]
+    alone = [wb.solve(one).q for one in problems]
+    for jobs in (1, 2):
+        for record, q in zip(wb.solve_many(problems, jobs=jobs), alone, strict=True):
+            assert record.outcome == "solved"
+            np.testing.assert_array_equal(record.q, q)
+
+
+def test_warm_starts_are_the_same_whatever_jobs_is_and_solve_each_goal(arm: wb.Figure) -> None:
+    problems = [problem(arm, (0.4, 0.02 * k - 0.2, 0.5)) for k in range(20)]
+    one, two = (wb.solve_many(problems, jobs=jobs, warm_start=True) for jobs in (1, 2))
+    for k, (a, b) in enumerate(zip(one, two, strict=True)):
+        assert a.solved
+        np.testing.assert_array_equal(a.q, b.q)
+        there = arm.placement(a.q, "hand").translation
+        np.testing.assert_allclose(there, (0.4, 0.02 * k - 0.2, 0.5), atol=2e-5)
+
+
+def test_a_process_that_ends_costs_its_own_problem_alone(arm: wb.Figure) -> None:
+    problems = {"good": problem(arm, PLACES[0]), "fatal": problem(arm, PLACES[1], measures=[Fatal(os.getpid())])}
+    for warm in (False, True):
+        good, fatal = wb.solve_many(problems, warm_start=warm)
+        assert good.solved
+        assert (fatal.outcome, fatal.q) == ("ended", None)
+        assert "SIGKILL" in fatal.message
+
+
+class Failing(Fatal):
+    """A measure with a mistake that shows in the process of a solve."""
+
+    def value(self, state: Any) -> float:
+        if os.getpid() != self.parent:
+            raise ZeroDivisionError("nothing to divide by")
+        return 0.0
+
+
+def test_a_term_that_fails_is_a_record(arm: wb.Figure) -> None:
+    failing = problem(arm, PLACES[1], measures=[Failing(os.getpid())])
+    record, other = wb.solve_many([failing, problem(arm, PLACES[0])])
+    assert (record.outcome, record.q) == ("refused", None)
+    assert "nothing to divide by" in record.message
+    assert other.solved
+
+
+def test_a_folder_keeps_what_is_done(arm: wb.Figure, tmp_path: Path) -> None:
+    problems = [problem(arm, place) for place in PLACES]
+    done: list[int] = []
+
+    def stop(told: wb.SolveProgress) -> bool:
+        done.append(told.done)
+        return told.done == 2
+
+    first = wb.solve_many(problems, folder=tmp_path, progress=stop)
+    assert first.counts() == {"solved": 2, "cancelled": 3}
+    begun: list[int] = []
+    second = wb.solve_many(problems, folder=tmp_path, progress=lambda told: begun.append(told.done))
+    assert begun == [2, 3, 4, 5]
+    assert second.counts() == {"solved": 5}
+    np.testing.assert_array_equal(first[0].q, second[0].q)
+    other = wb.solve_many([problem(arm, (0.3, 0.0, 0.6))], folder=tmp_path)
+    np.testing.assert_allclose(arm.placement(other[0].q, "hand").translation, (0.3, 0.0, 0.6), atol=2e-5)
+
+
+def test_a_folder_of_something_else_is_refused(arm: wb.Figure, tmp_path: Path) -> None:
+    (tmp_path / "records.sqlite").write_text("not a database, but long enough to be one" * 50)
+    with pytest.raises(wb.FileFormatError, match="another folder"):
+        wb.solve_many([problem(arm, PLACES[0])], folder=tmp_path)
+
+
+def test_records_are_written_as_a_table(arm: wb.Figure, tmp_path: Path) -> None:
+    records = wb.solve_many({"near": problem(arm, PLACES[0]), "far": problem(arm, (9.0, 0.0, 0.0))})
+    lines = records.to_csv(tmp_path / "a.csv").read_text().splitlines()
+    assert lines[0].startswith("name,outcome,message,seconds")
+    assert [line.split(",")[:2] for line in lines[1:]] == [["near", "solved"], ["far", "unreachable"]]
+    assert records.solved == 0.5
+    assert "1 solved, 1 unreachable" in repr(records)
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError:
+        with pytest.raises(wb.MissingPackageError, match="pyarrow"):
+            records.to_parquet(tmp_path / "a.parquet")
+        assert not (tmp_path / "a.parquet").exists()
+
+
+def test_something_else_than_a_problem_is_refused(arm: wb.Figure) -> None:
+    with pytest.raises(wb.InputError, match=r"problems\[1\]"):
+        wb.solve_many([problem(arm, PLACES[0]), "x"])  # type: ignore[list-item]

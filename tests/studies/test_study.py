@@ -1,0 +1,133 @@
+"""Studies: the product of people, targets and layouts, by functions and by files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.cli.main import main
+
+TASK = """
+[figure]
+name = "human"
+[[object]]
+name = "post"
+shape = "box"
+size = [0.05, 0.05, 0.5]
+at = [1.5, 0.0, 0.25]
+[[constraint]]
+type = "hold"
+frame = "pelvis"
+[[goal]]
+type = "point"
+frame = "right_index_tip"
+target = [0.4, -0.2, 1.2]
+"""
+STUDY = """
+task = "task.toml"
+[[person]]
+name = "short"
+sex = "female"
+stature = 1.55
+[[person]]
+name = "tall"
+stature = 1.9
+[[target]]
+name = "near"
+at = [0.35, -0.2, 1.2]
+[[target]]
+name = "far"
+at = [3.0, -0.2, 1.2]
+[[layout]]
+name = "nearer"
+move = { post = [1.2, 0.0, 0.25] }
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "task.toml").write_text(TASK)
+    (tmp_path / "study.toml").write_text(STUDY)
+    return tmp_path
+
+
+def reach(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
+    assert layout is None
+    return wb.Problem(wb.Scene(figure), goals=[wb.Point("hand", target)])
+
+
+def broken(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
+    if target == 1:
+        raise ZeroDivisionError("a mistake in the task")
+    return wb.Problem(wb.Scene(figure), goals=[wb.Point("hand", (0.4, 0.0, 0.5))])
+
+
+def test_each_combination_has_a_record_with_its_factors() -> None:
+    arm = wb.load(Path(__file__).resolve().parents[2] / "examples" / "tasks" / "arm.urdf")
+    places = {"a": (0.4, 0.0, 0.5), "b": (0.4, 0.1, 0.5)}
+    records = wb.study(reach, people={"one": arm, "two": arm}, targets=places, warm_start=True)
+    assert [one.factors for one in records] == [{"person": p, "target": t} for p in ("one", "two") for t in "ab"]
+    for one in records:
+        assert one.factors is not None
+        there = arm.placement(one.q, "hand").translation
+        np.testing.assert_allclose(there, places[one.factors["target"]], atol=2e-5)
+        assert one.row()["person"] == one.factors["person"]
+
+
+def test_a_mistake_in_a_task_is_a_record() -> None:
+    arm = wb.load(Path(__file__).resolve().parents[2] / "examples" / "tasks" / "arm.urdf")
+    first, second = wb.study(broken, people=[arm], targets=[0, 1])
+    assert first.solved
+    assert second.outcome == "refused"
+    assert "a mistake in the task" in second.message
+
+
+def test_a_study_file_is_solved_by_command(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["study", str(folder / "study.toml"), "--out", str(folder / "out")]) == 1
+    shown = capsys.readouterr().out
+    assert "4 cases: 2 solved, 2 unreachable" in shown
+    rows = (folder / "out" / "cases.csv").read_text().splitlines()
+    assert rows[0].startswith("name,person,target,layout,outcome")
+    assert len(rows) == 5
+    assert ",short,far,nearer,unreachable," in rows[2]
+
+
+def test_people_differ_in_a_study_of_a_file(folder: Path) -> None:
+    short, tall = wb.study(folder / "task.toml", people=[{"stature": 1.5}, {"stature": 2.0}], targets=[(3.0, 0.0, 1.0)])
+    assert short.goal_error > tall.goal_error + 0.1  # both stretch towards it; the tall one comes nearer
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('task = "task.toml"', 'task = "tusk.toml"', "task.toml"),
+        ("stature = 1.55", "stature = 155", "1.55"),
+        ("stature = 1.55", "height = 1.55", "height"),
+        ('name = "near"', 'name = "far"', "another"),
+        ("at = [3.0, -0.2, 1.2]", "at = [3.0, -0.2]", "target 2"),
+        ("post = [", "past = [", "post"),
+        ("[[layout]]", "[[layouts]]", "layout"),
+        ('task = "task.toml"', "", "task is missing"),
+    ],
+)
+def test_a_wrong_study_file_is_refused_with_place(
+    folder: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, said: str
+) -> None:
+    (folder / "study.toml").write_text(STUDY.replace(old, new, 1))
+    assert main(["study", str(folder / "study.toml"), "--out", str(folder / "out")]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+def test_what_cannot_vary_is_refused(folder: Path) -> None:
+    with pytest.raises(wb.InputError, match="nothing varies"):
+        wb.study(folder / "task.toml")
+    with pytest.raises(wb.UnknownNameError, match="F5"):
+        wb.study(folder / "task.toml", people=["F6"])
+    with pytest.raises(wb.InputError, match="target"):
+        wb.study(folder / "task.toml", targets=[(0.0, 1.0)])

@@ -1,0 +1,89 @@
+"""`wholebody reach`: which places of a grid a frame of a task's figure can reach."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+HELP = "map the places that a hand or another frame can reach"
+DESCRIPTION = """\
+Find which places of a grid a frame of a task file's figure reaches, with everything that the task file asks except its
+goals, and write into a folder:
+
+  reach.png    heat maps of all heights, seen from above
+  reach.html   the same with a slider, for any browser
+  reach.npz    all arrays: verdicts, distances left, postures
+  reach.vtk    verdicts and distances, for ParaView and the like"""
+EPILOG = """\
+examples:
+  wholebody reach seat.toml --frame right_index_tip --low 0,-0.8,0.4 --high 1.0,0.4,1.6 --step 0.1
+  wholebody reach seat.toml --frame left_palm --low 0.2,-0.5,0.9 --high 0.9,0.5,0.9 --step 0.05 --jobs 2"""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser("reach", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
+    parser.add_argument("task", type=Path, metavar="TASK.toml", help="the task file: figure, things, constraints")
+    parser.add_argument("--frame", required=True, metavar="NAME", help="the frame that reaches")
+    parser.add_argument("--low", required=True, metavar="X,Y,Z", help="least corner of the grid, metres")
+    parser.add_argument("--high", required=True, metavar="X,Y,Z", help="greatest corner")
+    parser.add_argument("--step", default="0.1", metavar="M", help="metres between places, or X,Y,Z (default: 0.1)")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default: 1)")
+    parser.add_argument("--cluster", metavar="ADDRESS", help="dask scheduler that runs the searches")
+    parser.add_argument("--goals", action="store_true", help="meet the task's goals too at every place")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Search and write; 1 if no place is reached."""
+    from rich.console import Console
+
+    from wholebody.cli.picture import make_folder
+    from wholebody.studies.reach_map import reach_map
+    from wholebody.taskfile import read_task
+
+    low, high = _numbers(arguments.low, "--low"), _numbers(arguments.high, "--high")
+    step = _numbers(arguments.step, "--step") if "," in arguments.step else _numbers(arguments.step, "--step", 1)[0]
+    task = read_task(arguments.task)
+    if not arguments.goals:
+        task.problem.retarget([])
+    out = arguments.out or Path("out") / arguments.task.stem
+    make_folder(out)
+    with Console(stderr=True).status("searching") as status:
+        found = reach_map(
+            task.problem, arguments.frame, low, high, step, jobs=arguments.jobs, cluster=arguments.cluster,
+            progress=lambda done, total: status.update(f"{done} of {total} places"),
+        )  # fmt: skip
+    console = Console()
+    console.print(str(found), highlight=False)
+    console.print(f"  {found.share:.1%} reached; reach volume {found.volume:.4g}", highlight=False)
+    for file in (
+        found.picture(out / "reach.png"),
+        found.html(out / "reach.html"),
+        found.save(out / "reach.npz"),
+        found.to_vtk(out / "reach.vtk"),
+    ):
+        console.print(f"wrote {file}", highlight=False, soft_wrap=True)
+    return 0 if found.reached.any() else 1
+
+
+def _numbers(text: str, what: str, count: int = 3) -> list[float]:
+    """Numbers separated by commas.
+
+    Raises:
+        InputError: they are something else.
+    """
+    from wholebody.checks import shown
+    from wholebody.errors import InputError
+
+    parts = text.split(",")
+    try:
+        numbers = [float(part) for part in parts]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count:
+        wanted = "a number" if count == 1 else f"{count} numbers with commas, such as 0.2,-0.5,0.9"
+        raise InputError(f"{what} is {shown(text)}; give {wanted}")
+    return numbers

@@ -1,0 +1,83 @@
+"""`wholebody study`: one task for many people, targets and layouts."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+HELP = "solve one task for many people, targets and layouts"
+DESCRIPTION = """\
+Solve the task of a study file for each person, with each target, in each layout, and write into a folder:
+
+  cases.csv         one row a case
+  records.sqlite    the same with the postures; a run that was ended goes on from it"""
+EPILOG = """\
+a study file:
+  task = "shelf.toml"                     # relative to the study file
+
+  [[person]]
+  name = "small woman"
+  sex = "female"
+  stature = 1.53
+
+  [[target]]                              # of the task's first goal of type point or frame
+  name = "upper board"
+  at = [0.45, -0.20, 1.45]
+
+  [[layout]]
+  name = "nearer"
+  move = { shelf = [0.55, 0.0, 0.0] }     # things of the task
+
+examples:
+  wholebody study shelf-study.toml --jobs 2
+  wholebody study shelf-study.toml --out results/study --parquet"""
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser("study", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
+    parser.add_argument("study", type=Path, metavar="FILE.toml", help="the study file")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-FILE)")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="cases at a time (default: 1)")
+    parser.add_argument("--cluster", metavar="ADDRESS", help="dask scheduler that runs the cases")
+    parser.add_argument("--parquet", action="store_true", help="write cases.parquet too (needs pyarrow)")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Solve, report and write; 1 if a case is not solved."""
+    from rich.console import Console
+
+    from wholebody.cli.picture import make_folder
+    from wholebody.cli.tables import table
+    from wholebody.studies.study import study
+    from wholebody.studies.study_file import read_study
+
+    asked = read_study(arguments.study)
+    out = arguments.out or Path("out") / arguments.study.stem
+    make_folder(out)
+    with Console(stderr=True).status("solving") as status:
+        records = study(
+            asked.task, people=asked.people, targets=asked.targets, layouts=asked.layouts, method=asked.method,
+            warm_start=asked.warm_start, jobs=arguments.jobs, cluster=arguments.cluster, folder=out,
+            progress=lambda told: status.update(f"{told.done} of {told.total}"),
+        )  # fmt: skip
+    console = Console()
+    made = table("case", "outcome", "left", "overlap", "time")
+    for one in records:
+        left, overlap = f"{1e3 * one.goal_error:.2f} mm", f"{1e3 * one.penetration:.3f} mm"
+        made.add_row(one.name, one.outcome, left, overlap, f"{1e3 * one.seconds:.0f} ms")
+    console.print(made)
+    counts = ", ".join(f"{count} {outcome}" for outcome, count in records.counts().items())
+    console.print(f"{len(records)} cases: {counts}", highlight=False)
+    for one in records:
+        if one.q is None:
+            print(f"{one.name}: {one.message}", file=sys.stderr)
+    files = [records.to_csv(out / "cases.csv")]
+    if arguments.parquet:
+        files.append(records.to_parquet(out / "cases.parquet"))
+    for file in files:
+        console.print(f"wrote {file}", highlight=False, soft_wrap=True)
+    return 0 if all(one.solved for one in records) else 1

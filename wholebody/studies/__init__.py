@@ -1,0 +1,1 @@
+"""One task many times: many problems at once, studies of people, targets and layouts, reach maps."""

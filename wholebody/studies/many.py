@@ -1,0 +1,274 @@
+"""`wb.solve_many`: many problems beside each other, each in a child process; one that fails has a record."""
+
+from __future__ import annotations
+
+import os
+import pickle
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from wholebody import checks
+from wholebody.arrays import Array
+from wholebody.batches import run_batch
+from wholebody.errors import InputError, WholebodyError, one_line
+from wholebody.methods.base import Method
+from wholebody.methods.inputs import check_problem
+from wholebody.methods.solve import as_method
+from wholebody.problem import Problem
+from wholebody.runner import Job, packed
+from wholebody.studies.records import ENDED, REFUSED, Records, SolveRecord
+from wholebody.studies.store import RecordStore
+from wholebody.version import __version__
+
+MOST_JOBS = 4096
+LONGEST = 1e7  # s: a greater deadline of a solve is a mistake
+RUN = 16  # problems that warm-start one from the other: longer = fewer cold starts, fewer processes busy at the end
+
+Make = Callable[[], Problem]
+
+
+class SolveProgress(NamedTuple):
+    """Told when a problem is done.
+
+    Attributes:
+        done: problems, those of an earlier run included.
+        total: how many there are in all.
+        record: the one that was done last; None before the first.
+    """
+
+    done: int
+    total: int
+    record: SolveRecord | None
+
+
+@dataclass(frozen=True)
+class Case:
+    """A problem that is made where it is solved.
+
+    Attributes:
+        record: its record before it is done: name and factors.
+        make: makes the problem.
+        asked: fingerprint; a case with the same is not done again.
+    """
+
+    record: SolveRecord
+    make: Make
+    asked: str = ""
+
+
+@dataclass(frozen=True)
+class Running:
+    """How cases are run; see `solve_many`.
+
+    Raises:
+        InputError: a value of the wrong kind or range.
+    """
+
+    method: Method
+    jobs: int = 1
+    cluster: str | None = None
+    seconds: float | None = None
+    progress: Callable[[SolveProgress], Any] | None = None
+
+    @classmethod
+    def checked(
+        cls, what: str, method: object, jobs: object, cluster: object, seconds: object, progress: Any
+    ) -> Running:
+        """Check the arguments of a function that runs cases.
+
+        Raises:
+            InputError: one is of the wrong kind or range.
+            UnknownNameError: there is no such method.
+        """
+        return cls(
+            as_method(method),
+            checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS),
+            None if cluster is None else checks.text(cluster, f"{what}: cluster"),
+            None if seconds is None else checks.number(seconds, f"{what}: seconds", 1e-3, LONGEST, "s"),
+            checks.function(progress, f"{what}: progress"),
+        )
+
+
+def solve_many(
+    problems: Iterable[Problem] | Mapping[str, Problem],
+    method: str | Method = "qp",
+    *,
+    jobs: int = 1,
+    cluster: str | None = None,
+    warm_start: bool = False,
+    seconds: float | None = None,
+    folder: str | os.PathLike[str] | None = None,
+    progress: Callable[[SolveProgress], Any] | None = None,
+) -> Records:
+    """Solve many problems, several at a time, each in a child process.
+
+    The answers are the same whatever `jobs` is. A problem that fails, or whose process ends, has a record that says so
+    and ends no other.
+
+    Args:
+        problems: the problems; a mapping gives them names, otherwise they are numbered from "0".
+        method: name or settings, see `solve`.
+        jobs: problems at a time.
+        cluster: address of a dask scheduler that runs them; None for this machine.
+        warm_start: begin each problem at the answer of the one before it, if that is solved and of the same figure.
+            One that is not solved from there is solved from its own start. Runs of 16 problems in the order given are
+            linked so, whatever `jobs` is. An answer may then be another local solution than without.
+        seconds: deadline of each problem, by the clock; its record's outcome is then "ended". None for none.
+        folder: keeps the records (`records.sqlite`). What it holds already of the same problem and method is not solved
+            again: a run that was ended goes on. Made if it does not exist.
+        progress: called with a `SolveProgress` after each problem; if it returns True, the run ends and the problems
+            that are left are "cancelled".
+
+    Returns:
+        The records, in the order of the problems.
+
+    Raises:
+        InputError: something else than problems, or a value out of range.
+        UnknownNameError: there is no such method.
+        FileFormatError: the folder holds other records.
+        MissingPackageError: dask is not installed.
+        WholebodyError: the cluster does not answer.
+    """
+    what = "solve_many"
+    named = _named(problems, what)
+    running = Running.checked(what, method, jobs, cluster, seconds, progress)
+    checks.flag(warm_start, f"{what}: warm_start")
+    store = None if folder is None else RecordStore(checks.path(folder, f"{what}: folder"))
+    cases = []
+    for name, problem in named:
+        asked = "" if store is None else fingerprint(problem, running.method, warm_start)
+        cases.append(Case(SolveRecord(name), _Given(problem), asked))
+    return run_cases(runs_of(cases, RUN if warm_start else 1), running, store)
+
+
+def runs_of(cases: Sequence[Case], length: int) -> list[list[Case]]:
+    """Cases in runs of a length; within a run each begins at the answer of the one before."""
+    return [list(cases[k : k + length]) for k in range(0, len(cases), length)]
+
+
+def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordStore | None = None) -> Records:
+    """Solve cases; see `solve_many`.
+
+    Args:
+        runs: the cases; those of one run warm-start one from the other.
+        running: how.
+        store: what was done before, and keeps what is done now.
+    """
+    order = [case for run in runs for case in run]
+    before = {} if store is None else store.read()
+    done = {k: replace(before[case.asked], name=case.record.name, factors=case.record.factors)
+            for k, case in enumerate(order) if case.asked and case.asked in before}  # fmt: skip
+    tell = running.progress
+    numbered, first = [], 0
+    for run in runs:
+        numbered.append(range(first, first + len(run)))
+        first += len(run)
+
+    def keep(number: int, record: SolveRecord) -> bool:
+        done[number] = record
+        if store is not None:
+            store.add(order[number].asked, record)
+        return tell is not None and tell(SolveProgress(len(done), len(order), record)) is True
+
+    over = tell is not None and tell(SolveProgress(len(done), len(order), None)) is True
+    waiting = [run for run in numbered if any(k not in done for k in run)]
+    alone: list[range] = []
+    for work in (waiting, alone):  # the cases of a run whose process ended are done again, one by one
+        if not over and work:
+            over = _run(work, order, running, keep, alone)
+    return Records([done.get(k, order[k].record) for k in range(len(order))])
+
+
+def _run(
+    work: Sequence[range], order: Sequence[Case], running: Running, keep: Callable[[int, SolveRecord], bool],
+    alone: list[range],
+) -> bool:  # fmt: skip
+    """Do runs; whether the caller ended them. Runs of several cases whose process ended are left in `alone`."""
+
+    def jobs() -> Iterator[Job]:
+        for run in work:
+            makers = packed([order[k].make for k in run])
+            yield Job(run, _solve_run, (makers, running.method), (running.seconds or 0.0) * len(run))
+
+    outcomes = run_batch(jobs(), running.jobs, running.cluster)
+    try:
+        for outcome in outcomes:
+            run = outcome.job.name
+            if outcome.error is not None and len(run) > 1:
+                alone.extend(range(k, k + 1) for k in run)
+                continue
+            if outcome.error is not None:
+                answers = [{"outcome": ENDED, "message": str(outcome.error)}]
+            else:
+                answers = outcome.answer
+            for k, answer in zip(run, answers, strict=True):
+                if keep(k, replace(order[k].record, **answer)):
+                    return True
+    finally:
+        outcomes.close()  # type: ignore[attr-defined]
+    return False
+
+
+def _solve_run(makers: bytes, method: Method) -> list[dict[str, Any]]:
+    """Solve the problems of a run, in a process of its own: what their records say."""
+    answers, q = [], None
+    for make in pickle.loads(makers):
+        record = _solved(make, method, q)
+        q = record.q if record.solved else None
+        answers.append({name: getattr(record, name) for name in _ANSWERED})
+    return answers
+
+
+_ANSWERED = (
+    "outcome", "message", "seconds", "iterations", "goal_error", "goal_angle", "penetration", "limit_violation",
+    "constraint_violation", "measure", "q",
+)  # fmt: skip
+
+
+def _solved(make: Make, method: Method, q: Array | None) -> SolveRecord:
+    empty = SolveRecord("")
+    try:
+        problem = check_problem(make(), "the task's answer")
+        if q is not None and q.shape == problem.start.shape:
+            warm = empty.of(method.solve(problem.with_start(q)))
+            if warm.solved:
+                return warm
+        return empty.of(method.solve(problem))
+    except WholebodyError as error:
+        return replace(empty, outcome=REFUSED, message=str(error))
+    except Exception as error:  # of a term or a task of the user's own
+        return replace(empty, outcome=REFUSED, message=one_line(f"{type(error).__name__}: {error}"))
+
+
+def fingerprint(*asked: Any) -> str:
+    """Fingerprint of what is asked.
+
+    Raises:
+        InputError: it cannot be sent to another process.
+    """
+    import joblib
+
+    try:
+        return str(joblib.hash((*asked, __version__)))
+    except Exception as error:  # whatever an object of the user's own raises
+        raise InputError(f"what is given cannot be sent to another process ({one_line(str(error))})") from None
+
+
+@dataclass(frozen=True)
+class _Given:
+    """Gives a problem that was made before."""
+
+    problem: Problem
+
+    def __call__(self) -> Problem:
+        return self.problem
+
+
+def _named(given: Any, what: str) -> list[tuple[str, Problem]]:
+    if isinstance(given, Mapping):
+        named = [(checks.text(name, f"{what}: a name of problems"), problem) for name, problem in given.items()]
+    else:
+        listed = checks.listed(given, f"{what}: problems", "[problem, other_problem]")
+        named = [(str(k), problem) for k, problem in enumerate(listed)]
+    return [(name, check_problem(problem, f"{what}: problems[{name}]")) for name, problem in named]

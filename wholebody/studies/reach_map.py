@@ -1,0 +1,307 @@
+"""`wb.reach_map`: which places of a grid a frame can reach among things."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from hashlib import sha256
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wholebody import checks
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.batches import spread
+from wholebody.errors import InputError
+from wholebody.geometry.placement import FARTHEST
+from wholebody.methods.base import Method
+from wholebody.methods.inputs import check_problem
+from wholebody.methods.solve import as_method
+from wholebody.problem import Problem
+from wholebody.runner import packed
+from wholebody.studies.many import MOST_JOBS
+from wholebody.studies.reach_bounds import beyond, lacking, reach_balls
+from wholebody.studies.reach_result import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED, ReachMap
+from wholebody.studies.reach_search import SURE, Asked, Brick, Try, covered, search_brick
+from wholebody.tasks.inputs import find_place
+
+MOST_PLACES = 1_000_000
+ROUNDS = 12  # most rounds in which bricks hand postures on to their neighbours
+BRICKS = 64  # about how many there are of many places: more = more whole solves, fewer = less to do beside each other
+LEAST_EDGE, MOST_EDGE = 2, 6  # places along an edge of a brick
+
+
+class _Grid(NamedTuple):
+    """The grid of places."""
+
+    axes: tuple[Array, Array, Array]
+    places: Array
+    cells: Indices
+    number: dict[tuple[int, int, int], int]
+
+    def neighbours(self, place: int) -> tuple[int, ...]:
+        """Numbers of the up to six places beside a place."""
+        i, j, k = self.cells[place].tolist()
+        near = ((i - 1, j, k), (i + 1, j, k), (i, j - 1, k), (i, j + 1, k), (i, j, k - 1), (i, j, k + 1))
+        return tuple(self.number[at] for at in near if at in self.number)
+
+
+def reach_map(
+    problem: Problem,
+    frame: str,
+    low: Any,
+    high: Any,
+    step: Any = 0.1,
+    *,
+    offset: Any = (0.0, 0.0, 0.0),
+    method: str | Method | None = None,
+    jobs: int = 1,
+    cluster: str | None = None,
+    progress: Callable[[int, int], Any] | None = None,
+) -> ReachMap:
+    """Find which places of a grid a point of a frame can reach, with everything that a problem asks.
+
+    Each place is solved from the posture of a reached neighbour. What is provably out of reach is not searched: places
+    beyond the lengths of the limbs from what is held, places inside of things, and places within the distance by which
+    a search of another place missed. The answer is the same whatever `jobs` is. A place counts as reached only with a
+    posture that the assessment of `wb.solve` accepts; a place counts as missed after local searches, so that a way in
+    between things that no neighbour leads to may be overlooked.
+
+    Args:
+        problem: figure, things, start, constraints; its goals are met at every place too.
+        frame: the frame that reaches.
+        low: (3,) least corner of the grid, metres.
+        high: (3,) greatest corner; equal values make a plane or a line.
+        step: metres between places, one or for each axis.
+        offset: (3,) the point of the frame that reaches, in its axes.
+        method: of the solves, name or settings; None for `wb.QP(measures=False)`, with quicker settings where a
+            neighbour is reached. A method that is given solves all places, so `wb.QP()` minimises the measures too.
+        jobs: processes.
+        cluster: address of a dask scheduler; None for this machine.
+        progress: called with the numbers of settled and of all places; if it returns True, the search ends, and places
+            that are left are not tried.
+
+    Raises:
+        InputError: a value of the wrong kind or range, or more than a million places.
+        UnknownNameError: no such frame or method.
+        MissingPackageError: dask is not installed.
+        WholebodyError: the cluster does not answer.
+    """
+    what = "reach_map"
+    check_problem(problem, f"{what}: problem").check_fresh()
+    find_place(problem.scene, frame, what)
+    point = checks.numbers(offset, (3,), f"{what}: offset")
+    grid = _grid(low, high, step)
+    whole, quick = _methods(method)
+    jobs = checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS)
+    if cluster is not None:
+        checks.text(cluster, f"{what}: cluster")
+    checks.function(progress, f"{what}: progress")
+    asked = Asked(problem, frame, point, whole, quick)
+    search = _Search(asked, grid, jobs, cluster, progress)
+    search.run()
+    return search.answer()
+
+
+class _Search:
+    """The rounds of one map, and what is known of each place."""
+
+    def __init__(
+        self, asked: Asked, grid: _Grid, jobs: int, cluster: str | None, progress: Callable[[int, int], Any] | None
+    ) -> None:
+        self._asked, self._grid, self._jobs, self._cluster, self._progress = asked, grid, jobs, cluster, progress
+        count = len(grid.places)
+        center, radius = reach_balls(asked.problem, asked.frame, asked.offset)
+        self._verdict = np.where(beyond(grid.places, center, radius), BEYOND, NOT_TRIED).astype(np.int8)
+        self._left = np.where(self._verdict == BEYOND, lacking(grid.places, center, radius), 0.0)
+        self._measure = np.zeros(count)
+        self._q: dict[int, Array] = {}
+        self._tried: set[tuple[int, int]] = set()
+        self._balls: dict[int, float] = {}
+        self._solves = 0
+        self._bricks = _bricks(grid)
+        self._sent = packed(asked)
+        self._key = sha256(self._sent).hexdigest()
+        self._over = False
+
+    def run(self) -> None:
+        """All rounds."""
+        self._round(self._first())
+        for _ in range(ROUNDS):
+            bricks = list(self._following())
+            if not bricks or self._over:
+                return
+            self._round(bricks)
+
+    def answer(self) -> ReachMap:
+        """What was found."""
+        shape = tuple(len(axis) for axis in self._grid.axes)
+        model = self._asked.problem.scene.model
+        postures = np.tile(self._asked.problem.start, (len(self._verdict), 1))
+        for place, q in self._q.items():
+            postures[place] = q
+        x, y, z = self._grid.axes
+        return ReachMap(
+            self._asked.problem, self._asked.frame, x, y, z, self._verdict.reshape(shape),
+            self._left.reshape(shape), self._measure.reshape(shape), postures.reshape((*shape, model.nq)), self._solves,
+        )  # fmt: skip
+
+    def _round(self, bricks: Sequence[Brick]) -> None:
+        """Search bricks beside each other, and take down what they found in their own order."""
+        found: dict[int, list[tuple[Try, int]]] = {}
+        sent = ((number, (self._key, self._sent, brick)) for number, brick in enumerate(bricks))
+        settled = len(self._verdict) - int(self._open().sum())
+        if self._tell(settled):
+            return
+        answers = spread(_numbered, sent, self._jobs, self._cluster)
+        try:
+            for number, tries in answers:
+                found[number] = tries
+                settled += len({one.place for one, _ in tries})
+                if self._tell(settled):
+                    break
+        finally:
+            answers.close()  # type: ignore[attr-defined]
+        for number in sorted(found):
+            for one, begin in found[number]:
+                self._take(one, begin)
+        self._settle()
+
+    def _tell(self, settled: int) -> bool:
+        total = len(self._verdict)
+        if self._progress is not None and self._progress(min(settled, total), total) is True:
+            self._over = True
+        return self._over
+
+    def _take(self, one: Try, begin: int) -> None:
+        place = one.place
+        self._tried.add((place, begin))
+        self._solves += not one.inside
+        if one.reached:
+            if self._verdict[place] != REACHED or one.measure < self._measure[place]:
+                self._verdict[place], self._left[place], self._measure[place] = REACHED, 0.0, one.measure
+                self._q[place] = one.q
+            self._balls.pop(place, None)
+        elif one.inside:
+            self._verdict[place] = INSIDE
+        elif self._verdict[place] != REACHED:
+            nearer = self._verdict[place] != MISSED or one.left < self._left[place]
+            if nearer:
+                self._verdict[place], self._left[place], self._q[place] = MISSED, one.left, one.q
+            if one.sure and nearer:
+                self._balls[place] = one.left
+
+    def _settle(self) -> None:
+        """Leave out what is within the distance by which a search missed, unless a reached place disproves it."""
+        places, reached = self._grid.places, np.flatnonzero(self._verdict == REACHED)
+        for place, left in list(self._balls.items()):
+            if len(reached) and np.linalg.norm(places[reached] - places[place], axis=1).min() < SURE * left:
+                del self._balls[place]
+        centers = np.array([places[place] for place in self._balls]).reshape(-1, 3)
+        radii = np.array(list(self._balls.values()))
+        free = np.flatnonzero(np.isin(self._verdict, (NOT_TRIED, EXCLUDED)))
+        out = covered(places[free], centers, radii)
+        self._verdict[free] = np.where(out, EXCLUDED, NOT_TRIED)
+        for place in free[out].tolist():
+            near = radii - np.linalg.norm(centers - places[place], axis=1)
+            self._left[place] = max(float(near.max()), 0.0)
+
+    def _open(self) -> Mask:
+        return np.asarray(self._verdict == NOT_TRIED)
+
+    def _first(self) -> list[Brick]:
+        """One place of each brick, by a whole solve."""
+        bricks = []
+        for members in self._bricks:
+            free = members[self._open()[members]]
+            if len(free):
+                apart = np.linalg.norm(self._grid.places[free] - self._grid.places[members].mean(axis=0), axis=1)
+                bricks.append(self._brick([int(free[np.argmin(apart)])], [], whole=True))
+        return bricks
+
+    def _following(self) -> Iterator[Brick]:
+        """Bricks with places that are open, or to be tried once more."""
+        open_, reached = self._open(), self._verdict == REACHED
+        known = np.flatnonzero(reached)
+        for members in self._bricks:
+            free = members[open_[members]].tolist()
+            again = [pair for k in members[self._verdict[members] == MISSED].tolist() for pair in self._again(k, known)]
+            if free or again:
+                yield self._brick(free, again)
+
+    def _again(self, place: int, known: Indices) -> list[tuple[int, int]]:
+        """The reached place from which a missed one is tried once more: it is nearer than what was missed by."""
+        if not len(known):
+            return []
+        apart = np.linalg.norm(self._grid.places[known] - self._grid.places[place], axis=1)
+        nearest = int(np.argmin(apart))
+        begin = int(known[nearest])
+        if apart[nearest] >= SURE * self._left[place] or (place, begin) in self._tried:
+            return []
+        return [(place, begin)]
+
+    def _brick(self, free: list[int], again: list[tuple[int, int]], whole: bool = False) -> Brick:
+        near = {k: self._grid.neighbours(k) for k in [*free, *(place for place, _ in again)]}
+        wanted = {*near, *(other for others in near.values() for other in others), *(begin for _, begin in again)}
+        reached = {k: self._q[k] for k in sorted(wanted) if self._verdict[k] == REACHED}
+        if free and not whole and not reached:
+            reached = self._nearest(free)
+        places = {k: self._grid.places[k] for k in wanted | reached.keys()}
+        tried = {pair for pair in self._tried if pair[0] in near}
+        return Brick(places, near, free, again, reached, whole, tried)
+
+    def _nearest(self, free: list[int]) -> dict[int, Array]:
+        """The reached place that is nearest to a brick without any, and its posture."""
+        known = np.flatnonzero(self._verdict == REACHED)
+        if not len(known):
+            return {}
+        middle = self._grid.places[free].mean(axis=0)
+        begin = int(known[np.argmin(np.linalg.norm(self._grid.places[known] - middle, axis=1))])
+        return {begin: self._q[begin]}
+
+
+def _numbered(sent: tuple[int, Any]) -> tuple[int, list[tuple[Try, int]]]:
+    return sent[0], search_brick(sent[1])
+
+
+def _bricks(grid: _Grid) -> list[Indices]:
+    """The places in bricks of equal edges; their size depends on the number of places alone."""
+    dimensions = max(sum(len(axis) > 1 for axis in grid.axes), 1)
+    edge = (len(grid.places) / BRICKS) ** (1.0 / dimensions)
+    size = int(min(max(round(edge), LEAST_EDGE), MOST_EDGE))
+    keys = grid.cells // size
+    order: dict[tuple[int, ...], list[int]] = {}
+    for place, key in enumerate(map(tuple, keys.tolist())):
+        order.setdefault(key, []).append(place)
+    return [np.array(members, dtype=np.intp) for members in order.values()]
+
+
+def _grid(low: Any, high: Any, step: Any) -> _Grid:
+    what = "reach_map"
+    least, most = checks.numbers(low, (3,), f"{what}: low"), checks.numbers(high, (3,), f"{what}: high")
+    if (least > most).any() or max(np.abs(least).max(), np.abs(most).max()) > FARTHEST:
+        raise InputError(
+            f"{what}: low is {least.tolist()} and high {most.tolist()}; give the least corner first, metres"
+        )
+    steps = np.full(3, checks.number(step, f"{what}: step", 1e-4, FARTHEST, "m")) if np.ndim(step) == 0 else (
+        checks.numbers(step, (3,), f"{what}: step")
+    )  # fmt: skip
+    if (steps < 1e-4).any():
+        raise InputError(f"{what}: step is {steps.tolist()}; give 0.0001 m or more")
+    counts = np.floor((most - least) / steps + 1e-9) + 1
+    if np.prod(counts) > MOST_PLACES:
+        raise InputError(f"{what}: {np.prod(counts):.3g} places; give a greater step, at most {MOST_PLACES} places fit")
+    x, y, z = (start + size * np.arange(int(n)) for start, size, n in zip(least, steps, counts, strict=True))
+    places = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
+    index = np.stack(np.meshgrid(*(np.arange(int(n)) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3)
+    number = {(i, j, k): place for place, (i, j, k) in enumerate(index.tolist())}
+    return _Grid((x, y, z), places, index, number)
+
+
+def _methods(given: str | Method | None) -> tuple[Method, Method]:
+    """The method of whole solves, and of those that begin at a neighbour."""
+    if given is not None:
+        method = as_method(given)
+        return method, method
+    from wholebody.methods.qp.method import QP
+
+    return QP(measures=False), QP(measures=False, restarts=0, budget=0, iterations=30)

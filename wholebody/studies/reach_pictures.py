@@ -1,0 +1,136 @@
+"""Pictures of a reach map: heat maps of its heights as PNG, and as a page with a slider."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.files import write
+
+if TYPE_CHECKING:
+    from wholebody.studies.reach_result import ReachMap
+
+MOST_SLICES = 24  # heights in one picture; of more, some are left out evenly
+COLUMNS = 6
+INCHES = 2.4  # of one height
+DPI = 120
+INSIDE_GRAY = (0.35, 0.35, 0.38, 1.0)
+
+_PAGE = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><title>{title}</title>
+<style>body{{font:16px/1.5 sans-serif;margin:2rem auto;max-width:46rem;color:#222}}
+img{{width:100%;display:none}} img.on{{display:block}} input{{width:100%}} td{{padding-right:2rem}}</style>
+<h1>{title}</h1><table>{rows}</table>
+<label>height <output id="height"></output><input id="slider" type="range" min="0" max="{last}" value="{first}"></label>
+{images}
+<script>
+const heights={heights}, images=document.querySelectorAll("img"), slider=document.getElementById("slider");
+function show(){{const k=+slider.value;images.forEach((image,n)=>image.classList.toggle("on",n===k));
+document.getElementById("height").textContent=heights[k].toFixed(2)+" m";}}
+slider.addEventListener("input",show);show();
+</script></html>
+"""
+
+
+def draw_slices(found: ReachMap, path: Path) -> Path:
+    """Draw the heights of a reach map beside each other, seen from above; returns the path."""
+    shown = np.unique(np.linspace(0, len(found.z) - 1, min(len(found.z), MOST_SLICES)).round().astype(int)).tolist()
+    columns = min(COLUMNS, len(shown))
+    rows = -(-len(shown) // columns)
+    chart, axes = _chart(rows, columns, (INCHES * columns + 1.2, INCHES * rows + 0.6))
+    values = heat(found)
+    image: Any = None
+    for axis in axes.flat[len(shown) :]:
+        axis.set_axis_off()
+    for axis, k in zip(axes.flat, shown, strict=False):
+        image = _slice(axis, found, values, k)
+    bar = chart.colorbar(image, ax=list(axes.flat), shrink=0.8)
+    bar.set_label(_meaning(found))
+    chart.suptitle(f"{found.frame}: {found.share:.0%} of {found.verdict.size} places reached, seen from above")
+    return write(path, _png(chart))
+
+
+def write_page(found: ReachMap, path: Path) -> Path:
+    """Write a page with one picture a height and a slider; returns the path."""
+    values, images = heat(found), []
+    for k in range(len(found.z)):
+        chart, axes = _chart(1, 1, (6.4, 5.2))
+        image = _slice(axes[0, 0], found, values, k)
+        chart.colorbar(image, ax=axes[0, 0]).set_label(_meaning(found))
+        data = base64.b64encode(_png(chart)).decode()
+        images.append(f'<img alt="places at {found.z[k]:.2f} m" src="data:image/png;base64,{data}">')
+    facts = {**found.counts(), "solves": found.solves, "reach volume": f"{found.volume:.3g}"}
+    text = _PAGE.format(
+        title=html.escape(f"Reach of {found.frame}"),
+        rows="".join(f"<tr><td>{html.escape(word)}</td><td>{value}</td></tr>" for word, value in facts.items()),
+        last=len(found.z) - 1,
+        first=int(np.argmax(found.reached.sum(axis=(0, 1)))),
+        heights=[float(z) for z in found.z],
+        images="\n".join(images),
+    )
+    return write(path, text)
+
+
+def heat(found: ReachMap) -> Array:
+    """(nx, ny, nz) what is drawn: minus the distance that is left, metres; where reached, 0 to 1 by the measure.
+
+    1 is the least measure of all reached places, 0 the greatest.
+    """
+    values: Array = -np.asarray(found.left, dtype=float)
+    reached = found.reached
+    if reached.any():
+        measures = found.measure[reached]
+        span = float(np.ptp(measures))
+        values[reached] = (measures.max() - measures) / span if span > 0.0 else 1.0
+    return values
+
+
+def _slice(axis: Any, found: ReachMap, values: Array, k: int) -> Any:
+    """Draw one height: reached places green, the others by what is left, places inside of things gray."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    colors = LinearSegmentedColormap.from_list(
+        "reach", [(0.0, "#7f0000"), (0.25, "#d7301f"), (0.4999, "#fdd0a2"), (0.5, "#c7e9c0"), (1.0, "#00441b")]
+    )
+    half = [0.5 * float(places[1] - places[0]) if len(places) > 1 else 0.05 for places in (found.x, found.y)]
+    extent = (found.y[0] - half[1], found.y[-1] + half[1], found.x[0] - half[0], found.x[-1] + half[0])
+    image = axis.imshow(
+        values[:, :, k], origin="lower", extent=extent, cmap=colors, vmin=-1.0, vmax=1.0, interpolation="nearest"
+    )
+    from wholebody.studies.reach_result import INSIDE
+
+    gray = np.zeros((*values.shape[:2], 4))
+    gray[found.verdict[:, :, k] == INSIDE] = INSIDE_GRAY
+    axis.imshow(gray, origin="lower", extent=extent, interpolation="nearest")
+    axis.invert_xaxis()
+    axis.set_title(f"z = {found.z[k]:.2f} m", fontsize="small")
+    axis.set_xlabel("y, left [m]", fontsize="x-small")
+    axis.set_ylabel("x, forward [m]", fontsize="x-small")
+    axis.tick_params(labelsize="x-small")
+    return image
+
+
+def _meaning(found: ReachMap) -> str:
+    return "below 0: metres short; 0 to 1: reached, 1 with the least measure"
+
+
+def _chart(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:
+    """A chart and its axes; without pyplot, which keeps state of its own."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    chart = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(chart)
+    return chart, chart.subplots(rows, columns, squeeze=False)
+
+
+def _png(chart: Any) -> bytes:
+    stream = io.BytesIO()
+    chart.savefig(stream, format="png", dpi=DPI, metadata={"Software": None})
+    return stream.getvalue()

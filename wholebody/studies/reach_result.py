@@ -1,0 +1,139 @@
+"""A reach map: what is known of each place of a grid, its volume, and its files."""
+
+from __future__ import annotations
+
+import io
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from wholebody import checks
+from wholebody.arrays import Array, Mask
+from wholebody.files import check_writable, write
+from wholebody.problem import Problem
+
+NOT_TRIED, REACHED, MISSED, EXCLUDED, BEYOND, INSIDE = range(6)
+VERDICTS = ("not tried", "reached", "missed", "excluded", "beyond", "inside")
+"""Words of the codes of a verdict."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReachMap:
+    """Which places of a grid a point of a frame reaches.
+
+    Attributes:
+        problem: what was asked at every place.
+        frame: the frame that reaches.
+        x, y, z: (nx,), (ny,), (nz,) the places along each axis, metres.
+        verdict: (nx, ny, nz) codes, whose words `VERDICTS` has: reached with a posture; missed by searches; excluded,
+            because another place is missed by more than its distance; beyond the lengths of the limbs; inside of a
+            thing; not tried.
+        left: (nx, ny, nz) distance to the nearest posture that was found, metres: 0 where reached, a lower bound where
+            not searched.
+        measure: (nx, ny, nz) weighted sum of the measures where reached, 0 elsewhere.
+        q: (nx, ny, nz, nq) the posture of a reached place, the nearest of a missed one, the start elsewhere.
+        solves: how many solves it took.
+    """
+
+    problem: Problem = field(repr=False)
+    frame: str
+    x: Array
+    y: Array
+    z: Array
+    verdict: np.ndarray[tuple[int, ...], np.dtype[np.int8]]
+    left: Array
+    measure: Array
+    q: Array
+    solves: int
+
+    @property
+    def reached(self) -> Mask:
+        """(nx, ny, nz) whether a place is reached."""
+        return np.asarray(self.verdict == REACHED)
+
+    @property
+    def share(self) -> float:
+        """Share of the places that are reached."""
+        return float(self.reached.mean())
+
+    @property
+    def volume(self) -> float:
+        """Reached places times the volume of a cell, m^3; of a plane its area, m^2; of a line its length, m."""
+        cell = 1.0
+        for axis in (self.x, self.y, self.z):
+            cell *= float(axis[1] - axis[0]) if len(axis) > 1 else 1.0
+        return cell * int(self.reached.sum())
+
+    def counts(self) -> dict[str, int]:
+        """How many places have each verdict."""
+        found = {word: int((self.verdict == code).sum()) for code, word in enumerate(VERDICTS)}
+        return {word: count for word, count in found.items() if count}
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{count} {word}" for word, count in self.counts().items())
+        span = ", ".join(
+            f"{name} {axis[0]:.2f} to {axis[-1]:.2f} m"
+            for name, axis in zip("xyz", (self.x, self.y, self.z), strict=True)
+        )
+        return f"ReachMap of {self.frame!r}: {self.verdict.size} places, {self.solves} solves\n  {counts}\n  {span}"
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write all arrays into an npz file; returns the path.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        file = check_writable(checks.path(path, "save: path"))
+        stream = io.BytesIO()
+        np.savez_compressed(
+            stream, frame=self.frame, x=self.x, y=self.y, z=self.z, verdict=self.verdict, verdicts=np.array(VERDICTS),
+            left=self.left, measure=self.measure, q=self.q,
+        )  # fmt: skip
+        return write(file, stream.getvalue())
+
+    def to_vtk(self, path: str | os.PathLike[str]) -> Path:
+        """Write verdict, left and measure as a legacy VTK file of structured points; returns the path.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        file = check_writable(checks.path(path, "to_vtk: path"))
+        shape, origin = self.verdict.shape, (self.x[0], self.y[0], self.z[0])
+        spacing = [float(axis[1] - axis[0]) if len(axis) > 1 else 1.0 for axis in (self.x, self.y, self.z)]
+        lines = [
+            "# vtk DataFile Version 3.0",
+            f"reach of {self.frame}: " + ", ".join(f"{code} {word}" for code, word in enumerate(VERDICTS)),
+            "ASCII",
+            "DATASET STRUCTURED_POINTS",
+            "DIMENSIONS " + " ".join(map(str, shape)),
+            "ORIGIN " + " ".join(f"{value:.9g}" for value in origin),
+            "SPACING " + " ".join(f"{value:.9g}" for value in spacing),
+            f"POINT_DATA {self.verdict.size}",
+        ]
+        for name, values in (("verdict", self.verdict), ("left", self.left), ("measure", self.measure)):
+            kind = "int" if name == "verdict" else "float"
+            lines += [f"SCALARS {name} {kind} 1", "LOOKUP_TABLE default"]
+            lines += [f"{value:.9g}" for value in values.flatten(order="F").tolist()]
+        return write(file, "\n".join(lines) + "\n")
+
+    def picture(self, path: str | os.PathLike[str]) -> Path:
+        """Draw heat maps of all heights into a PNG file; returns the path.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        from wholebody.studies.reach_pictures import draw_slices
+
+        return draw_slices(self, check_writable(checks.path(path, "picture: path")))
+
+    def html(self, path: str | os.PathLike[str]) -> Path:
+        """Write a page with a slider over the heights, for any browser, without a network; returns the path.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        from wholebody.studies.reach_pictures import write_page
+
+        return write_page(self, check_writable(checks.path(path, "html: path")))

@@ -1,0 +1,192 @@
+"""The search of one brick of a reach map: each place from the posture of a neighbour that is reached."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array, Mask
+from wholebody.methods.base import Method
+from wholebody.problem import Problem
+from wholebody.studies.reach_bounds import contradicted
+from wholebody.tasks import Point
+
+SURE = 0.95  # share of what is left of a place within which no place is searched: 1 trusts descents to the last digit
+MOST_TRIES = 4  # starts of one place: more finds more places behind things, and takes longer at the border of the reach
+SURROUNDED = 3  # reached neighbours from which a place that was not reached is tried once more
+OUT_OF_REACH = ("unreachable",)
+
+
+class Try(NamedTuple):
+    """A place that was searched.
+
+    Attributes:
+        place: its number.
+        reached: whether a posture was found.
+        inside: whether the place contradicts what must hold, so that it was not searched.
+        left: distance to the nearest posture that was found, metres.
+        sure: whether the search says that there is nothing nearer, so that places within that distance are left out.
+        measure: weighted sum of the measures at the posture.
+        q: (nq,) the posture.
+    """
+
+    place: int
+    reached: bool
+    inside: bool
+    left: float
+    sure: bool
+    measure: float
+    q: Array
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked at every place.
+
+    Attributes:
+        problem: its goals are met at every place too.
+        frame: the frame that reaches.
+        offset: (3,) the point of the frame, in its axes.
+        whole: method of whole solves.
+        quick: method of those that begin at a neighbour.
+    """
+
+    problem: Problem
+    frame: str
+    offset: Array
+    whole: Method
+    quick: Method
+
+    def at(self, place: Array, start: Array) -> Problem:
+        """The problem of a place (3,), from a start (nq,)."""
+        made = self.problem.with_start(start)
+        made.goals = (*self.problem.goals, Point(self.frame, place, offset=self.offset).resolve(made.scene, made.start))
+        return made
+
+    @cached_property
+    def alone(self) -> bool:
+        """Whether the place is the only goal, so that what is left of it is its distance from the reach."""
+        return not self.problem.goals
+
+
+@dataclass
+class Brick:
+    """Places that are searched together, in one process.
+
+    Attributes:
+        places: number -> (3,) metres.
+        neighbours: number -> numbers of the neighbours of a place, those of other bricks included.
+        open: places that are searched.
+        again: (place, neighbour) to be tried once more from there.
+        reached: number -> posture (nq,) of what is reached already, here and around.
+        whole: whether places are solved by whole solves from the problem's start.
+        tried: (place, neighbour) of tries of earlier rounds.
+        tries: the answer.
+    """
+
+    places: dict[int, Array]
+    neighbours: dict[int, tuple[int, ...]]
+    open: list[int]
+    again: list[tuple[int, int]]
+    reached: dict[int, Array]
+    whole: bool = False
+    tried: set[tuple[int, int]] = field(default_factory=set)
+    tries: list[tuple[Try, int]] = field(default_factory=list)
+
+    def search(self, asked: Asked) -> list[tuple[Try, int]]:
+        """Search the places: each try, with the neighbour that it began from, -1 for none."""
+        pending = dict.fromkeys(self.open)
+        if self.whole:
+            for place in pending:
+                self._try(asked, place, -1)
+            return self.tries
+        while pending:
+            place, begin = self._next(pending)
+            del pending[place]
+            found = self._try(asked, place, begin)
+            if found.sure and not found.reached:
+                near = SURE * found.left
+                for other in [k for k in pending if np.linalg.norm(self.places[k] - self.places[place]) < near]:
+                    del pending[other]
+            if found.reached:
+                self._once_more()
+            while self.again:
+                other, begin = self.again.pop(0)
+                if other not in self.reached and self._try(asked, other, begin).reached:
+                    self._once_more()
+        while self.again:
+            other, begin = self.again.pop(0)
+            if other not in self.reached:
+                self._try(asked, other, begin)
+        return self.tries
+
+    def _next(self, pending: dict[int, None]) -> tuple[int, int]:
+        """The next place and the reached place to begin from: a neighbour, else the place farthest from all."""
+        for place in pending:
+            for other in self.neighbours[place]:
+                if other in self.reached:
+                    return place, other
+        if not self.reached:
+            return next(iter(pending)), -1
+        numbers = list(self.reached)
+        there = np.array([self.places[k] for k in numbers])
+        apart = {k: np.linalg.norm(there - self.places[k], axis=1) for k in pending}
+        place = max(pending, key=lambda k: (float(apart[k].min()), -k))
+        return place, numbers[int(np.argmin(apart[place]))]
+
+    def _try(self, asked: Asked, place: int, begin: int) -> Try:
+        self.tried.add((place, begin))
+        start = self.reached.get(begin, asked.problem.start)
+        problem = asked.at(self.places[place], start)
+        found = self._contradiction(problem, place) or _solved(asked, problem, place, self.whole or begin < 0)
+        self.tries.append((found, begin))
+        if found.reached:
+            self.reached[place] = found.q
+        return found
+
+    def _contradiction(self, problem: Problem, place: int) -> Try | None:
+        with problem.borrow() as workspace:
+            if contradicted(problem, workspace):
+                return Try(place, False, True, 0.0, False, 0.0, problem.start)
+        return None
+
+    def _once_more(self) -> None:
+        """Ask for another try of places that were not reached and of which many neighbours are."""
+        failed = {found.place for found, _ in self.tries if not (found.reached or found.inside)} - self.reached.keys()
+        for place in sorted(failed):
+            near = [other for other in self.neighbours[place] if other in self.reached]
+            tries = sum(pair[0] == place for pair in self.tried)
+            fresh = [other for other in near if (place, other) not in self.tried]
+            if len(near) >= SURROUNDED and fresh and tries < MOST_TRIES and (place, fresh[0]) not in self.again:
+                self.again.append((place, fresh[0]))
+
+
+def _solved(asked: Asked, problem: Problem, place: int, whole: bool) -> Try:
+    solution = (asked.whole if whole else asked.quick).solve(problem)
+    judged = solution.assessment
+    sure = asked.alone and solution.status in OUT_OF_REACH
+    return Try(place, solution.solved, False, judged.goal_errors[-1], sure, judged.measure, np.asarray(solution.q))
+
+
+_known: dict[str, Asked] = {}
+
+
+def search_brick(sent: tuple[str, bytes, Brick]) -> list[tuple[Try, int]]:
+    """Search a brick, in any process; what is asked is unpacked once a process."""
+    key, packed_asked, brick = sent
+    if key not in _known:
+        _known.clear()
+        _known[key] = pickle.loads(packed_asked)
+    return brick.search(_known[key])
+
+
+def covered(places: Array, center: Array, radius: Array) -> Mask:
+    """Which places (n, 3) are within a ball around a place that is out of reach by more."""
+    inside = np.zeros(len(places), dtype=bool)
+    for middle, size in zip(center, radius, strict=True):
+        inside |= np.linalg.norm(places - middle, axis=1) < SURE * size
+    return inside

@@ -1,0 +1,191 @@
+"""What a run of many solves found: one record a case, and the table of all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wholebody import checks
+from wholebody.arrays import Array
+from wholebody.errors import MissingPackageError
+from wholebody.files import check_writable, write
+from wholebody.solution import Solution
+
+REFUSED, ENDED, CANCELLED = "refused", "ended", "cancelled"
+
+
+@dataclass(frozen=True, eq=False)
+class SolveRecord:
+    """One problem of many, and what came of it.
+
+    Attributes:
+        name: of the case.
+        outcome: the status of the solution; "refused" where the input is wrong, "ended" where its process ended,
+            "cancelled" where it was not begun.
+        message: one sentence that explains the outcome.
+        seconds: of the solve, by the clock.
+        iterations: of the method.
+        goal_error: largest distance that is left, metres.
+        goal_angle: largest angle that is left, radians.
+        penetration: depth of the deepest overlap, metres.
+        limit_violation: largest violation of a joint limit, radians or metres.
+        constraint_violation: largest violation of a constraint, metres or radians.
+        measure: weighted sum of the measures.
+        q: (nq,) the posture; None where there is none. Numbers of a record without a posture are 0.
+        factors: what the case is made of, such as {"person": "F5", "target": "shelf"}.
+    """
+
+    name: str
+    outcome: str = CANCELLED
+    message: str = ""
+    seconds: float = 0.0
+    iterations: int = 0
+    goal_error: float = 0.0
+    goal_angle: float = 0.0
+    penetration: float = 0.0
+    limit_violation: float = 0.0
+    constraint_violation: float = 0.0
+    measure: float = 0.0
+    q: Array | None = None
+    factors: Mapping[str, str] | None = None
+
+    @property
+    def solved(self) -> bool:
+        """Whether the outcome is "solved"."""
+        return self.outcome == "solved"
+
+    def of(self, solution: Solution) -> SolveRecord:
+        """The record with what a solution says."""
+        judged = solution.assessment
+        return replace(
+            self,
+            outcome=solution.status,
+            message=solution.message,
+            seconds=solution.seconds,
+            iterations=solution.iterations,
+            goal_error=judged.goal_error,
+            goal_angle=judged.goal_angle,
+            penetration=judged.penetration,
+            limit_violation=judged.limit_violation,
+            constraint_violation=judged.constraint_violation,
+            measure=judged.measure,
+            q=np.array(solution.q, dtype=float),
+        )
+
+    def row(self) -> dict[str, Any]:
+        """The record as plain values, without the posture; the factors are columns of their own."""
+        plain = {field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("q", "factors")}
+        return {"name": plain.pop("name"), **(self.factors or {}), **plain}
+
+    def as_json(self) -> str:
+        """The record as JSON; `from_json` reads it."""
+        plain = asdict(self)
+        plain["q"] = None if self.q is None else self.q.tolist()
+        return json.dumps(plain)
+
+    @classmethod
+    def from_json(cls, text: str) -> SolveRecord:
+        """Read what `as_json` wrote.
+
+        Raises:
+            ValueError, TypeError: it is something else.
+        """
+        plain = json.loads(text)
+        q = plain.pop("q")
+        return cls(q=None if q is None else np.array(q, dtype=float), **plain)
+
+
+class Records(Sequence[SolveRecord]):
+    """The records of many solves, in the order in which they were asked."""
+
+    def __init__(self, records: Sequence[SolveRecord]) -> None:
+        """Keep the records."""
+        listed = checks.listed(records, "Records: records", "those of wb.solve_many")
+        for one in listed:
+            checks.instance(one, SolveRecord, "Records: a record", "give those of wb.solve_many")
+        self._records: tuple[SolveRecord, ...] = tuple(listed)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._records[index]
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    def __iter__(self) -> Iterator[SolveRecord]:
+        return iter(self._records)
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{number} {outcome}" for outcome, number in self.counts().items()) or "none"
+        seconds = sum(one.seconds for one in self._records)
+        worst = max(self._records, key=lambda one: one.goal_error, default=None)
+        missed = f"{worst.name} by {1e3 * worst.goal_error:.3g} mm" if worst else "none"
+        return (
+            f"{len(self)} solves: {counts}\n  {seconds:.3g} s of solving\n"
+            f"  goal missed most: {missed}"
+        )  # fmt: skip
+
+    def counts(self) -> dict[str, int]:
+        """How many records have each outcome."""
+        found: dict[str, int] = {}
+        for one in self._records:
+            found[one.outcome] = found.get(one.outcome, 0) + 1
+        return found
+
+    @property
+    def solved(self) -> float:
+        """Share of the records that are solved; 0 without records."""
+        return sum(one.solved for one in self._records) / len(self) if len(self) else 0.0
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The records as plain dictionaries, without postures."""
+        return [one.row() for one in self._records]
+
+    @property
+    def table(self) -> Any:
+        """A pandas DataFrame where pandas is installed, otherwise the rows."""
+        try:
+            import pandas
+        except ImportError:
+            return self.rows()
+        return pandas.DataFrame(self.rows())
+
+    def to_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write the rows as CSV; returns the path.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        file = check_writable(checks.path(path, "to_csv: path"))
+        rows = self.rows()
+        sheet = io.StringIO()
+        made = csv.DictWriter(sheet, list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n")
+        made.writeheader()
+        made.writerows(rows)
+        return write(file, sheet.getvalue())
+
+    def to_parquet(self, path: str | os.PathLike[str]) -> Path:
+        """Write the rows as Parquet; returns the path.
+
+        Raises:
+            MissingPackageError: pyarrow is not installed.
+            InputError: the file cannot be written.
+        """
+        file = check_writable(checks.path(path, "to_parquet: path"))
+        try:
+            import pyarrow
+            import pyarrow.parquet
+        except ImportError:
+            raise MissingPackageError(
+                "Parquet files need pyarrow; install it with: pip install pyarrow, or write with to_csv"
+            ) from None
+        sink = pyarrow.BufferOutputStream()
+        pyarrow.parquet.write_table(pyarrow.Table.from_pylist(self.rows()), sink)
+        return write(file, sink.getvalue().to_pybytes())

@@ -1,0 +1,202 @@
+"""`wb.study`: one task for many people, targets and layouts, in one table."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from typing import Any
+
+from wholebody import checks
+from wholebody.errors import InputError, WholebodyError
+from wholebody.figures import Figure, load
+from wholebody.figures.anthropometry import design_cases
+from wholebody.files import read_bytes
+from wholebody.methods.base import Method
+from wholebody.problem import Problem
+from wholebody.runner import packed
+from wholebody.studies.many import RUN, Case, Running, SolveProgress, fingerprint, run_cases, runs_of
+from wholebody.studies.records import Records, SolveRecord
+from wholebody.studies.store import RecordStore
+from wholebody.studies.task_files import TaskFile
+
+MOST_CASES = 1_000_000
+FACTORS = ("person", "target", "layout")
+
+TaskFunction = Callable[[Any, Any, Any], Problem]
+"""Makes the problem of a figure, a target and a layout; each is None where the study has none."""
+
+
+def study(
+    task: TaskFunction | str | os.PathLike[str],
+    *,
+    people: Any = None,
+    targets: Any = None,
+    layouts: Any = None,
+    method: str | Method | None = None,
+    jobs: int = 1,
+    cluster: str | None = None,
+    warm_start: bool = False,
+    seconds: float | None = None,
+    folder: str | os.PathLike[str] | None = None,
+    progress: Callable[[SolveProgress], Any] | None = None,
+) -> Records:
+    """Solve one task for every person, with every target, in every layout.
+
+    Args:
+        task: a function of a figure, a target and a layout that returns a problem, or a task file. In a task file, a
+            person replaces the figure's sex, stature and mass, a target (3,) the place of the first goal of type point
+            or frame, and a layout the placements of things, by name.
+        people: in a list, or by name in a mapping. A person is a design case of the anthropometric tables ("F5" to
+            "M95", percentiles of women and men), a mapping of options of `wb.load("human")` such as `{"sex":
+            "female", "stature": 1.6}`, or a figure (for functions).
+        targets: likewise; for functions any values.
+        layouts: likewise.
+        method: name or settings; None for the file's, and for "qp" with functions.
+        jobs: problems at a time.
+        cluster: address of a dask scheduler that runs them; None for this machine.
+        warm_start: begin each target at the answer of the one before it, see `solve_many`.
+        seconds: deadline of each problem, by the clock; None for none.
+        folder: keeps the records, so that a run that was ended goes on; see `solve_many`.
+        progress: called with a `SolveProgress` after each case; if it returns True, the run ends.
+
+    Returns:
+        One record for each combination, the targets varying fastest. Its columns `person`, `target` and `layout` are
+        the names that were given, or the values in words.
+
+    Raises:
+        InputError: a value of the wrong kind or range, or nothing to vary.
+        UnknownNameError: an unknown method, option, design case or thing.
+        FileFormatError: the task file cannot be read, or the folder holds other records.
+        MissingPackageError: dask is not installed.
+        WholebodyError: the cluster does not answer.
+    """
+    what = "study"
+    make: TaskFile | TaskFunction
+    mark: Any
+    file: TaskFile | None = None
+    if isinstance(task, (str, os.PathLike)):
+        make = file = TaskFile(checks.path(task, f"{what}: task"))
+        chosen, mark = file.task.method if method is None else method, read_bytes(file.path, "task file")
+    elif callable(task):
+        make, chosen, mark = task, "qp" if method is None else method, _source(task)
+    else:
+        raise InputError(f"study: task is {checks.shown(task)}; give the path of a task file, or a function")
+    running = Running.checked(what, chosen, jobs, cluster, seconds, progress)
+    checks.flag(warm_start, f"{what}: warm_start")
+    given = {"people": people, "targets": targets, "layouts": layouts}
+    factors = [_named(values, f"{what}: {name}") for name, values in given.items()]
+    if not any(factors):
+        raise InputError("study: nothing varies; give people, targets or layouts")
+    if len(factors[0] or [1]) * len(factors[1] or [1]) * len(factors[2] or [1]) > MOST_CASES:
+        raise InputError(f"study: more than {MOST_CASES} cases; give fewer people, targets or layouts")
+    persons = {name: _person(person) for name, person in factors[0].items()}
+    for number, values in enumerate((persons, factors[1], factors[2])):
+        for value in values.values():
+            if file is not None:
+                file.check(*(value if k == number else None for k in range(3)))
+    store = None if folder is None else RecordStore(checks.path(folder, f"{what}: folder"))
+    runs = []
+    for (who, person), (where, layout) in product(_or_none(persons), _or_none(factors[2])):
+        cases = []
+        for aim, target in _or_none(factors[1]):
+            named = {key: name for key, name in zip(FACTORS, (who, aim, where), strict=True) if name}
+            variant = _Variant(make, person, target, layout)
+            asked = fingerprint(mark, person, target, layout, running.method, warm_start) if store else ""
+            cases.append(Case(SolveRecord(", ".join(named.values()), factors=named), variant, asked))
+        runs += runs_of(cases, RUN if warm_start else 1)
+    return run_cases(runs, running, store)
+
+
+@dataclass(frozen=True)
+class _Variant:
+    """Makes the problem of one case, in the process that solves it."""
+
+    make: Any
+    person: Any
+    target: Any
+    layout: Any
+
+    def __call__(self) -> Problem:
+        person = self.person
+        if isinstance(self.make, TaskFile):
+            return self.make(person, self.target, self.layout)
+        figure = loaded(tuple(sorted(person.items()))) if isinstance(person, Mapping) else person
+        made: Problem = self.make(figure, self.target, self.layout)
+        return made
+
+
+@cache
+def loaded(options: tuple[tuple[str, Any], ...]) -> Figure:
+    """A person by options of `load`, made once a process."""
+    return load("human", **dict(options))
+
+
+def _person(given: Any) -> Any:
+    """A figure as it is, or options of `load`.
+
+    Raises:
+        InputError, UnknownNameError: no such person.
+    """
+    if isinstance(given, Figure):
+        return given
+    if isinstance(given, str):
+        cases = design_cases()
+        body = cases[checks.known(given, cases, "design case", "study: people")]
+        return {"sex": body.sex, "stature": body.stature, "mass": body.mass}
+    if isinstance(given, Mapping):
+        try:
+            loaded(tuple(sorted(given.items())))  # wrong options are refused before anything is computed
+        except WholebodyError:
+            raise
+        except TypeError:
+            raise InputError(
+                f"study: a person is {checks.shown(given)}; give options such as {{'sex': 'female'}}"
+            ) from None
+        return dict(given)
+    raise InputError(f"study: a person is {checks.shown(given)}; give 'F5', {{'sex': 'female'}} or a figure")
+
+
+def _named(given: Any, what: str) -> dict[str, Any]:
+    """Values by name."""
+    if given is None:
+        return {}
+    if isinstance(given, Mapping):
+        return {checks.text(name, f"{what}: a name"): value for name, value in given.items()}
+    found: dict[str, Any] = {}
+    for value in checks.listed(given, what, "[...], or values by name"):
+        name, number = _words(value), 2
+        while name in found:
+            name, number = f"{_words(value)} ({number})", number + 1
+        found[name] = value
+    return found
+
+
+def _words(value: Any) -> str:
+    """A value as the name of a case."""
+    if isinstance(value, Figure):
+        return value.name
+    if isinstance(value, Mapping):
+        return " ".join(f"{_word(key)}={_word(part)}" for key, part in value.items())
+    if isinstance(value, Iterable) and not isinstance(value, str) and getattr(value, "shape", (1,)) != ():
+        return " ".join(map(_word, value))
+    return _word(value)
+
+
+def _word(value: Any) -> str:
+    return value if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else checks.shown(value)
+
+
+def _or_none(values: dict[str, Any]) -> list[tuple[str, Any]]:
+    return list(values.items()) or [("", None)]
+
+
+def _source(task: Any) -> Any:
+    """What tells one task function from another: its code and what it is bound to."""
+    try:
+        return inspect.getsource(task), packed(task)
+    except (OSError, TypeError):
+        return packed(task)
