@@ -26,7 +26,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         help="things that move by themselves: closed forms, throws at a person, drops beside MuJoCo and Rapier",
         description="Measure motions whose outcome is known by formula; throw things at a person who stands, walks or "
         "is dragged; drop, slide and stack the same things in wholebody, MuJoCo and Rapier; let dominoes, stacks and "
-        "balls move for minutes. The whole takes about 20 minutes of one processor.",
+        "balls move for minutes. The whole takes about 15 minutes of one processor.",
     )
     parser.add_argument("--parts", nargs="+", metavar="PART", help="closed, throws, drops, long (default: all)")
     parser.add_argument("--only", nargs="+", metavar="DROP", help="names of drops (default: all)")
