@@ -117,6 +117,6 @@ def _engine(seed: int) -> tuple[RigidBodies, list[str], list[str]]:
         put(wb.Box((0.02, 0.08, 0.16)), f"domino {k}", 0.09 * k - 0.3, 0.3, 0.0801, wb.Body())
     rng = np.random.default_rng(seed)
     for k in range(BALLS):
-        x, y = (float(v) for v in rng.normal(size=2))
-        put(wb.Sphere(0.06), f"ball {k}", 0.25 * k - 0.7, -0.2, 0.3, wb.Body(velocity=(x, y, 0.0)))
+        forward, left = (float(v) for v in rng.normal(size=2))
+        put(wb.Sphere(0.06), f"ball {k}", 0.25 * k - 0.7, -0.2, 0.3, wb.Body(velocity=(forward, left, 0.0)))
     return RigidBodies(scene), names, [name for name in names if name.startswith("pillar")]
