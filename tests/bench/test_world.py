@@ -7,9 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wholebody.bench.tables import read_rows
+from wholebody.bench.world.closed_forms import MOTIONS
 from wholebody.bench.world.drops import DENSITY, GRAVITY, ball, pile, stack
 from wholebody.bench.world.engines import ENGINES
+from wholebody.bench.world.long_run import LongRow
 from wholebody.bench.world.measuring import Judge, installed, measure
+from wholebody.bench.world.throws import throws
 from wholebody.cli.main import main
 
 
@@ -46,7 +50,37 @@ def test_a_heap_is_measured() -> None:
 
 
 def test_the_command_writes_a_table(tmp_path: Path) -> None:
-    run = ["bench", "world", "--quick", "--only", "ball", "--engines", "wholebody", "--out", str(tmp_path)]
+    run = [
+        "bench",
+        "world",
+        "--quick",
+        "--parts",
+        "drops",
+        "long",
+        "--only",
+        "ball",
+        "--engines",
+        "wholebody",
+        "--out",
+        str(tmp_path),
+    ]
     assert main(run) == 0
     assert (tmp_path / "world.csv").read_text().count("ball,wholebody") == 1
     assert "| ball | wholebody |" in (tmp_path / "world.md").read_text()
+    _, rows = read_rows(tmp_path / "world-long.csv", LongRow)
+    assert rows[0].outside == 0
+    assert rows[0].deepest_mm <= 0.1
+
+
+def test_closed_forms_are_held() -> None:
+    rows = [row for measure in MOTIONS if measure.__name__ in ("_cradle", "_door", "_slope") for row in measure()]
+    assert len(rows) == 5
+    assert all(row.held for row in rows)
+
+
+def test_what_is_thrown_is_avoided_or_named() -> None:
+    swift = throws("ball", 10.0, "stands", True, 1)
+    assert swift.deep == swift.silent == 0
+    human = throws("ball", 20.0, "walks", False, 1)
+    assert human.silent == 0
+    assert human.named >= human.deep

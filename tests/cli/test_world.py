@@ -47,7 +47,7 @@ def test_a_run_writes_numbers_chart_and_animation(tmp_path: Path, capsys: pytest
     assert len(rows) == 20
     assert max(row.deepest_mm for row in rows) <= 0.1
     assert {path.name for path in out.iterdir()} == {
-        "push_ball.csv", "push_ball.html", "push_ball.png", "push_ball.svg",
+        "push_ball.csv", "push_ball.html", "push_ball.png", "push_ball.svg", "world.md",
     }  # fmt: skip
 
 

@@ -122,6 +122,19 @@ def test_a_door_against_a_wall_stays_on_its_hinge(hand: wb.Figure) -> None:
     assert hits > 0
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_door_bounces_off_a_wall_that_it_touches_beside_its_hinge(hand: wb.Figure, friction: float) -> None:
+    stuff = wb.Material("stuff", others=(0.3, friction))
+    door = wb.Body(mass=12.0, material=stuff, angular_velocity=(0.0, 0.0, -5.0), velocity=(2.25, 0.0, 0.0),
+                   joints=[wb.Hinge((0.0, -0.45, 0.0))])  # fmt: skip
+    scene = wb.Scene(hand).add(wb.Box((0.04, 0.9, 2.0)), name="door", at=AWAY, body=door)
+    scene.add(wb.Box((0.1, 0.5, 2.1)), name="wall", at=AWAY - (0.0, 0.73, 0.0))
+    engine = RigidBodies(scene, gravity=(0.0, 0.0, 0.0))
+    while not engine.advance(1 / 60).events:
+        assert engine.time < 1.0
+    assert engine.twist("door")[5] == pytest.approx(1.5, rel=1e-6)
+
+
 def test_a_chain_on_a_thing_that_is_moved_follows_it(hand: wb.Figure) -> None:
     scene = wb.Scene(hand).add(wb.Box((0.1, 0.1, 0.1)), name="beam", at=AWAY)
     above = "beam"

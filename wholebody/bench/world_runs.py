@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from wholebody.bench import plot_style
+from wholebody.bench.interaction import PAPER
+from wholebody.bench.report import render
 from wholebody.dynamics.world import WorldFrame
 
 
@@ -18,7 +20,9 @@ class WorldFrameRow:
     """One frame; milliseconds, millimetres, joules.
 
     `contacts` counts contact points that bore a force at its end, `events` its impacts, `unavoided` collisions that
-    the figure could not avoid.
+    the figure could not avoid. `drawing_ms` is the time to make the picture's commands, as for a live page; `query_ms`
+    and `ik_ms` are collision queries and programs of the figure, `joints` and `iterations` those of `Frame`. `pairs`
+    counts pairs of pieces by which the posture that the spring wanted was in things.
     """
 
     scene: str
@@ -30,6 +34,12 @@ class WorldFrameRow:
     sleeping: int
     deepest_mm: float
     unavoided: int
+    drawing_ms: float
+    query_ms: float
+    ik_ms: float
+    iterations: int
+    joints: int
+    pairs: int
     note: str
 
 
@@ -48,12 +58,23 @@ class WorldRow:
     unavoided: int
     first_energy: float
     last_energy: float
+    drawn_mean_ms: float
+    drawn_p99_ms: float
+    mean_ms: float
+    joints: float
+    iterations: float
+    ik_percent: float
+    pairs: float
+    query_percent: float
 
 
-def frame_rows(scene: str, frames: Sequence[WorldFrame]) -> list[WorldFrameRow]:
-    """A row for each frame."""
+def frame_rows(
+    scene: str, frames: Sequence[WorldFrame], drawing: Sequence[float], pairs: Sequence[int]
+) -> list[WorldFrameRow]:
+    """A row for each frame; `drawing` has the seconds that drawing it took, `pairs` what the wanted posture was in."""
     rows = []
-    for number, frame in enumerate(frames):
+    for number, (frame, drawn, inside) in enumerate(zip(frames, drawing, pairs, strict=True)):
+        loop = frame.loop
         engine = frame.engine
         energy, events, contacts, sleeping = (
             (engine.energy, len(engine.events), engine.contacts, engine.sleeping) if engine else (0.0, 0, 0, 0)
@@ -62,19 +83,25 @@ def frame_rows(scene: str, frames: Sequence[WorldFrame]) -> list[WorldFrameRow]:
         rows.append(
             WorldFrameRow(
                 scene, number, 1e3 * frame.seconds, energy, events, contacts, sleeping, 1e3 * deepest,
-                len(frame.collisions), frame.note,
+                len(frame.collisions), 1e3 * drawn, 1e3 * loop.contact_seconds, 1e3 * loop.solve_seconds,
+                loop.iterations, loop.joints, inside, frame.note,
             )
         )  # fmt: skip
     return rows
 
 
 def summary(bodies: int, rows: Sequence[WorldFrameRow]) -> WorldRow:
-    """The row of a scene."""
+    """The row of a scene; iterations count in frames in which the tracked posture overlaps something."""
     time = np.array([row.milliseconds for row in rows])
+    drawn, whole = time + [row.drawing_ms for row in rows], float(time.sum())
     return WorldRow(
         rows[0].scene, bodies, len(rows), float(np.median(time)), float(np.quantile(time, 0.99)), float(time.max()),
         sum(row.events for row in rows), max(row.deepest_mm for row in rows), sum(row.unavoided for row in rows),
-        rows[0].energy, rows[-1].energy,
+        rows[0].energy, rows[-1].energy, float(drawn.mean()), float(np.quantile(drawn, 0.99)), float(time.mean()),
+        float(np.mean([row.joints for row in rows])),
+        float(np.mean([row.iterations if row.pairs else 0 for row in rows])),
+        100.0 * sum(row.ik_ms for row in rows) / whole, float(np.mean([row.pairs for row in rows])),
+        100.0 * sum(row.query_ms for row in rows) / whole,
     )  # fmt: skip
 
 
@@ -102,8 +129,20 @@ def chart(rows: Sequence[WorldFrameRow], dt: float, path: Path) -> tuple[Path, P
     above.set(ylabel="energy [J]")
     above.legend(loc="upper right", frameon=False, fontsize=8)
     above.set_title(f"{rows[0].scene.replace('_', ' ')}: energy of what moves by itself", loc="left")
-    below.plot(time, [row.milliseconds for row in rows], color="#666666", linewidth=0.8)
+    whole = [row.milliseconds + row.drawing_ms for row in rows]
+    below.plot(time, whole, color="#bbbbbb", linewidth=0.8, label="with drawing")
+    below.plot(time, [row.milliseconds for row in rows], color="#444444", linewidth=0.8, label="whole frame")
+    below.plot(time, [row.query_ms for row in rows], color="#009e73", linewidth=0.8, label="the figure's queries")
+    touching = [row.pairs > 0 for row in rows]
+    below.fill_between(time, 0.0, 1.0, where=touching, step="mid", transform=below.get_xaxis_transform(),
+                       color="#e6eef5", linewidth=0.0)  # fmt: skip
     below.axhline(1e3 * dt, color="#d55e00", linewidth=0.8, linestyle="--", label="real time")
-    below.set(ylabel="frame time [ms]", xlabel="time [s]")
-    below.legend(loc="upper right", frameon=False, fontsize=8)
+    below.set(ylabel="frame time [ms]", xlabel="time [s] (shaded: the wanted posture is inside of something)")
+    below.set_ylim(0.0, 1.3 * max(float(np.quantile(whole, 0.995)), 1e3 * dt))
+    below.legend(loc="upper right", frameon=False, ncols=4, fontsize=8)
     return plot_style.save(drawn, path)
+
+
+def report(rows: Sequence[WorldRow], facts: Mapping[str, str]) -> str:
+    """Table 2 of Schmidl and Lin with things that move, as Markdown."""
+    return render("world_scenes.md", rows=rows, paper=PAPER, facts=facts)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from wholebody.bench.world_runs import WorldRow
+    from wholebody.dynamics.overlaps import Overlap
     from wholebody.dynamics.scenes import WorldScene
     from wholebody.dynamics.world import WorldFrame
 
@@ -25,6 +26,7 @@ examples:
   wholebody world all --out out/world
 exit code: 1 if pieces were deeper in each other than 0.1 mm after a frame, or a collision could not be avoided"""
 DEEPEST = 0.1  # mm
+CHARTED = ("flick", "avatar_and_cartons")  # a hand and an avatar, as figures 7 and 8 of the paper
 STANDING = 180  # frames of a task file
 FILM = (460, 420)  # pixels of a moment
 
@@ -47,12 +49,18 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         "--out", type=Path, default=Path("out/world"), metavar="DIR", help="folder (default: out/world)"
     )
     parser.add_argument("--picture", action="store_true", help="draw five moments too, by a headless Chromium")
+    parser.add_argument(
+        "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
+        help="write table and charts into the documentation too (default folder: docs)",
+    )  # fmt: skip
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.bench.machine import machine
+    from wholebody.bench.tables import write_text
+    from wholebody.bench.world_runs import report
     from wholebody.dynamics.scenes import WORLD_SCENES
     from wholebody.errors import InputError, UnknownNameError
     from wholebody.files import check_writable, make_folder
@@ -77,7 +85,11 @@ def run(arguments: argparse.Namespace) -> int:
     facts = machine()
     rows = [_run_one(_scene(name, arguments), arguments, facts) for name in names]
     _print(rows)
+    text = report(rows, facts)
+    write_text(arguments.out / "world.md", text + "\n")
     print(f"wrote {arguments.out}")
+    if arguments.update_docs is not None:
+        _update(arguments, text, names)
     return 0 if all(row.deepest_mm <= DEEPEST and not row.unavoided for row in rows) else 1
 
 
@@ -98,11 +110,13 @@ def _run_one(scene: WorldScene, arguments: argparse.Namespace, facts: dict[str, 
 
     from wholebody.bench.tables import write_rows
     from wholebody.bench.world_runs import chart, frame_rows, summary
+    from wholebody.dynamics.overlaps import overlaps
     from wholebody.dynamics.world import World
 
     name = scene.name
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     frames: list[WorldFrame] = []
+    pushed: list[tuple[Overlap, ...]] = []
     with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
         task = bar.add_task(name, total=len(scene.track))
         world = World(
@@ -110,17 +124,23 @@ def _run_one(scene: WorldScene, arguments: argparse.Namespace, facts: dict[str, 
         )  # fmt: skip
         for tracked in scene.track.q:
             frames.append(world.step(tracked))
+            pushed.append(overlaps(scene.scene, frames[-1].wanted))
             bar.update(task, completed=len(frames))
-    rows = frame_rows(name, frames)
+    drawing = _animation(scene, frames, pushed, arguments.out, arguments.picture)
+    rows = frame_rows(name, frames, drawing, [sum(one.pairs for one in each) for each in pushed])
     write_rows(arguments.out / f"{name}.csv", facts, rows)
     chart(rows, scene.track.dt, arguments.out / name)
-    _animation(scene, frames, arguments.out, arguments.picture)
     for row in [row for row in rows if row.note][:5]:
         print(f"{name}, frame {row.frame}: {row.note}")
     return summary(len(frames[-1].placements), rows)
 
 
-def _animation(scene: WorldScene, frames: list[WorldFrame], out: Path, picture: bool) -> None:
+def _animation(
+    scene: WorldScene, frames: list[WorldFrame], pushed: list[tuple[Overlap, ...]], out: Path, picture: bool
+) -> list[float]:
+    """Write the animation, with PD_g of what the spring wanted; the seconds that each frame takes to draw."""
+    import time
+
     from wholebody.bench.world_runs import moments
     from wholebody.view import Viewer
     from wholebody.view.filmstrip import write_filmstrip
@@ -131,11 +151,34 @@ def _animation(scene: WorldScene, frames: list[WorldFrame], out: Path, picture: 
     with Viewer(viewed, contact_distance=0.0, see_through=scene.see_through, title=scene.name) as viewer:
         if scene.eye is not None and scene.target is not None:
             viewer.look(eye=scene.eye, target=scene.target)
-        viewer.play(postures, scene.track.dt, repeat=float("inf"))
+        seconds = []
+        for posture, overlaps in zip(postures, pushed, strict=True):
+            began = time.perf_counter()
+            viewer.show(posture, overlaps=overlaps)
+            seconds.append(time.perf_counter() - began)
+        viewer.play(postures, scene.track.dt, repeat=float("inf"), overlaps=pushed)
         viewer.save(out / f"{scene.name}.html")
         if picture:
             chosen = [postures[number] for number in moments(frames)]
             write_filmstrip(viewer, chosen, out / f"{scene.name}-film.png", FILM)
+    return seconds
+
+
+def _update(arguments: argparse.Namespace, text: str, names: list[str]) -> None:
+    """Write the table and the charts of figures 7 and 8 into the documentation."""
+    import shutil
+
+    from wholebody.bench.tables import replace_section
+
+    docs = arguments.update_docs
+    folder = docs / "assets" / "bench"
+    folder.mkdir(parents=True, exist_ok=True)
+    charted = [name for name in CHARTED if name in names]
+    for name in charted:
+        shutil.copyfile(arguments.out / f"{name}.svg", folder / f"world-{name}.svg")
+    pictures = [f"![Energy and frame time: {name}](assets/bench/world-{name}.svg)" for name in charted]
+    replace_section(docs / "results.md", "world-scenes", "\n\n".join([*pictures, text]))
+    print(f"wrote {docs / 'results.md'}")
 
 
 def _print(rows: list[WorldRow]) -> None:

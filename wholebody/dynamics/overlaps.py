@@ -23,6 +23,7 @@ class Overlap(NamedTuple):
             of it where both may.
         moves_second: (3,) the same of the second.
         pairs: number of overlapping pairs of pieces.
+        point: (3,) in the world, between the two surfaces where they overlap most.
     """
 
     first: str
@@ -31,6 +32,7 @@ class Overlap(NamedTuple):
     moves_first: Array
     moves_second: Array
     pairs: int
+    point: Array
 
 
 def overlaps(scene: Scene, q: Array) -> tuple[Overlap, ...]:
@@ -45,17 +47,22 @@ def overlaps(scene: Scene, q: Array) -> tuple[Overlap, ...]:
     def whole(owner: str) -> str:
         return owner if owner in objects and objects[owner].segment is None else figure
 
-    found: dict[tuple[str, str], list[tuple[float, Array]]] = {}
-    for (i, j), distance, normal in zip(near.pair.tolist(), near.distance.tolist(), near.normal, strict=True):
+    found: dict[tuple[str, str], list[tuple[float, Array, Array]]] = {}
+    middle = 0.5 * (near.point_a + near.point_b)
+    for (i, j), distance, normal, point in zip(
+        near.pair.tolist(), near.distance.tolist(), near.normal, middle, strict=True
+    ):
         first, second = whole(owners[i]), whole(owners[j])
         if first == second:
             continue
         key, out = ((first, second), -normal) if first == figure or second != figure else ((second, first), normal)
-        found.setdefault(key, []).append((-distance, out))
+        found.setdefault(key, []).append((-distance, out, point))
     made = []
     for (first, second), pairs in found.items():
-        depth = global_depth(np.array([d for d, _ in pairs]), np.array([n for _, n in pairs]))
+        depth = global_depth(np.array([d for d, _, _ in pairs]), np.array([n for _, n, _ in pairs]))
         free = [name == figure or objects[name].body is not None for name in (first, second)]
         share = 0.5 if all(free) else 1.0
-        made.append(Overlap(first, second, depth, share * free[0] * depth, -share * free[1] * depth, len(pairs)))
+        deepest = max(pairs, key=lambda pair: pair[0])[2]
+        moves = share * free[0] * depth, -share * free[1] * depth
+        made.append(Overlap(first, second, depth, *moves, len(pairs), deepest))
     return tuple(sorted(made, key=lambda one: -float(np.linalg.norm(one.depth))))

@@ -331,7 +331,7 @@ _PLANS: dict[str, _Plan] = {
     ),
     "door": _Plan(
         "an avatar walks with its hands ahead against a swinging door, and through it",
-        "avatar", _door, _walk_through, (4.4, -3.4, 2.4), (0.9, 0.0, 0.95),
+        "avatar", _door, _walk_through, (-2.6, 3.0, 2.2), (0.6, 0.0, 0.95),
     ),
     "bag": _Plan(
         "an avatar walks with its hands ahead into a bag that hangs from a beam, and back",

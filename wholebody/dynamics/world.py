@@ -29,6 +29,7 @@ from wholebody.matter.materials import Surface, surface
 from wholebody.moving_things import Collision
 from wholebody.scene import Scene
 from wholebody.tracking.loop import FrameLoop, unreadable
+from wholebody.tracking.recording import Frame
 
 FRAME = 1.0 / 60.0  # s: frame time of a screen
 
@@ -42,6 +43,7 @@ class WorldFrame(NamedTuple):
         wanted: (nq,) where the spring would have brought the figure.
         placements: thing that moves by itself to where it is.
         impulses: thing to the impulse (3,) that the figure gave it, N s.
+        loop: how the figure's overlap was removed, and in what time.
         engine: what the things did; None if none moves by itself.
         collisions: what could not be avoided, such as a thing that the user moved too fast; empty if nothing.
         overlaps: objects that overlap at the end by more than 0.1 mm, with what would part them; empty if nothing.
@@ -55,6 +57,7 @@ class WorldFrame(NamedTuple):
     wanted: Array
     placements: Mapping[str, pin.SE3]
     impulses: Mapping[str, Array]
+    loop: Frame
     engine: EngineFrame | None
     collisions: tuple[Collision, ...]
     overlaps: tuple[Overlap, ...]
@@ -168,8 +171,8 @@ class World:
         found = overlaps(self.scene, frame.q) if deepest > INSIDE else ()
         note = "; ".join(part for part in (note and f"{note}; the one before counts", frame.note) if part)
         return WorldFrame(
-            self.time, frame.q, wanted, {name: self._placed[name] for name in self._bodies}, impulses, engine,
-            frame.collisions, found, deepest, time.perf_counter() - began, note,
+            self.time, frame.q, wanted, {name: self._placed[name] for name in self._bodies}, impulses, frame,
+            engine, frame.collisions, found, deepest, time.perf_counter() - began, note,
         )  # fmt: skip
 
     def _segments(self, q: Array) -> dict[str, pin.SE3]:

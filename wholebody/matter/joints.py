@@ -54,7 +54,8 @@ class Hinge(BallJoint):
     def __post_init__(self) -> None:
         super().__post_init__()
         axis = checks.numbers(self.axis, (3,), "Hinge axis")
-        length = float(np.linalg.norm(axis))
+        largest = float(np.abs(axis).max())
+        length = float(np.linalg.norm(axis)) if largest < 1e9 else np.inf
         if not 1e-9 < length < 1e9:
             raise InputError(f"Hinge axis is {checks.shown(self.axis)}; give a direction such as (0, 0, 1)")
         object.__setattr__(self, "axis", tuple(float(x) for x in axis / length))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.arrays import Array
+from wholebody.dynamics.overlaps import Overlap
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
@@ -18,6 +19,7 @@ from wholebody.view.bodies import Bodies
 from wholebody.view.camera import camera_on
 from wholebody.view.contact_markers import color_contacts, mark_contacts
 from wholebody.view.goal_markers import Goals
+from wholebody.view.overlap_markers import mark_overlaps
 from wholebody.view.scene_graph import Keyframe, Marker, SceneGraph
 from wholebody.view.server import Command
 from wholebody.view.viewed_scene import ViewedScene
@@ -80,8 +82,10 @@ class Composition:
         """
         return np.array(self._state.update(q).q)
 
-    def keyframe(self, q: Array, problem: Any, blockers: Sequence[Any] = ()) -> Keyframe:
-        """The keyframe of a posture, with the goals of a problem if there is one, and the blockers."""
+    def keyframe(
+        self, q: Array, problem: Any, blockers: Sequence[Any] = (), overlaps: Sequence[Overlap] = ()
+    ) -> Keyframe:
+        """The keyframe of a posture, with the goals of a problem if there is one, the blockers, and overlaps."""
         bodies, state, keyframe = self.bodies, self._state.update(q), Keyframe()
         bodies.pose(keyframe, state.data)
         contacts = self._scene.contacts(q, within=self._contact_distance)
@@ -94,6 +98,7 @@ class Composition:
             asked = float(problem.clearances.max(initial=0.0))
             near = self._scene.contacts(q, within=asked + self._contact_distance)
             mark_blockers(keyframe, self._scene, state, near, blockers)
+        mark_overlaps(keyframe, overlaps)
         mark_frames(keyframe, self._scene, state, self._frames, self._axes)
         if self._names:
             for path, (name, top) in bodies.tops(state.data).items():

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from wholebody import checks
 from wholebody.arrays import Array
 from wholebody.assessment import assess
+from wholebody.dynamics.overlaps import Overlap
 from wholebody.errors import InputError
 from wholebody.files import check_writable, write
 from wholebody.geometry.placement import FARTHEST
@@ -102,7 +103,9 @@ class Viewer:
 
     # ---- content
 
-    def show(self, q: ArrayLike, *, problem: Any = None, pieces: bool = False) -> None:
+    def show(
+        self, q: ArrayLike, *, problem: Any = None, pieces: bool = False, overlaps: Sequence[Overlap] = ()
+    ) -> None:
         """Show a posture. Only changes are sent to the live page; it can be called sixty times a second.
 
         Args:
@@ -110,29 +113,25 @@ class Viewer:
             problem: a `wholebody.Problem`, whose goals are drawn with their remaining errors and their
                 blockers.
             pieces: draw the figure's pieces, with which contacts are measured, instead of its body's surface.
+            overlaps: of whole objects, as `WorldFrame.overlaps` has them; drawn by what would part the two.
 
         Raises:
-            InputError: q has the wrong shape or is not finite.
+            InputError: q has the wrong shape or is not finite, or overlaps are none.
         """
         self._composition.pieces = checks.flag(pieces, "pieces")
+        marked = _overlaps(overlaps, "overlaps")
         posture = self._composition.checked(q)
         blockers = assess(problem, posture).blockers if isinstance(problem, Problem) else ()
-        keyframe = self._composition.keyframe(posture, problem, blockers)
+        keyframe = self._composition.keyframe(posture, problem, blockers, marked)
         self._seen, self._motion, self._shown = [posture], None, (posture, problem)
         if self._graph.store.camera is None:
             self._graph.do(self._camera_command())
         self._graph.show(keyframe)
 
     def play(
-        self,
-        motion: Any,
-        dt: float | None = None,
-        *,
-        problem: Any = None,
-        ghost: Any = None,
-        repeat: float = 1,
-        pieces: bool = False,
-    ) -> None:
+        self, motion: Any, dt: float | None = None, *, problem: Any = None, ghost: Any = None, repeat: float = 1,
+        pieces: bool = False, overlaps: Sequence[Sequence[Overlap]] | None = None,
+    ) -> None:  # fmt: skip
         """Let the page play a motion; returns at once. The page has a bar to pause and scrub.
 
         Args:
@@ -142,9 +141,11 @@ class Viewer:
             ghost: the same number of postures, shown transparent; they replace earlier ghosts.
             repeat: number of times it is played; `math.inf` for ever.
             pieces: draw the figure's pieces instead of its body's surface.
+            overlaps: overlaps of whole objects at each posture; see `show`.
 
         Raises:
-            InputError: there is no posture, one has the wrong shape, or the time step or the repeats are not positive.
+            InputError: there is no posture, one has the wrong shape, the time step or the repeats are not positive, or
+                there are not as many overlaps as postures.
         """
         self._composition.pieces = checks.flag(pieces, "pieces")
         given = checks.listed(getattr(motion, "q", motion), "motion", "postures, each of shape (nq,)")
@@ -154,7 +155,15 @@ class Viewer:
         step = checks.time_step(getattr(motion, "dt", DEFAULT_DT) if dt is None else dt, "dt")
         if not (isinstance(repeat, float) and math.isinf(repeat) and repeat > 0.0):
             repeat = checks.number(repeat, "repeat", 1e-3, 1e9, "times, or math.inf")
-        keyframes = [self._composition.keyframe(q, problem) for q in postures]
+        marked = [()] * len(postures) if overlaps is None else checks.listed(overlaps, "overlaps", "[frame.overlaps]")
+        if len(marked) != len(postures):
+            raise InputError(
+                f"overlaps has {len(marked)} entries and the motion {len(postures)} postures; give as many"
+            )
+        marked = [_overlaps(one, f"overlaps[{number}]") for number, one in enumerate(marked)]
+        keyframes = [
+            self._composition.keyframe(q, problem, overlaps=here) for q, here in zip(postures, marked, strict=True)
+        ]
         if ghost is not None:
             followed = checks.listed(getattr(ghost, "q", ghost), "ghost", "postures, each of shape (nq,)")
             self._ghosts = self._composition.moving_ghost(keyframes, followed, style.GHOST)
@@ -357,3 +366,9 @@ def _seconds(timeout: object) -> float:
     if isinstance(timeout, float) and math.isinf(timeout) and timeout > 0.0:
         return timeout
     return checks.number(timeout, "timeout", 0.0, 1e9, "s, or math.inf")
+
+
+def _overlaps(given: object, what: str) -> list[Overlap]:
+    """Overlaps, checked."""
+    found = checks.listed(given, what, "frame.overlaps")
+    return [checks.instance(one, Overlap, what, "give those of a WorldFrame") for one in found]

@@ -1,0 +1,141 @@
+"""Things that fly at a person who stands, walks or is dragged: who is hit, and is it said?
+
+With `swift` limits the person may move as fast as the thing comes, so a free posture is within reach in every frame:
+going along with it is one. With `human` limits there may be none. Depths are found by fine subdivision in a scene of
+their own.
+"""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.arrays import Array
+from wholebody.tracking.moving_goals import retarget
+
+DT = 1.0 / 60.0
+SHAPES = {
+    "plate of 1 mm": wb.Box((0.001, 0.5, 0.5)),
+    "board": wb.Box((0.02, 0.6, 0.4)),
+    "ball": wb.Sphere(0.08),
+    "rod": wb.Capsule(0.01, 0.9),
+}
+SPEEDS = (1.0, 2.5, 5.0, 10.0, 20.0)  # m/s
+PERSONS = ("stands", "walks", "is dragged")
+WALK, PULL = 1.3, 1.0  # m/s: of the one who walks, and of the fingertip that is dragged
+HUMAN = (12.0, 4.0)  # rad/s of joints, m/s of the root
+SPIN = 3.0  # rad/s
+WAY = 0.7  # m: that a thing flies
+NAMED = 1.2e-4  # m: what is deeper at an end has to be named
+DIP = 4e-4  # m: what is deeper on every way has to be named
+PARTS = 60  # of a way
+
+
+@dataclass(frozen=True)
+class ThrowRow:
+    """All throws of one kind.
+
+    Attributes:
+        limits: "swift" or "human".
+        person, thing: who is hit by what.
+        speed: of the thing, m/s.
+        frames: of all throws.
+        deepest_mm: at the end of any frame.
+        deep: frames that end deeper than 0.1 mm.
+        named: frames in which something is named that could not be avoided.
+        silent: frames that end deeper, or in which something passes on every way, and nothing is named.
+        median_ms: processor time of a frame.
+    """
+
+    limits: str
+    person: str
+    thing: str
+    speed: float
+    frames: int
+    deepest_mm: float
+    deep: int
+    named: int
+    silent: int
+    median_ms: float
+
+
+class _Throw:
+    """A thing that flies towards the body with constant velocity, and turns."""
+
+    def __init__(self, rng: np.random.Generator, thing: str, speed: float) -> None:
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        self._way = speed * DT * np.array([np.cos(angle), np.sin(angle), 0.0])
+        rotation = pin.exp3(np.array([0.0, 0.0, angle]))
+        self._at = pin.SE3(rotation, -0.5 * self._way / (speed * DT) + [0.0, 0.0, rng.uniform(0.7, 1.5)])
+        self._turn = pin.exp3(SPIN * DT * rng.normal(size=3))
+        self.scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+        self.scene.add(SHAPES[thing], name="thing", at=self._at)
+        self._truth = copy.copy(self.scene)
+        self.frames = int(WAY / (speed * DT)) + 1
+
+    def next(self) -> tuple[pin.SE3, pin.SE3]:
+        """Let it fly for a frame; where it was and is."""
+        before = self._at
+        self._at = pin.SE3(before.rotation @ self._turn, before.translation + self._way)
+        self.scene.move("thing", at=self._at, over=DT)
+        return before, self._at
+
+    def deepest(self, path: Sequence[tuple[float, Array]], way: tuple[pin.SE3, pin.SE3], parts: int) -> float:
+        """Depth of the thing in the body along a path of shares and postures, metres."""
+        turn, worst = pin.log3(way[0].rotation.T @ way[1].rotation), 0.0
+        for (s0, q0), (s1, q1) in pairwise(path):
+            for share in np.linspace(0.0, 1.0, parts):
+                s = s0 + share * (s1 - s0)
+                centre = (1.0 - s) * way[0].translation + s * way[1].translation
+                self._truth.move("thing", at=pin.SE3(way[0].rotation @ pin.exp3(s * turn), centre))
+                near = self._truth.contacts(pin.interpolate(self._truth.model, q0, q1, share), 0.0)
+                owner = self._truth.piece_owner
+                rows = [row for row, pair in enumerate(near.pair) if "thing" in {owner[k] for k in pair}]
+                worst = max(worst, float(-near.distance[rows].min(initial=0.0)))
+        return worst
+
+
+def throws(thing: str, speed: float, person: str, swift: bool, count: int, seed: int = 0) -> ThrowRow:
+    """Throw a thing at a person who is posed by "qp", several times."""
+    rng = np.random.default_rng([seed, *map(ord, thing + person), int(10.0 * speed)])
+    depths, times, named, silent = [], [], 0, 0
+    for _ in range(count):
+        throw = _Throw(rng, thing, speed)
+        turning, going = (max(HUMAN[0], 3.0 * speed), max(HUMAN[1], 1.6 * speed)) if swift else HUMAN
+        start = throw.scene.figure.posture("standing")
+        tip = throw.scene.state(start).frame(throw.scene.frame_id("right_index_tip")).translation.copy()
+        goal = wb.Point("right_index_tip", tip)
+        limits = wb.StepLimit(turning, root_velocity=going, root_turn=1.5 * going)
+        problem = wb.Problem(throw.scene, start, goals=[goal], constraints=[limits], clearance=0.001)
+        tracker, q = wb.QP().tracker(problem, DT), problem.start
+        for frame in range(throw.frames):
+            way = throw.next()
+            if person == "walks":
+                retarget(problem, 0, tip + (WALK * DT * (frame + 1), 0.0, 0.0))
+            elif person == "is dragged":
+                retarget(problem, 0, tip + PULL * DT * (frame + 1) * np.array([0.5, 0.5, 0.7]))
+            began = time.process_time()
+            step = tracker.step(q)
+            times.append(time.process_time() - began)
+            end = throw.deepest(((1.0, step.q), (1.0, step.q)), way, 1)
+            depths.append(end)
+            named += bool(step.collisions)
+            began_in = throw.deepest(((0.0, q), (0.0, q)), way, 1)  # what was in before was named then
+            if not step.collisions and began_in < NAMED:
+                straight = ((0.0, q), (1.0, step.q))
+                passed = end > NAMED or (
+                    throw.deepest(straight, way, PARTS) > DIP and throw.deepest(step.path, way, 4) > DIP
+                )
+                silent += bool(passed)
+            q = step.q
+    return ThrowRow(
+        "swift" if swift else "human", person, thing, speed, len(depths), 1e3 * max(depths),
+        int((np.array(depths) > 1e-4).sum()), named, silent, 1e3 * float(np.median(times)),
+    )  # fmt: skip
