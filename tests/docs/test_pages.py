@@ -18,6 +18,7 @@ import pytest
         "docs/interaction.md",
         "docs/motion.md",
         "docs/world.md",
+        "docs/studies.md",
         "docs/frames.md",
     ],
 )
