@@ -621,6 +621,39 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "study", Call(wb.study, varied)
     anything = partial(wb.study, lambda *given: ask, progress=lambda told: True)
     yield "study(function)", Call(anything, {"people": [arm], "targets": [places[0]], "layouts": [None]})
+    grid = {"problem": ask, "frame": "link4", "low": (0.1, 0.1, 1.0), "high": (0.2, 0.1, 1.0), "step": 0.1}
+    grid |= {"offset": (0.0, 0.0, 0.1), "jobs": 1, "progress": lambda *told: True}
+    yield "reach_map", Call(wb.reach_map, grid, repr)
+    yield "people", Call(wb.people, {"count": 2, "sexes": ["male"]})
+    counted = {"task": path / "task.toml", "sees": (1.0, 0.0, 1.0), "count": 1, "sexes": ["male"]}
+    yield "accommodation", Call(partial(wb.accommodation, jobs=1, progress=lambda told: True), counted)
+    upright, work = person.figure.neutral, wb.Work(load=5.0)
+    posed = {"figure": person.figure, "q": upright, "work": work}
+    for judge in (wb.rula, wb.reba, wb.owas):
+        yield judge.__name__, Call(judge, posed)
+    yield "ergonomics_of", Call(wb.ergonomics_of, {**posed, "strength": wb.Strength()})
+    yield "body_angles", Call(wb.body_angles, {"figure": person.figure, "q": upright}, lambda made: made.side("left"))
+    yield (
+        "static_torques",
+        Call(wb.static_torques, {"figure": person.figure, "q": upright, "load": 5.0, "seated": True}),
+    )
+    lifted = {"figure": person.figure, "origin": upright, "destination": upright, "floor": 0.1}
+    yield "lift_between", Call(wb.lift_between, lifted)
+    lift = {"horizontal": 0.3, "vertical": 0.7, "travel": 0.3, "asymmetry": 0.1, "frequency": 1.0, "duration": 1.0}
+    yield "Lift", Call(wb.Lift, {**lift, "coupling": "good", "load": 5.0}, lambda made: (made.limit, made.index))
+    yield "Work", Call(wb.Work, {"load": 5.0, "static": True, "coupling": "good", "seated": None})
+    yield "sight", Call(wb.sight, {"scene": person, "q": upright, "point": (1.0, 0.0, 1.5), "field": wb.FieldOfView()})
+    cone = {"horizontal": 0.5, "up": 0.5, "down": 0.5, "declination": 0.2}
+    yield "FieldOfView", Call(wb.FieldOfView, cone, lambda made: made.off(np.array((1.0, 0.0, 0.0))))
+    yield (
+        "RulaParts",
+        Call(wb.RulaParts, dict.fromkeys(list(wb.RulaParts.__dataclass_fields__), 1), lambda made: made.score),
+    )
+    yield (
+        "RebaParts",
+        Call(wb.RebaParts, dict.fromkeys(list(wb.RebaParts.__dataclass_fields__), 1), lambda made: made.score),
+    )
+    yield "Owas", Call(wb.Owas, {"back": 1, "arms": 1, "legs": 1, "load": 1}, lambda made: made.category)
     record = wb.SolveRecord("a")
     yield "Records", Call(wb.Records, {"records": [record]}, lambda made: (repr(made), made.counts(), made.rows()))
     for method in (wb.Trajectory, wb.PerFrame, wb.Fade, wb.Bisection):
