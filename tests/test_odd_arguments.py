@@ -514,6 +514,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Viewer.play", Call(viewer.play, motion)
     yield "Viewer.ghosts", Call(viewer.ghosts, {"postures": [q], "color": (1.0, 0.0, 0.0, 1.0)})
     yield "Viewer.frames", Call(viewer.frames, {"names": ["link1"], "length": 0.1}, lambda _: viewer.show(q))
+    yield "Viewer.color", Call(viewer.color, {"segments": {"link1": (1.0, 0.0, 0.0)}}, lambda _: viewer.show(q))
     yield "Viewer.look", Call(viewer.look, {"eye": at, "target": (0.0, 0.0, 0.0)}, lambda _: viewer.show(q))
     yield "Viewer.save", Call(viewer.save, {"path": path / "x.html"})
     yield "Parts", Call(Parts, {"parts": {"one": [Part(wb.Sphere(0.1))]}}, Viewer)
