@@ -20,6 +20,7 @@ MOST_SLICES = 24  # heights in one picture; of more, some are left out evenly
 COLUMNS = 6
 INCHES = 2.4  # of one height
 DPI = 120
+MEANING = "below 0: metres short; above: reached"
 INSIDE_GRAY = (0.35, 0.35, 0.38, 1.0)
 
 _PAGE = """<!doctype html>
@@ -51,7 +52,7 @@ def draw_slices(found: ReachMap, path: Path) -> Path:
     for axis, k in zip(axes.flat, shown, strict=False):
         image = _slice(axis, found, values, k)
     bar = chart.colorbar(image, ax=list(axes.flat), shrink=0.8)
-    bar.set_label(_meaning(found))
+    bar.set_label(MEANING, fontsize="small")
     chart.suptitle(f"{found.frame}: {found.share:.0%} of {found.verdict.size} places reached, seen from above")
     return write(path, _png(chart))
 
@@ -62,7 +63,7 @@ def write_page(found: ReachMap, path: Path) -> Path:
     for k in range(len(found.z)):
         chart, axes = _chart(1, 1, (6.4, 5.2))
         image = _slice(axes[0, 0], found, values, k)
-        chart.colorbar(image, ax=axes[0, 0]).set_label(_meaning(found))
+        chart.colorbar(image, ax=axes[0, 0]).set_label(MEANING, fontsize="small")
         data = base64.b64encode(_png(chart)).decode()
         images.append(f'<img alt="places at {found.z[k]:.2f} m" src="data:image/png;base64,{data}">')
     facts = {**found.counts(), "solves": found.solves, "reach volume": f"{found.volume:.3g}"}
@@ -114,10 +115,6 @@ def _slice(axis: Any, found: ReachMap, values: Array, k: int) -> Any:
     axis.set_ylabel("x, forward [m]", fontsize="x-small")
     axis.tick_params(labelsize="x-small")
     return image
-
-
-def _meaning(found: ReachMap) -> str:
-    return "below 0: metres short; 0 to 1: reached, 1 with the least measure"
 
 
 def _chart(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:
