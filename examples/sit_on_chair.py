@@ -15,8 +15,8 @@ import wholebody as wb
 from wholebody.tracking import Dragged, drag_along, judge_drag, read_path, spread
 from wholebody.view.filmstrip import write_filmstrip
 
-SEAT = 0.386  # m: its top; buttocks touch it when the hips are as high as the knees
-SEATED = (-0.41, 0.0, 0.4898)  # m: of the pelvis, a tenth of a millimetre over the seat
+SEAT = 0.4262  # m: its top; buttocks touch it when the hips are as high as the knees
+SEATED = (-0.41, 0.0, 0.4885)  # m: of the pelvis, a tenth of a millimetre over the seat
 PATH = Path(__file__).parent / "tasks" / "sit_on_chair.csv"
 FRAMES = 240
 STAGES = (0.0, 0.3, 0.55, 0.8, 1.0)  # of the motion, in the picture
@@ -32,13 +32,13 @@ def build() -> wb.Problem:
     for side, y in (("left", 0.22), ("right", -0.22)):
         scene.add(wb.Box((0.03, 0.04, 1.0)), name=f"{side} post", at=(-0.5765, y, 0.5), color=OAK)
     for side, y in (("left", 0.22), ("right", -0.22)):
-        scene.add(wb.Box((0.04, 0.04, 0.346)), name=f"{side} leg", at=(-0.15, y, 0.173), color=OAK)
+        scene.add(wb.Box((0.04, 0.04, 0.386)), name=f"{side} leg", at=(-0.15, y, 0.193), color=OAK)
     bent = {"hip_flexion": 0.1, "knee_flexion": 0.2, "ankle_dorsiflexion": 0.1}  # rad: the knees are unlocked
     start = person.with_joints(
         person.posture("standing"),
         {f"{side}_{joint}": angle for side in ("left", "right") for joint, angle in bent.items()},
     )
-    start[2] = 0.903901  # m: as much lower as the knees are bent
+    start[2] = 0.895725  # m: as much lower as the knees are bent
     return wb.Problem(
         scene,
         start,

@@ -14,8 +14,8 @@ import pytest
 
 import wholebody as wb
 from wholebody import tracking
-from wholebody.cli import result
 from wholebody.cli.demo import packaged_tasks
+from wholebody.taskfile import result
 from wholebody.taskfile import task as task_module
 
 ROUNDS = 250

@@ -231,6 +231,9 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     def on_a_person(term: Any) -> Any:
         return term.resolve(person, person.figure.neutral)
 
+    person.add(wb.Box((0.4, 0.4, 0.1)), name="crate", at=(0.5, 0.0, 0.4)).add(wb.HalfSpace(), name="floor")
+    person.add(wb.Box((0.1, 0.4, 0.8)), name="post", at=(-0.9, 0.0, 0.4))
+
     yield "load", Call(lambda spec, **options: wb.load(spec, **options), {"spec": path / "arm.urdf"})
     for option, value in {"root": "fixed", "package_dirs": [path], "concavity": 0.5, "samples": 10, "seed": 0}.items():
         yield f"load({option})", Call(wb.load, {"spec": path / "arm.urdf", option: value})
@@ -285,6 +288,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         return wb.Scene(arm).add(wb.Sphere(0.1), name="ball", at=(1.0, 1.0, 1.0), body=body)
 
     yield "Body", Call(wb.Body, body, lambda made: RigidBodies(loose(made)).advance(0.1))
+    for joint in (wb.BallJoint, wb.Hinge):
+        hung = {"at": (0.0, 0.0, 0.1), "to": None, **({"axis": (0.0, 1.0, 0.0)} if joint is wb.Hinge else {})}
+        yield joint.__name__, Call(joint, hung, lambda made: RigidBodies(loose(wb.Body(joints=[made]))).advance(0.1))
+    yield "Body(joints)", Call(wb.Body, {"joints": ()}, lambda made: RigidBodies(loose(made)).advance(0.1))
     yield "Body(density)", Call(wb.Body, {"density": 500.0}, lambda made: RigidBodies(loose(made)).advance(0.1))
     material = {"name": "glass", "against": {"wood": (0.5, 0.1)}, "others": (0.5, 0.1)}
     yield "Material", Call(wb.Material, material, lambda made: RigidBodies(loose(wb.Body(material=made))))
@@ -333,7 +340,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Mesh", Call(wb.Mesh, mesh, put)
     yield "Mesh(vertices)", Call(lambda vertices: wb.Mesh((vertices, faces)), {"vertices": corners}, put)
     yield "Mesh(faces)", Call(lambda faces: wb.Mesh((corners, faces)), {"faces": faces}, put)
-    for shape in (wb.Box((1, 1, 1)), wb.Sphere(1), wb.Capsule(1, 1), wb.Ellipsoid((1, 1, 1)), wb.HalfSpace()):
+    simple = wb.Box((1, 1, 1)), wb.Sphere(1), wb.Capsule(1, 1), wb.Ellipsoid((1, 1, 1)), wb.HalfSpace()
+    for shape in (*simple, wb.Cylinder(0.1, 0.2), wb.Torus(0.1, 0.02)):
         yield f"{type(shape).__name__}.pieces", Call(shape.pieces, {})
     yield "Hull.pieces", Call(wb.Hull(corners).pieces, {})
     yield "Mesh.pieces", Call(wb.Mesh((corners, faces)).pieces, {})
@@ -356,6 +364,28 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Plane", Call(wb.Plane, plane, solve_it)
     yield "Balance", Call(wb.Balance, {"feet": ["left_foot"], "margin": 0.0}, on_a_person)
     yield "ReachCones", Call(wb.ReachCones, {"names": ["left_shoulder"]}, on_a_person)
+    yield "RangeOfMotion", Call(wb.RangeOfMotion, {"names": ["neck"]}, on_a_person)
+    yield "Cylinder", Call(wb.Cylinder, {"radius": 0.1, "length": 0.2}, lambda shape: shape.pieces())
+    yield "Torus", Call(wb.Torus, {"radius": 0.1, "tube": 0.02}, lambda shape: shape.pieces())
+    task = wb.read_task(path / "task.toml")
+    given = {"problem": task.problem, "path": path / "written.toml", "title": "one line"}
+    yield "write_task", Call(wb.write_task, given)
+    answer = wb.solve(task.problem)
+    stored = path / "result.json"
+    yield "write_result", Call(wb.write_result, {"task": task, "solution": answer, "path": stored})
+    wb.write_result(task, answer, stored)
+    yield "read_result", Call(wb.read_result, {"path": stored})
+    touch = {"part": "link4", "thing": "ball", "weight": 1.0}
+    yield "Touch", Call(wb.Touch, touch, solve_it)
+    lean = {"on": "crate", "part": "thorax", "side": at, "weight": 1.0}
+    yield "Lean", Call(wb.Lean, lean, on_a_person)
+    sit = {"on": "crate", "pelvis": "pelvis", "trunk": "thorax", "weight": 1.0}
+    yield "Sit", Call(wb.Sit, sit, on_a_person)
+    yield "Sit(back)", Call(lambda back: wb.Sit("crate", back), {"back": "post"}, on_a_person)
+    yield "Stand", Call(wb.Stand, {"on": "crate", "feet": ["left_foot"], "balance": True, "margin": 0.0}, on_a_person)
+    grasp = {"hand": "left", "thing": "crate", "kind": "palm", "side": at, "weight": 1.0}
+    yield "Grasp", Call(wb.Grasp, grasp, on_a_person)
+    yield "Figure.grounded", Call(person.figure.grounded, {"q": person.figure.neutral, "scene": person})
     yield "Freeze", Call(lambda name: wb.Freeze(name), {"name": "joint1"}, solve_it)
     limit = {"velocity": 1.0, "joints": {"joint1": 1.0}, "root_velocity": math.inf, "root_turn": math.inf}
     yield "StepLimit", Call(wb.StepLimit, limit, solve_it)

@@ -35,6 +35,7 @@ ROOMS = (
         "scene",
         "tasks",
         "derivatives",
+        "term_entries",
         "term_plan",
         "residual_kernel",
         "coordinate_kernel",

@@ -63,14 +63,15 @@ def test_nearly_unit_quaternions_are_made_unit(scene):
 
 
 def test_effort_is_minimised_unless_something_else_is_said(scene):
-    assert [type(term) for term in wb.Problem(scene).measures] == [wb.Effort]
+    assert [type(term) for term in wb.Problem(scene).measures] == [wb.Effort, wb.Rhythm]
     assert wb.Problem(scene, measures=[]).measures == ()
 
 
 def test_bounds_and_constraints_are_told_apart(scene):
     problem = wb.Problem(scene, constraints=[wb.Freeze("neck"), wb.Hold("left_foot"), wb.StepLimit(1.0)])
     assert [type(term) for term in problem.bounds] == [wb.Freeze, wb.StepLimit]
-    assert [type(term) for term in problem.constraints] == [wb.Hold]
+    assert [type(term) for term in problem.constraints] == [wb.Hold, wb.RangeOfMotion, wb.ReachCones]
+    assert [type(term) for term in problem.stated] == [wb.Hold]
 
 
 def test_pairs_keep_what_they_begin_with_and_leave_what_they_are_in(free_bodies):

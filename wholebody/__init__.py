@@ -39,8 +39,20 @@ if TYPE_CHECKING:
     from wholebody.ergonomics.vision import FieldOfView, Sight, sight
     from wholebody.ergonomics.work import Work
     from wholebody.figures import Figure, load
-    from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+    from wholebody.geometry.shapes import (
+        Box,
+        Capsule,
+        Cylinder,
+        Ellipsoid,
+        HalfSpace,
+        Hull,
+        Mesh,
+        Shape,
+        Sphere,
+        Torus,
+    )
     from wholebody.matter.body import Body
+    from wholebody.matter.joints import BallJoint, Hinge
     from wholebody.matter.materials import Material
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
@@ -78,7 +90,7 @@ if TYPE_CHECKING:
     from wholebody.studies.reach_result import ReachMap
     from wholebody.studies.records import Records, SolveRecord
     from wholebody.studies.study import study
-    from wholebody.taskfile import Task, read_task
+    from wholebody.taskfile import Result, Task, read_result, read_task, write_result, write_task
     from wholebody.tasks import (
         Axis,
         Balance,
@@ -91,16 +103,23 @@ if TYPE_CHECKING:
         Frame,
         Freeze,
         Goal,
+        Grasp,
         Hold,
+        Lean,
         Measure,
         Orientation,
         Plane,
         Point,
         Posture,
         PotentialEnergy,
+        RangeOfMotion,
         ReachCones,
         Relative,
+        Rhythm,
+        Sit,
+        Stand,
         StepLimit,
+        Touch,
     )
     from wholebody.tracking.drag import Drag
     from wholebody.tracking.path_following import follow_path
@@ -119,6 +138,7 @@ __all__ = [
     "AvoidedCase",
     "Axis",
     "Balance",
+    "BallJoint",
     "BatchProgress",
     "Bisection",
     "Body",
@@ -130,6 +150,7 @@ __all__ = [
     "Clip",
     "ClipCheck",
     "Constraint",
+    "Cylinder",
     "DampedLeastSquares",
     "DerivativeCheck",
     "Discomfort",
@@ -146,10 +167,13 @@ __all__ = [
     "Frame",
     "Freeze",
     "Goal",
+    "Grasp",
     "HalfSpace",
+    "Hinge",
     "Hold",
     "Hull",
     "InputError",
+    "Lean",
     "Lift",
     "Material",
     "Measure",
@@ -165,17 +189,21 @@ __all__ = [
     "Posture",
     "PotentialEnergy",
     "Problem",
+    "RangeOfMotion",
     "ReachCones",
     "ReachMap",
     "Reba",
     "RebaParts",
     "Records",
     "Relative",
+    "Result",
+    "Rhythm",
     "Rula",
     "RulaParts",
     "Scene",
     "Shape",
     "Sight",
+    "Sit",
     "SkeletonMotion",
     "Solution",
     "SolveProgress",
@@ -183,11 +211,14 @@ __all__ = [
     "Sphere",
     "Spring",
     "StanceFeet",
+    "Stand",
     "StaticTorques",
     "StepLimit",
     "Strength",
     "Task",
     "Torques",
+    "Torus",
+    "Touch",
     "Trajectory",
     "UnknownNameError",
     "Viewer",
@@ -212,6 +243,7 @@ __all__ = [
     "reach_map",
     "read_clip",
     "read_many",
+    "read_result",
     "read_skeleton",
     "read_task",
     "reba",
@@ -224,13 +256,15 @@ __all__ = [
     "static_torques",
     "study",
     "torques",
+    "write_result",
+    "write_task",
 ]
 
 _MODULES = {
     "wholebody.assessment": "Assessment assess",
     "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
-    "wholebody.geometry.shapes": "Box Capsule Ellipsoid HalfSpace Hull Mesh Shape Sphere",
+    "wholebody.geometry.shapes": "Box Capsule Cylinder Ellipsoid HalfSpace Hull Mesh Shape Sphere Torus",
     "wholebody.dynamics.coupling": "Spring",
     "wholebody.dynamics.world": "World",
     "wholebody.ergonomics.angles": "BodyAngles body_angles",
@@ -243,6 +277,7 @@ _MODULES = {
     "wholebody.ergonomics.vision": "FieldOfView Sight sight",
     "wholebody.ergonomics.work": "Work",
     "wholebody.matter.body": "Body",
+    "wholebody.matter.joints": "BallJoint Hinge",
     "wholebody.matter.materials": "Material",
     "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
@@ -282,9 +317,10 @@ _MODULES = {
     "wholebody.studies.reach_map": "reach_map",
     "wholebody.studies.reach_result": "ReachMap",
     "wholebody.studies.study": "study",
-    "wholebody.taskfile": "Task read_task",
+    "wholebody.taskfile": "Result Task read_result read_task write_result write_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
-    "Hold Measure Orientation Plane Point Posture PotentialEnergy ReachCones Relative StepLimit",
+    "Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
+    "StepLimit Grasp Lean Sit Stand Touch",
     "wholebody.view": "Viewer",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}

@@ -23,6 +23,7 @@ _T = TypeVar("_T")
 NUMERIC = "fiu"
 """Kinds of numpy arrays that hold real numbers: floating, signed and unsigned."""
 
+FAR = 1e15  # values beyond this get no hint at a wrong unit
 TIME_STEP = (1e-6, 1e6)
 """Least and greatest time step, seconds: beyond them velocities have no significant digits."""
 
@@ -90,8 +91,19 @@ def number(value: object, what: str, low: float, high: float, unit: str = "") ->
         else:
             odd = isinstance(value, float) and not math.isfinite(value)
             wanted = f"a {'finite ' if odd else ''}number between {low:g} and {high:g}"
-        raise InputError(f"{what} is {shown(value)}; give {wanted}{f' {unit}' if unit else ''}")
+        slip = slipped(found, low, high) if unit == "m" and found is not None else ""
+        raise InputError(f"{what} is {shown(value)}; give {wanted}{f' {unit}' if unit else ''}{slip}")
     return found
+
+
+def slipped(value: float, low: float, high: float) -> str:
+    """A hint that a length out of a range [m] may be in millimetres or centimetres; empty if it is in neither."""
+    fits = [
+        f"{value * factor:.6g} if it is in {unit}"
+        for factor, unit in ((1e-3, "millimetres"), (1e-2, "centimetres"))
+        if low <= value * factor <= high and abs(value) < FAR
+    ]
+    return f"; write {' or '.join(fits)}" if fits else ""
 
 
 def time_step(value: object, what: str) -> float:
@@ -268,10 +280,22 @@ def posture(value: object, size: int, what: str = "a posture") -> Array:
 def color(value: object, what: str) -> tuple[float, float, float, float]:
     """Red, green, blue and alpha, each from 0 to 1; alpha is 1 if it is missing.
 
+    Args:
+        value: three or four such numbers, a name of CSS such as "steelblue", or "#rrggbb" or "#rrggbbaa".
+        what: is painted, for the message.
+
     Raises:
-        InputError: it is neither three nor four such numbers.
+        InputError: it is none of these.
     """
-    wanted = "red, green, blue and, if wanted, alpha, each from 0 to 1, such as (1.0, 0.0, 0.0)"
+    wanted = "red, green, blue and, if wanted, alpha, each from 0 to 1, such as (1.0, 0.0, 0.0), a name or '#rrggbb'"
+    if isinstance(value, str):
+        from PIL import ImageColor  # the names of CSS
+
+        try:
+            parts = (*ImageColor.getrgb(value), 255)[:4]
+        except ValueError:
+            raise InputError(f"{what} is {shown(value)}; give {wanted}") from None
+        return parts[0] / 255.0, parts[1] / 255.0, parts[2] / 255.0, parts[3] / 255.0
     found = array(value, what, wanted)
     if found.shape not in ((3,), (4,)) or not ((found >= 0.0) & (found <= 1.0)).all():
         raise InputError(f"{what} is {shown(value)}; give {wanted}")

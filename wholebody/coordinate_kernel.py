@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from wholebody.arrays import Array
 from wholebody.compiled import compiled
 from wholebody.residual_kernel import SMALL, inverse_left, rotation_vector
-from wholebody.term_plan import Integers
+from wholebody.term_entries import Integers
 
 
 @compiled()
@@ -17,6 +17,36 @@ def coordinates(targets: Array, places: Integers, q: Array, value: Array, jacobi
     for e in range(len(targets)):
         value[places[e, 0]] = q[places[e, 1]] - targets[e, 0]
         jacobian[places[e, 0], places[e, 2]] = 1.0
+
+
+@compiled()
+def coupled_ranges(tables: Array, places: Integers, q: Array, value: Array, jacobian: Array) -> None:
+    """See `tasks.range_of_motion.CoupledRow`."""
+    for e in range(len(tables)):
+        row = places[e, 0]
+        value[row] = tables[e, 2]
+        for k in range(2):
+            if places[e, 1 + 2 * k] >= 0:
+                value[row] -= tables[e, k] * q[places[e, 1 + 2 * k]]
+                jacobian[row, places[e, 2 + 2 * k]] -= tables[e, k]
+
+
+@compiled(error_model="numpy")
+def elliptic_ranges(tables: Array, places: Integers, q: Array, value: Array, jacobian: Array) -> None:
+    """See `tasks.range_of_motion.EllipticRow`."""
+    for e in range(len(tables)):
+        row, size = places[e, 0], tables[e, 9]
+        value[row] = 0.5 * size
+        for k in range(3):
+            angle = tables[e, k]
+            for j in range(4 * k + 1, 4 * k + 5, 2):
+                if places[e, j] >= 0:
+                    angle += q[places[e, j]]
+            limit = tables[e, 6 + k] if angle > 0.0 else tables[e, 3 + k]
+            value[row] -= 0.5 * size * angle * angle / (limit * limit)
+            for j in range(4 * k + 1, 4 * k + 5, 2):
+                if places[e, j] >= 0:
+                    jacobian[row, places[e, j + 1]] -= size * angle / (limit * limit)
 
 
 @compiled()
@@ -82,6 +112,64 @@ def roots(targets: Array, places: Integers, q: Array, value: Array, jacobian: Ar
                 jacobian[row + i, v + 3 + m] = (
                     bend[i, 0] * left[m, 0] + bend[i, 1] * left[m, 1] + bend[i, 2] * left[m, 2]
                 )
+
+
+@compiled()
+def root_distances(tables: Array, places: Integers, q: Array, measure: Array) -> None:
+    """Squared distance of a free root, see `tasks.distance.SquaredDistance`; its curvature is always the same."""
+    if not len(tables):
+        return
+    at, target, error, slope = np.zeros((1, 3), dtype=np.int64), np.empty((1, 12)), np.zeros(6), np.zeros((6, 6))
+    last = measure.shape[1] - 1
+    for e in range(len(tables)):
+        target[0] = tables[e, :12]
+        roots(target, at, q, error, slope)
+        for i in range(6):
+            force = tables[e, 12 + i] * error[i]
+            measure[0, last] += force * error[i]
+            for v in range(6):
+                measure[0, v] += 2.0 * force * slope[i, v]
+
+
+@compiled()
+def rhythms(
+    girdles: Array, girdle_places: Integers, lumbars: Array, lumbar_places: Integers, q: Array, measure: Array
+) -> None:
+    """See `tasks.Rhythm`."""
+    slopes, at = np.empty(5), np.empty(5, dtype=np.int64)
+    for e in range(len(girdles)):
+        flexion, abduction = q[girdle_places[e, 1]], q[girdle_places[e, 2]]
+        rise = girdles[e, 1]
+        excess = q[girdle_places[e, 0]] - rise * (1.0 - np.cos(flexion) * np.cos(abduction))
+        slopes[0] = 1.0
+        slopes[1] = -rise * np.sin(flexion) * np.cos(abduction)
+        slopes[2] = -rise * np.cos(flexion) * np.sin(abduction)
+        for k in range(3):
+            at[k] = girdle_places[e, 3 + k]
+        _square(girdles[e, 0], excess, slopes[:3], at[:3], measure)
+    for e in range(len(lumbars)):
+        x, y, z, w = q[3], q[4], q[5], q[6]
+        share = np.tanh(-lumbars[e, 2] * 2.0 * (x * z - y * w))
+        steep = lumbars[e, 1] * lumbars[e, 2] * (1.0 - share * share)
+        excess = -lumbars[e, 1] * share - lumbars[e, 3]
+        for k in range(3):
+            excess += q[lumbar_places[e, k]]
+            slopes[k], at[k] = 1.0, lumbar_places[e, 3 + k]
+        slopes[3], at[3] = -steep * (1.0 - 2.0 * (x * x + y * y)), 4
+        slopes[4], at[4] = steep * 2.0 * (y * z + x * w), 5
+        _square(lumbars[e, 0], excess, slopes, at, measure)
+
+
+@compiled()
+def _square(weight: float, excess: float, slopes: Array, at: Integers, measure: Array) -> None:
+    """Add a weighted square with slopes (k,) at these places of the tangent; row sums bound its second derivative."""
+    steep = 0.0
+    for k in range(len(slopes)):
+        steep += abs(slopes[k])
+    measure[0, measure.shape[1] - 1] += weight * excess * excess
+    for k in range(len(slopes)):
+        measure[0, at[k]] += 2.0 * weight * excess * slopes[k]
+        measure[1, at[k]] += 2.0 * weight * abs(slopes[k]) * steep
 
 
 @compiled()

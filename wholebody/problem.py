@@ -20,6 +20,7 @@ from wholebody.linearisation import Lineariser
 from wholebody.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
+from wholebody.tasks.defaults import default_constraints, default_measures
 from wholebody.workspace import Workspace
 
 UNIT_TOLERANCE = 1e-3  # largest deviation of a start's quaternion from unit length; more is refused as a mistake
@@ -29,15 +30,20 @@ LARGEST_CLEARANCE = 0.5  # m: more is refused as a wrong unit
 class Problem:
     """Scene, start, goals, constraints and measures, in the same form for every method.
 
-    Joint limits and non-penetration are part of every problem. A pair that is nearer than the clearance at the start,
-    but does not penetrate (soles on a floor, a hand on a table), must keep its distance. A pair that penetrates at the
-    start must reach the full clearance.
+    Joint limits and non-penetration are part of every problem. A person keeps its `RangeOfMotion` and `ReachCones`, and
+    its `Balance` if it stands: both feet are held in the world where they are at the start, and nothing else carries
+    it, that is, no other frame is held in the world and the root is not frozen. What is stated takes the place of a
+    default.
+
+    A pair that is nearer than the clearance at the start, but does not penetrate (soles on a floor, a hand on a table),
+    must keep its distance. A pair that penetrates at the start must reach the full clearance.
 
     Attributes:
         scene: figure and things.
         start: (nq,) the start posture.
         goals, constraints, bounds, measures: the terms, resolved on this scene and start.
-        measures_given: whether the caller gave measures; false if `Effort()` is the default.
+        defaults: the constraints that were not stated; methods that cannot take one leave it to the assessment.
+        measures_given: whether the caller gave measures; false if they are the default.
         clearance: least distance of every pair, metres.
         clearances: (pairs,) least distance of each collision pair of the scene; may be changed between runs.
 
@@ -55,6 +61,8 @@ class Problem:
         measures: Iterable[Measure] | None = None,
         clearance: float = 0.0,
         touching: Iterable[tuple[str, str]] = (),
+        range_of_motion: bool = True,
+        balance: bool | None = None,
     ) -> None:
         """State a problem.
 
@@ -63,16 +71,16 @@ class Problem:
             start: (nq,) posture, or the name of one of the figure's; None for the figure's first posture.
             goals: equalities that are met if possible.
             constraints: what must always hold; bounds on the displacement are given here too.
-            measures: costs to minimise; None for `Effort()`.
+            measures: costs to minimise; None for `Effort()`, and `Rhythm()` beside it for a person.
             clearance: least distance between pieces, metres.
-            touching: pairs of segment or object names whose clearance is zero.
+            touching: pairs of segment or object names whose clearance is zero; those of contact terms are added.
+            range_of_motion: whether a person keeps its ranges of motion and reach cones.
+            balance: whether the centre of mass stays above the feet; None if the figure is a person who stands.
 
         Raises:
             InputError: a value of the wrong kind, shape or range.
             UnknownNameError: a name that the figure or scene does not have.
         """
-        from wholebody.tasks import Effort
-
         self.scene = checks.instance(scene, Scene, "Problem: scene", "make one with wb.Scene(figure)")
         self._revision = scene.revision
         self.start = _start(scene, start)
@@ -80,15 +88,21 @@ class Problem:
         terms = [*_checked(goals, (Goal,), "goals")]
         given = [*_checked(constraints, (Constraint, Bound), "constraints")]
         self.measures_given = measures is not None
-        measured = [Effort()] if measures is None else [*_checked(measures, (Measure,), "measures")]
+        measured = default_measures(scene) if measures is None else _checked(measures, (Measure,), "measures")
         self.goals: tuple[Goal, ...] = tuple(goal.resolve(scene, self.start) for goal in terms)
-        self.constraints: tuple[Constraint, ...] = tuple(
-            term.resolve(scene, self.start) for term in given if isinstance(term, Constraint)
-        )
+        stated = tuple(term.resolve(scene, self.start) for term in given if isinstance(term, Constraint))
+        checks.flag(range_of_motion, "range_of_motion")
+        if balance is not None:
+            checks.flag(balance, "balance")
         self.bounds: tuple[Bound, ...] = tuple(
             term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
         )
         self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
+        added = default_constraints(
+            scene, self.start, stated, self.bounds, self.goals, ranges=range_of_motion, balance=balance
+        )
+        self.defaults: tuple[Constraint, ...] = tuple(term.resolve(scene, self.start) for term in added)
+        self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
         pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
         self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
         with self.borrow() as workspace:
@@ -107,6 +121,12 @@ class Problem:
             f"  constraints: {checks.some(map(_in_words, asked[len(self.goals) :])) or 'none'}; "
             f"measures: {checks.some(map(_in_words, self.measures)) or 'none'}"
         )
+
+    @property
+    def stated(self) -> tuple[Constraint, ...]:
+        """The constraints without the defaults."""
+        added = {id(term) for term in self.defaults}
+        return tuple(term for term in self.constraints if id(term) not in added)
 
     def retarget(self, goals: Iterable[Goal]) -> None:
         """Replace the goals, for a goal that moves from frame to frame; everything else stays.
@@ -206,7 +226,8 @@ class Problem:
     def _clearances(self, workspace: Workspace) -> Array:
         pairs, owners = workspace.table.pairs, workspace.owners
         asked = np.full(len(pairs), self.clearance)
-        allowed = set(self.touching) | {(b, a) for a, b in self.touching}
+        brought = [pair for term in (*self.goals, *self.constraints) for pair in term.touching]
+        allowed = {*self.touching, *brought} | {(b, a) for a, b in (*self.touching, *brought)}
         if allowed:
             named = [(owners[a], owners[b]) in allowed for a, b in pairs]
             asked[np.array(named, dtype=bool)] = 0.0

@@ -1,4 +1,4 @@
-"""Errors of frames, planes, axes and reach cones with their wrenches, as compiled loops: see `term_plan`.
+"""Errors of frames, planes, axes, reach cones and twists with their wrenches, as compiled loops: see `term_plan`.
 
 Each function fills the rows of its table in `wrench` (rows, 6) and `value` (rows,), which are zero before.
 """
@@ -12,7 +12,8 @@ from wholebody.compiled import compiled
 from wholebody.figures.reach_cones import PARALLEL
 from wholebody.figures.reach_cones import TOUCHING as ON_EDGE
 from wholebody.tasks.axis import NO_ANGLE, STEEPEST, TOUCHING
-from wholebody.term_plan import Integers
+from wholebody.tasks.range_of_motion import OPPOSITE
+from wholebody.term_entries import Integers
 
 SMALL = 1e-4
 """Angle [rad] below which the series of log and its derivative are exact to rounding."""
@@ -231,6 +232,42 @@ def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench:
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
             wrench[row, 3 + i] = world[j] * local[k] - world[k] * local[j]
+
+
+@compiled(error_model="numpy")
+def twists(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
+    """See `tasks.range_of_motion.TwistRow`."""
+    limb, base, seen, along = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    for e in range(len(tables)):
+        row = entries[e, 0]
+        _turned(joints[entries[e, 1]], tables[e, :9], limb)
+        _turned(joints[entries[e, 2]], tables[e, 9:18], base)
+        for i in range(3):
+            for j in range(3):
+                seen[i, j] = base[0, i] * limb[0, j] + base[1, i] * limb[1, j] + base[2, i] * limb[2, j]
+        sine, cosine = seen[1, 0] - seen[0, 1], seen[0, 0] + seen[1, 1]
+        square = max(sine * sine + cosine * cosine, OPPOSITE)
+        sign = tables[e, 22]
+        value[row] = tables[e, 21] - sign * np.arctan2(sine, cosine)
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            value[row] += tables[e, 18 + i] * seen[i, 2]
+            along[i] = seen[j, 2] * tables[e, 18 + k] - seen[k, 2] * tables[e, 18 + j]
+        along[0] -= sign * (sine * seen[2, 1] - cosine * seen[2, 0]) / square
+        along[1] += sign * (cosine * seen[2, 1] + sine * seen[2, 0]) / square
+        along[2] -= sign
+        for i in range(3):
+            wrench[row, 3 + i] = base[i, 0] * along[0] + base[i, 1] * along[1] + base[i, 2] * along[2]
+
+
+@compiled()
+def _turned(joint: Array, part: Array, turn: Array) -> None:
+    """Rotation (3, 3) in the world of a frame with the rotation `part` (9,) in a joint (4, 3)."""
+    for i in range(3):
+        for j in range(3):
+            turn[i, j] = 0.0
+            for k in range(3):
+                turn[i, j] += joint[k, i] * part[3 * j + k]
 
 
 @compiled()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from wholebody.geometry.continuous.sweep import FirstContact
     from wholebody.geometry.penetration import ObjectPenetration
 
+FARTHEST_LIKELY = 100.0  # m: a thing farther than this from the origin is probably placed in millimetres
 SHAPES = "give wb.Box, wb.Sphere, wb.Mesh or another"
 
 
@@ -144,7 +146,7 @@ class Scene:
         *,
         name: str,
         at: Any = (0.0, 0.0, 0.0),
-        color: Sequence[float] | None = None,
+        color: Sequence[float] | str | None = None,
         body: Body | None = None,
         material: Material | str | None = None,
     ) -> Scene:
@@ -154,7 +156,7 @@ class Scene:
             shape: a `wholebody.geometry.shapes.Shape`.
             name: a name that nothing else in the scene has.
             at: (x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3.
-            color: red, green, blue and, if wanted, alpha, each from 0 to 1.
+            color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
             body: its mass, material and velocity, if it moves by itself.
             material: of a thing that does not; wood if none is given.
 
@@ -182,7 +184,7 @@ class Scene:
         name: str,
         at: Any = (0.0, 0.0, 0.0),
         rests_on: Iterable[str] = (),
-        color: Sequence[float] | None = None,
+        color: Sequence[float] | str | None = None,
     ) -> Scene:
         """Attach a thing to the figure: it moves with a segment, at `at` in the segment's frame.
 
@@ -196,7 +198,7 @@ class Scene:
             name: a name that nothing else in the scene has.
             at: its placement in that frame; as for `add`.
             rests_on: more segments, and carried things, that it is not tested against.
-            color: red, green, blue and, if wanted, alpha, each from 0 to 1.
+            color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
 
         Raises:
             InputError: the name exists already, or the shape, placement or color is invalid.
@@ -268,6 +270,11 @@ class Scene:
         checks.text(name, "the name of an object")
         checks.instance(shape, Shape, repr(name), SHAPES)
         place = to_placement(at, f"{name!r}: at")
+        far = float(max(abs(place.translation)))
+        if far > FARTHEST_LIKELY:
+            warnings.warn(
+                f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000", stacklevel=3
+            )
         painted = None if color is None else checks.color(color, f"{name!r}: color")
         with self._lock:
             thing = SceneObject(name, shape, place, to, painted, rests_on, body=body, material=material)

@@ -7,27 +7,42 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.compiled import compiled
-from wholebody.coordinate_kernel import coordinates, heights, roots, turns
-from wholebody.residual_kernel import axis_errors, cones, planes, residuals
+from wholebody.coordinate_kernel import (
+    coordinates,
+    coupled_ranges,
+    elliptic_ranges,
+    heights,
+    rhythms,
+    root_distances,
+    roots,
+    turns,
+)
+from wholebody.residual_kernel import axis_errors, cones, planes, residuals, twists
 from wholebody.tasks.discomfort import POWER, STEEPNESS
-from wholebody.term_plan import (
+from wholebody.term_entries import (
     AXIS,
     BODY,
     BOX,
     COLUMN,
     CONE,
     COORDINATE,
+    COUPLED,
     CURVATURE,
     DISCOMFORT,
     DISTANCE,
     EDGE,
+    ELLIPSE,
+    GIRDLE,
     HEIGHT,
     LIMIT,
+    LUMBAR,
     MASS_CENTER,
     PLANE,
     RESIDUAL,
     ROOT,
+    ROOT_DISTANCE,
     TURN,
+    TWIST,
     Integers,
 )
 
@@ -93,10 +108,11 @@ def linearise(
         _floats(floats, layout, CONE), _integers(integers, layout, CONE), _floats(floats, layout, EDGE), joints, wrench,
         value,
     )  # fmt: skip
-    for table, rows in ((RESIDUAL, 0), (PLANE, 1), (AXIS, 2), (CONE, 1)):
+    twists(_floats(floats, layout, TWIST), _integers(integers, layout, TWIST), joints, wrench, value)
+    for table, rows in ((RESIDUAL, 0), (PLANE, 1), (AXIS, 2), (CONE, 1), (TWIST, 1)):
         entries = _integers(integers, layout, table)
         for e in range(len(entries)):
-            against = entries[e, 2] if table in (RESIDUAL, CONE) else 0
+            against = entries[e, 2] if table in (RESIDUAL, CONE, TWIST) else 0
             count = 3 * (entries[e, 3] + entries[e, 4]) if table == RESIDUAL else rows
             for r in range(entries[e, 0], entries[e, 0] + count):
                 _row(wrench[r], entries[e, 1], against, columns, support, column, jacobian[r])
@@ -114,6 +130,12 @@ def linearise(
     )  # fmt: skip
     turns(_floats(floats, layout, TURN), _integers(integers, layout, TURN), q, value, jacobian)
     roots(_floats(floats, layout, ROOT), _integers(integers, layout, ROOT), q, value, jacobian)
+    coupled_ranges(
+        _floats(floats, layout, COUPLED), _integers(integers, layout, COUPLED), q, value, jacobian
+    )  # fmt: skip
+    elliptic_ranges(
+        _floats(floats, layout, ELLIPSE), _integers(integers, layout, ELLIPSE), q, value, jacobian
+    )  # fmt: skip
     _box(_floats(floats, layout, LIMIT), _integers(integers, layout, LIMIT), _floats(floats, layout, BOX), q, box)
     constant = _floats(floats, layout, CURVATURE)
     for v in range(nv):
@@ -123,6 +145,11 @@ def linearise(
     _measures(
         _floats(floats, layout, DISTANCE), _integers(integers, layout, DISTANCE), _floats(floats, layout, DISCOMFORT),
         _integers(integers, layout, DISCOMFORT), q, measure,
+    )  # fmt: skip
+    root_distances(_floats(floats, layout, ROOT_DISTANCE), _integers(integers, layout, ROOT_DISTANCE), q, measure)
+    rhythms(
+        _floats(floats, layout, GIRDLE), _integers(integers, layout, GIRDLE), _floats(floats, layout, LUMBAR),
+        _integers(integers, layout, LUMBAR), q, measure,
     )  # fmt: skip
     heights(
         _floats(floats, layout, HEIGHT), _integers(integers, layout, HEIGHT), joints, columns, support, column, measure

@@ -7,7 +7,7 @@ says in which rows they stand. `term_kernel` evaluates a plan.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -18,56 +18,29 @@ from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench, extended_columns
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
-from wholebody.tasks.distance import LEAST_CURVATURE
-from wholebody.tasks.inputs import WORLD, Place
-from wholebody.tasks.residuals import PlacementResidual
-
-RESIDUAL, PLANE, AXIS, MASS_CENTER, COORDINATE, TURN, ROOT, CONE = range(8)
-"""The tables of goals and constraints, by what a row of them stands for."""
-
-DISTANCE, DISCOMFORT, HEIGHT, BOX, LIMIT, BODY, CURVATURE, COLUMN, EDGE = range(8, 17)
-"""The other tables of a plan: of measures, of bounds, of the model, and of the edges of reach cones."""
-
-WIDTHS = {
-    RESIDUAL: (36, 6),  # place in the joint (12), base in its joint (12), target (3), rotation back from it (9)
-    PLANE: (7, 2),  # origin in the joint (3), normal (3), height
-    AXIS: (24, 3),  # place in the joint (12), basis (9), target (3)
-    MASS_CENTER: (4, 1),  # direction (3), offset
-    COORDINATE: (1, 3),  # target
-    TURN: (2, 3),  # cosine and sine of the target
-    ROOT: (12, 3),  # target
-    CONE: (12, 5),  # axis of the limb in its joint (3), rotation of the reference in its joint (9)
-}
-"""Floats and integers of a goal or constraint in its table. The first integer is its first row, then:
-
-RESIDUAL: joint, joint of the base, whether the place and the rotation count, whether there is a base other than the
-world; PLANE: joint; AXIS: joint, whether the target is a place; COORDINATE, TURN, ROOT: place in the posture and in the
-tangent; CONE: joint, joint of the reference, how many edges, the first of them.
-"""
-
-Integers: TypeAlias = NDArray[np.int64]
-Row: TypeAlias = tuple[tuple[int, ...], Array]
-"""Integers and floats of a row of a table."""
-
-_NO_EDGES: Array = np.zeros((0, 15))
-
-
-class Entry(NamedTuple):
-    """One row of a table of goals or constraints.
-
-    Attributes:
-        table: which.
-        integers: its integers without the first.
-        floats: its floats.
-        rows: how many rows of the Jacobian it makes.
-        edges: (k, 15) planes of the edges of a reach cone, see `ReachCone.planes`; each edge is a row.
-    """
-
-    table: int
-    integers: tuple[int, ...]
-    floats: Array
-    rows: int
-    edges: Array = _NO_EDGES
+from wholebody.tasks.distance import LEAST_CURVATURE, SquaredDistance
+from wholebody.tasks.rhythm import CLAVICLE_RISE, CLAVICLE_WEIGHT, LUMBAR_MOST, LUMBAR_RATE, LUMBAR_WEIGHT
+from wholebody.term_entries import (
+    BODY,
+    BOX,
+    COLUMN,
+    CONE,
+    CURVATURE,
+    DISCOMFORT,
+    DISTANCE,
+    EDGE,
+    GIRDLE,
+    HEIGHT,
+    LIMIT,
+    LUMBAR,
+    ROOT_DISTANCE,
+    WIDTHS,
+    Entry,
+    Integers,
+    Row,
+    entries_of,
+    placement_floats,
+)
 
 
 class OtherTerm(NamedTuple):
@@ -229,114 +202,6 @@ def _packed(parts: dict[int, list[Row]]) -> tuple[Array, Integers, Integers]:
     return np.concatenate(floats), np.array(integers, dtype=np.int64), layout
 
 
-def entries_of(term: Goal | Constraint, model: pin.Model) -> list[Entry] | None:
-    """The entries of a goal or constraint, in the order of its rows; None for one of another class."""
-    write = _WRITERS.get(type(term))
-    return None if write is None else write(term, model)
-
-
-def _placement(place: Any) -> Array:
-    """The columns of the rotation, then the translation."""
-    return np.concatenate([place.rotation.T.ravel(), place.translation])
-
-
-def _in_joint(place: Place, model: pin.Model) -> pin.SE3:
-    return model.frames[place.frame].placement
-
-
-def _residual(residual: PlacementResidual, model: pin.Model) -> list[Entry]:
-    based = residual.base.frame != WORLD.frame
-    base = _in_joint(residual.base, model) if based else pin.SE3.Identity()
-    floats = np.concatenate(
-        [
-            _placement(_in_joint(residual.place, model)), _placement(base), residual.target,
-            residual.undo.rotation.T.ravel(),
-        ]
-    )  # fmt: skip
-    integers = (residual.place.joint, residual.base.joint, residual.position, residual.orientation, based)
-    rows = 3 * (residual.position + residual.orientation)
-    return [Entry(RESIDUAL, tuple(map(int, integers)), floats, rows)]
-
-
-def _point(term: tasks.Point, model: pin.Model) -> list[Entry]:
-    frame = _in_joint(term.place, model)
-    place = pin.SE3(frame.rotation, frame.act(term.resolved_offset))
-    floats = np.concatenate([_placement(place), np.zeros(12), term.resolved_target, np.zeros(9)])
-    return [Entry(RESIDUAL, (term.place.joint, 0, 1, 0, 0), floats, 3)]
-
-
-def _plane(term: tasks.Plane, model: pin.Model) -> list[Entry]:
-    origin = _in_joint(term.place, model).translation
-    return [Entry(PLANE, (term.place.joint,), np.array([*origin, *term.resolved_normal, term.height]), 1)]
-
-
-def _axis(term: tasks.Axis, model: pin.Model) -> list[Entry]:
-    floats = np.concatenate([_placement(_in_joint(term.place, model)), term.basis.ravel(), term.resolved_target])
-    return [Entry(AXIS, (term.place.joint, int(term.toward is not None)), floats, 2)]
-
-
-def _mass_center(term: tasks.CenterOfMass, model: pin.Model) -> list[Entry]:
-    axes = np.eye(3)
-    return [
-        Entry(MASS_CENTER, (), np.array([*axes[k], target]), 1)
-        for k, target in enumerate(term.resolved_target.tolist())
-    ]
-
-
-def _balance(term: tasks.Balance, model: pin.Model) -> list[Entry]:
-    return [
-        Entry(MASS_CENTER, (), np.array([x, y, 0.0, offset]), 1)
-        for (x, y), offset in zip(term.normals.tolist(), term.offsets.tolist(), strict=True)
-    ]
-
-
-def _posture(term: tasks.Posture, model: pin.Model) -> list[Entry] | None:
-    entries: list[Entry] = []
-    dofs, target = term.dofs.tolist(), term.resolved_target
-    for joint in list(model.joints)[1:]:
-        q, v = int(joint.idx_q), int(joint.idx_v)
-        mine = [dof for dof in dofs if v <= dof < v + joint.nv]
-        if not mine:
-            continue
-        if joint.nq == joint.nv:
-            shifts = [dof - v for dof in mine]
-            entries += [Entry(COORDINATE, (q + k, v + k), target[q + k : q + k + 1], 1) for k in shifts]
-        elif (joint.nq, joint.nv) == (2, 1):
-            entries.append(Entry(TURN, (q, v), target[q : q + 2], 1))
-        elif joint.nq == 7 and len(mine) == 6:
-            entries.append(Entry(ROOT, (q, v), _placement(pin.XYZQUATToSE3(target[q : q + 7])), 6))
-        else:
-            return None
-    in_order = [entry.integers[1] + k for entry in entries for k in range(entry.rows)] == dofs
-    return entries if in_order else None
-
-
-def _cones(term: tasks.ReachCones, model: pin.Model) -> list[Entry]:
-    entries = []
-    for limb in term.limbs:
-        axis = _in_joint(limb.limb, model).rotation @ limb.axis
-        reference = _in_joint(limb.reference, model).rotation
-        edges = np.hstack(limb.cone.planes.reshape(5, -1, 3))
-        floats = np.concatenate([axis, reference.T.ravel()])
-        entries.append(Entry(CONE, (limb.limb.joint, limb.reference.joint), floats, 1, edges))
-    return entries
-
-
-_WRITERS: dict[type, Callable[[Any, pin.Model], list[Entry] | None]] = {
-    tasks.Point: _point,
-    tasks.Frame: lambda term, model: _residual(term.residual, model),
-    tasks.Orientation: lambda term, model: _residual(term.residual, model),
-    tasks.Relative: lambda term, model: _residual(term.residual, model),
-    tasks.Hold: lambda term, model: _residual(term.residual, model),
-    tasks.Plane: _plane,
-    tasks.Axis: _axis,
-    tasks.CenterOfMass: _mass_center,
-    tasks.Balance: _balance,
-    tasks.Posture: _posture,
-    tasks.ReachCones: _cones,
-}
-
-
 def coordinates(model: pin.Model) -> Integers:
     """(nv,) place in the posture of each degree of freedom that is a plain coordinate; -1 for the others."""
     places = np.full(model.nv, -1, dtype=np.int64)
@@ -361,12 +226,8 @@ def _measures(
     curvature = np.zeros(model.nv)
     places = coordinates(model)
     for term in measures:
-        if (type(term) is tasks.Effort or type(term) is tasks.Displacement) and term.distance.straight:
+        if isinstance(term, (tasks.Effort, tasks.Displacement)) and _distances(term, model, places, parts):
             curvature += term.weight * term.distance.curvature
-            for v in np.flatnonzero(term.distance.weights).tolist():
-                q = int(places[v])
-                floats = np.array([term.weight * term.distance.weights[v], term.distance.reference[q]])
-                parts[DISTANCE].append(((q, v), floats))
         elif type(term) is tasks.Discomfort:
             curvature += term.weight * LEAST_CURVATURE
             joints = term.limited
@@ -380,9 +241,37 @@ def _measures(
                 masses.joints.tolist(), masses.centres, masses.weights, masses.heights, strict=True
             ):
                 parts[HEIGHT].append(((joint,), np.array([*centre, term.weight * weight, height])))
+        elif type(term) is tasks.Rhythm:
+            curvature += term.weight * LEAST_CURVATURE
+            for girdle in term.girdles:
+                rise = np.array([term.weight * CLAVICLE_WEIGHT, CLAVICLE_RISE])
+                parts[GIRDLE].append(((*girdle.idx_q, *girdle.idx_v), rise))
+            if term.lumbar is not None:
+                share = np.array([term.weight * LUMBAR_WEIGHT, LUMBAR_MOST, LUMBAR_RATE, term.lumbar.rest])
+                parts[LUMBAR].append(((*term.lumbar.idx_q, *term.lumbar.idx_v), share))
         else:
             others.append(term)
     return tuple(others), curvature
+
+
+def _distances(
+    term: tasks.Effort | tasks.Displacement, model: pin.Model, places: Integers, parts: dict[int, list[Row]]
+) -> bool:
+    """Write the tables of a distance; false for a subclass, and for a joint that is no free root and no coordinate."""
+    distance: SquaredDistance = term.distance
+    weighed = np.flatnonzero(distance.weights).tolist()
+    root = model.joints[1] if model.njoints > 1 and model.joints[1].nq == 7 else None
+    own = range(0, 6) if root is not None else range(0)
+    if type(term) not in (tasks.Effort, tasks.Displacement) or any(places[v] < 0 for v in weighed if v not in own):
+        return False
+    if any(v in own for v in weighed):
+        target = placement_floats(pin.XYZQUATToSE3(distance.reference[:7]))
+        parts[ROOT_DISTANCE].append(((0, 0), np.concatenate([target, term.weight * distance.weights[:6]])))
+    for v in weighed:
+        if v not in own:
+            q = int(places[v])
+            parts[DISTANCE].append(((q, v), np.array([term.weight * distance.weights[v], distance.reference[q]])))
+    return True
 
 
 def checked_rows(term: Goal | Constraint, value: Array, jacobian: Wrench | Array, expected: int) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import runpy
+import sys
 from dataclasses import fields, replace
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -42,6 +45,27 @@ def test_more_programs_than_there_are_and_unknown_sets_are_refused(monkeypatch: 
         record(["robot_arm"], 100, seed=0)
     with pytest.raises(UnknownNameError, match="robot_arm"):
         record(["robot_arms"], 1, seed=0)
+
+
+def test_the_test_set_of_qpbenchmark_has_every_program(
+    recorded: list[Recorded], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where qpbenchmark is not installed, by a stand-in with the two classes that the file uses."""
+    qpsolvers = pytest.importorskip("qpsolvers")
+    try:
+        import qpbenchmark  # noqa: F401
+    except ImportError:
+        known = ModuleType("qpbenchmark")
+        monkeypatch.setitem(vars(known), "TestSet", object)
+        monkeypatch.setitem(vars(known), "Problem", qpsolvers.Problem)
+        monkeypatch.setitem(sys.modules, "qpbenchmark", known)
+    files.save(recorded, tmp_path)
+    found = runpy.run_path(str(tmp_path / "wholebody_postures.py"))["WholebodyPostures"]()
+    sizes = [len(problem.q) for problem in found]
+    assert len(sizes) == len(recorded)
+    programs = [one.program for one in sorted(recorded, key=lambda one: one.name)]
+    assert sizes == [one.size + len(one.target) + len(one.least) for one in programs]
+    assert found.title == "Whole-body postures"
 
 
 def test_files_come_back_and_are_programs_of_qpsolvers(recorded: list[Recorded], tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,10 @@ import pytest
         "docs/world.md",
         "docs/studies.md",
         "docs/frames.md",
+        "docs/how-to/bolt.md",
+        "docs/how-to/drag-and-record.md",
+        "docs/how-to/compare.md",
+        "docs/how-to/own-term.md",
     ],
 )
 def test_code_on_the_page_runs(page: str, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -31,3 +36,9 @@ def test_code_on_the_page_runs(page: str, root: Path, tmp_path: Path, monkeypatc
         exec(compile(block, page, "exec"), names)
     if "solution" in names:
         assert names["solution"].solved
+
+
+def test_a_real_robot_on_the_page(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not os.environ.get("WHOLEBODY_ROBOTS"):
+        pytest.skip("no robot descriptions here; WHOLEBODY_ROBOTS names their folder")
+    test_code_on_the_page_runs("docs/how-to/robot.md", root, tmp_path, monkeypatch)

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from wholebody.arrays import Array
-from wholebody.dynamics import contact_kernel
+from wholebody.dynamics import contact_kernel, solve_kernel
 
 ADMM = pytest.mark.skipif(not hasattr(pin, "ADMMContactSolver"), reason="this Pinocchio names its solver otherwise")
 
@@ -53,10 +53,13 @@ def test_velocities_are_those_of_pinocchios_solver(seed: int) -> None:
     solved = solver.solve(delassus, free[order], cones, np.zeros(15))
     impulse = np.zeros((5, 3))
     after = twist.copy()
-    contact_kernel.solve(
-        np.arange(5), bodies, jacobian, answer, mobility, friction, np.zeros(5), after, impulse, 1e-13, 100_000
+    none, zero = (np.zeros((0, 3, 3)), np.zeros((0, 3))), np.zeros(5)
+    solve_kernel.solve(
+        np.arange(5), bodies, jacobian, answer, mobility, friction, zero, *none, after, impulse, 1e-13, 10**6, 100_000
     )
-    signorini, coulomb = contact_kernel.residuals(bodies, jacobian, mobility, friction, np.zeros(5), after, impulse)
+    signorini, coulomb = solve_kernel.residuals(
+        bodies, jacobian, mobility, friction, zero, none[1], after, impulse
+    )  # fmt: skip
     assert max(signorini, coulomb) < 1e-9
     if solved:
         theirs = free[order] + gram @ np.array(solver.getPrimalSolution()).ravel()

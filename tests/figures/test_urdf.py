@@ -231,6 +231,11 @@ ODD = {
     "too many digits": ('<sphere radius="0.045"/>', f'<sphere radius="{"9" * 5000}"/>', "a finite number"),
     "zero scale": ('scale="1 1 1"', 'scale="1 0 1"', "give no zeros"),
     "unknown encoding": ('<?xml version="1.0"?>', '<?xml version="1.0" encoding="foo"?>', "encoding cannot be read"),
+    "a long encoding": (
+        '<?xml version="1.0"?>',
+        f'<?xml version="1.0" encoding="utf-{"9" * 5000}"?>',
+        "encoding cannot be read",
+    ),
     "an encoding of many bytes": ('<?xml version="1.0"?>', '<?xml version="1.0" encoding="shift_jis"?>', "encoding"),
 }
 

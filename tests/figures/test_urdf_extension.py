@@ -13,6 +13,7 @@ import wholebody as wb
 from wholebody.cli import main
 from wholebody.errors import FileFormatError
 from wholebody.figures import urdf_path
+from wholebody.figures.state import State
 
 
 def pairs(figure: wb.Figure) -> set[frozenset[str]]:
@@ -39,6 +40,16 @@ def test_what_is_read_back_is_what_was_written(name: str) -> None:
     for cone in built.cones:
         assert read.cones[cone].cone.vertices == pytest.approx(built.cones[cone].cone.vertices, abs=1e-10)
         assert read.cones[cone][1:3] == built.cones[cone][1:3]
+    assert sorted(read.ranges) == sorted(built.ranges)
+    scenes = wb.Scene(read), wb.Scene(built)
+    for part in built.ranges:  # the same values and slopes where every joint has moved
+        q = pin.integrate(built.model, built.neutral, np.full(built.model.nv, 0.2))
+        terms = [wb.RangeOfMotion([part]).resolve(scene, q) for scene in scenes]
+        states = [State(scene.model).update(q) for scene in scenes]
+        mine, theirs = (
+            [*term.value(state), *term.jacobian(state).ravel()] for term, state in zip(terms, states, strict=True)
+        )
+        assert mine == pytest.approx(theirs, abs=1e-9)
 
 
 def test_a_person_of_any_size_can_be_written_and_read_with_a_fixed_root(tmp_path: Path) -> None:

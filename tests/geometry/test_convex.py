@@ -224,3 +224,17 @@ def test_a_real_chair(shared_data: Path) -> None:
     turned = 0.75 * points @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]).T
     assert outside(turned, found.pieces).max() < 2e-4
     assert outside(np.array([[0.0, 0.0, 0.1]]), found.pieces)[0] > 0.02  # between the legs
+
+
+def test_flat_parts_of_a_decomposition_are_thickened(
+    torus: tuple[trimesh.Trimesh, ConvexPieces], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """CoACD cut a box with one vertex pulled far out into parts of which one was flat."""
+    mesh = torus[0]
+    flat = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0], [0.0, 0.1, 0.0], [0.05, 0.05, 0.0]])
+    solid = np.array([[x, y, z] for x in (0.0, 0.1) for y in (0.0, 0.1) for z in (0.0, 0.1)])
+    monkeypatch.setattr(convex, "_coacd", lambda *_: [flat, solid])
+    found = convex_pieces(mesh.vertices + 3.0, mesh.faces)  # not the torus that is kept already
+    assert len(found.pieces) == 2
+    assert (outside(flat, found.pieces[:1]) <= 0.0).all()
+    assert any("flat" in note for note in found.notes)

@@ -11,6 +11,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
@@ -19,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from wholebody import InputError
 from wholebody.geometry.hull import enclosing_ball, hull_piece
-from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere, Torus
 
 Slack = Callable[..., float]
 size = st.floats(0.01, 2.0)
@@ -237,3 +238,36 @@ def test_points_that_are_not_finite_are_refused(bad: float) -> None:
 def test_thin_but_solid_is_taken() -> None:
     plate = Hull([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 2e-4)])  # type: ignore[arg-type]
     assert plate.pieces()[0].volume == pytest.approx(2e-4)
+
+
+@pytest.mark.parametrize("place", [(0.9, 0.0, 0.1), (0.0, 0.0, 0.75), (0.2, 0.15, 0.0), (0.6, 0.6, 0.4)])
+def test_cylinder_against_its_formula(place: tuple[float, float, float]) -> None:
+    """Distance of a point from a cylinder of radius 0.4 and length 0.6, to the 0.12 % that the prism is larger."""
+    (piece,) = Cylinder(0.4, 0.6).pieces()
+    across, along = np.hypot(place[0], place[1]) - 0.4, abs(place[2]) - 0.3
+    outside = float(np.hypot(max(across, 0.0), max(along, 0.0)))
+    exact = outside if outside > 0.0 else max(across, along)
+    assert _distance(piece, place) == pytest.approx(exact, abs=5e-4 + 1e-6)
+
+
+@pytest.mark.parametrize("place", [(0.5, 0.0, 0.0), (0.0, 0.0, 0.0), (0.2, 0.25, 0.1), (0.2974, 0.0392, 0.0)])
+def test_torus_against_its_formula(place: tuple[float, float, float]) -> None:
+    """Distance of a point from a ring of the radii 0.3 and 0.02."""
+    exact = float(np.hypot(np.hypot(place[0], place[1]) - 0.3, place[2])) - 0.02
+    pieces = Torus(0.3, 0.02).pieces()
+    assert min(_distance(piece, place) for piece in pieces) == pytest.approx(exact, abs=5e-3)
+    assert 0.0 < Torus(0.3, 0.02).added_volume < 0.1
+
+
+def _distance(piece: Any, place: Any) -> float:
+    at = coal.Transform3s(piece.placement.rotation, piece.placement.translation)
+    point = coal.Transform3s(np.eye(3), np.array(place, dtype=float))
+    result = coal.DistanceResult()
+    return float(coal.distance(piece.geometry, at, coal.Sphere(1e-9), point, coal.DistanceRequest(), result))
+
+
+def test_a_mesh_of_trimesh() -> None:
+    mesh = trimesh.creation.box((0.2, 0.3, 0.4))
+    shape = Mesh(mesh, scale=0.5)
+    np.testing.assert_allclose(shape.vertices, 0.5 * mesh.vertices)
+    assert sum(piece.volume for piece in shape.pieces()) == pytest.approx(0.003)

@@ -76,7 +76,7 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         ("clearance = 0.01", "clearance = 10", ["task.toml:1", "key clearance", "from 0 to 0.5 m"]),
         ("clearance = 0.01", "clearance = nan", ["task.toml:1", "key clearance", "nan"]),
         ("radius = 0.01", "radius = true", ["attach 1, key radius", "True is not a number"]),
-        ('detail = "spheres"', "stature = 175", ["task.toml:5", "key stature", "centimetres, write 1.75"]),
+        ('detail = "spheres"', "stature = 175", ["task.toml:5", "key stature", "write 1.75 if it is in centimetres"]),
         ('detail = "spheres"', "mass = 70000", ["key mass", "grams, write 70"]),
         (
             "left_elbow_flexion = 0.5",
@@ -89,7 +89,11 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
             ["task.toml:9", "the joint's limits", "0.0000"],
         ),
         ("radius = 0.01", "radius = -0.01", ["task.toml:20", "attach 1, key radius", "0.0001 to 100 m"]),
-        ("target = [0.4, -0.2, 1.0]", "target = [400, -200, 1000]", ["goal 1, key target[0]", "write 4"]),
+        (
+            "target = [0.4, -0.2, 1.0]",
+            "target = [400, -200, 1000]",
+            ["goal 1, key target[0]", "write 0.4 if it is in millimetres or 4"],
+        ),
         ("target = [0.4, -0.2, 1.0]", "target = [0.4, -0.2]", ["task.toml:27", "write 3 numbers"]),
         ("target = [0.4, -0.2, 1.0]", "target = [0.4, inf, 1.0]", ["goal 1, key target[1]", "inf"]),
         ("tolerance = 1e-6", "tolerance = 1.0", ["task.toml:39", "method, key tolerance"]),

@@ -43,10 +43,12 @@ def test_scene_and_start(everything: wb.Task) -> None:
     assert figure.joint_values(problem.start)["left_elbow_flexion"] == 0.5
     objects = problem.scene.objects
     assert [type(thing.shape).__name__ for thing in objects.values()] == [
-        "Box", "Sphere", "Capsule", "Ellipsoid", "HalfSpace", "Hull", "Mesh", "Box",
+        "Box", "Sphere", "Capsule", "Ellipsoid", "Cylinder", "Torus", "HalfSpace", "Hull", "Mesh", "Box",
     ]  # fmt: skip
     assert objects["pack"].segment == "thorax"
     assert objects["box"].color == (1.0, 0.0, 0.0, 1.0)
+    np.testing.assert_allclose(objects["drum"].color, (70 / 255, 130 / 255, 180 / 255, 1.0))
+    np.testing.assert_allclose(objects["wheel"].color, (128 / 255, 1.0, 0.0, 64 / 255))
     np.testing.assert_allclose(objects["box"].placement.rotation @ [1, 0, 0], [0, 1, 0], atol=1e-12)
     np.testing.assert_allclose(objects["rod"].placement.translation, [2, 1, 0])
     np.testing.assert_allclose(np.abs(objects["tetrahedron"].shape.vertices).max(), 1.0)
@@ -67,6 +69,10 @@ def test_terms_are_those_that_python_makes(everything: wb.Task) -> None:
             wb.CenterOfMass((0, 0, 1), axes="xy"),
             wb.Relative("left_palm", "right_palm", (0, 0.3, 0), orientation=False),
             wb.Posture("sitting", joints=["left_leg"]),
+            wb.Touch("right_index_tip", "box"),
+            wb.Lean("rod", side=(1, 0, 0)),
+            wb.Sit("box", "rod"),
+            wb.Grasp("left", "box", side=(0, 1, 0)),
         ],
         constraints=[
             wb.Hold("left_foot", orientation=False),
@@ -74,8 +80,11 @@ def test_terms_are_those_that_python_makes(everything: wb.Task) -> None:
             wb.Balance(("left_foot", "right_foot"), margin=0.01),
             wb.Freeze("lower_body", "root"),
             wb.ReachCones(["right_shoulder"]),
+            wb.RangeOfMotion(["neck", "left_hamstrings"]),
+            wb.Stand("ground", feet=["left_foot"], balance=False),
+            wb.Grasp("right", "rod", "power"),
         ],
-        measures=[wb.Effort(), wb.Discomfort(0.1), wb.Displacement(), wb.PotentialEnergy(0.01)],
+        measures=[wb.Effort(), wb.Discomfort(0.1), wb.Displacement(), wb.PotentialEnergy(0.01), wb.Rhythm(2.0)],
     )
     q = pin.integrate(problem.scene.model, problem.start, np.linspace(-0.1, 0.1, 55))
     state = State(problem.scene.model).update(q)
@@ -104,7 +113,8 @@ def test_what_is_left_out_is_what_python_leaves_out(tmp_path: Path) -> None:
     task = wb.read_task(tmp_path / "least.toml")
     assert task.title == "least"
     np.testing.assert_array_equal(task.problem.start, wb.load("human").posture("standing"))
-    assert [type(measure) for measure in task.problem.measures] == [wb.Effort]
+    assert [type(measure) for measure in task.problem.measures] == [wb.Effort, wb.Rhythm]
+    assert [type(term) for term in task.problem.defaults] == [wb.RangeOfMotion, wb.ReachCones]
     assert task.problem.goals == ()
     assert task.problem.clearance == 0.0
 

@@ -114,10 +114,12 @@ HUMAN_TERMS = {
     "plane": tasks.Plane("left_elbow", (1.0, 1.0, 0.0)),
     "balance": tasks.Balance(),
     "reach_cones": tasks.ReachCones(),
+    "range_of_motion": tasks.RangeOfMotion(),
     "posture": tasks.Posture("sitting"),
     "effort": tasks.Effort(),
     "displacement": tasks.Displacement(),
     "discomfort": tasks.Discomfort(),
+    "rhythm": tasks.Rhythm(),
     "potential_energy": tasks.PotentialEnergy(0.01),
 }
 

@@ -59,9 +59,9 @@ def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False, dr
         WholebodyError: the task cannot be read, or the folder cannot be written to.
     """
     from wholebody import files
-    from wholebody.cli import picture, result
+    from wholebody.cli import picture
     from wholebody.methods.solve import method_named, solve
-    from wholebody.taskfile import read_task
+    from wholebody.taskfile import read_task, result
 
     chosen = None if method is None else method_named(method)
     task = read_task(path)

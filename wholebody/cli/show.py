@@ -76,11 +76,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _subject(what: str) -> tuple[Problem, NDArray[np.float64], View, str]:
     """Problem, posture, view and title of the subject."""
-    from wholebody.cli import result
     from wholebody.figures import load
     from wholebody.problem import Problem
     from wholebody.scene import Scene
-    from wholebody.taskfile import read_task
+    from wholebody.taskfile import read_task, result
     from wholebody.taskfile.task import View
 
     path = Path(what)

@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from wholebody.cli.result import goals_left
 from wholebody.figures.state import State
+from wholebody.taskfile.result import goals_left
 
 if TYPE_CHECKING:
     from wholebody.figures import Figure

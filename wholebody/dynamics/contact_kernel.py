@@ -1,13 +1,7 @@
-"""Velocities and impulses at contact points, and the joint program of all contacts, as compiled loops.
+"""Velocities and impulses at contact points, as compiled loops.
 
 At a point of the contact of bodies A and B, with the unit normal n from A to B and tangents t1 and t2, an impulse p
-changes the velocities by M^-1 J^T p, and u = J v is the velocity of B's point relative to A's. The program finds
-
-    0 <= p_n  complementary to  u_n - target >= 0                                                    (Signorini)
-    p_t = -min(mu p_n, sticking) u_t / |u_t|                                                         (Coulomb)
-
-by Gauss and Seidel's method with projection, one point after the other, forwards and backwards in turn, with the
-conjugate directions of Silcowitz, Niebe and Erleben (2010) between sweeps.
+changes the velocities by M^-1 J^T p, and u = J v is the velocity of B's point relative to A's.
 
 The loops share these arrays: `bodies` (m, 2) has A and B of every point, `jacobian` (m, 3, 2, 6) the rows of J along
 n, t1, t2 for the velocity and angular velocity of A and of B, `answer` (m, 3, 2, 6) the same of J M^-1, `mobility`
@@ -112,133 +106,6 @@ def push(c: int, row: int, impulse: float, bodies: Indices, answer: Array, twist
     for k in range(6):
         twist[a, k] += impulse * answer[c, row, 0, k]
         twist[b, k] += impulse * answer[c, row, 1, k]
-
-
-@compiled()
-def _sweep(
-    c: int,
-    bodies: Indices,
-    jacobian: Array,
-    answer: Array,
-    mobility: Array,
-    friction: float,
-    target: float,
-    twist: Array,
-    impulse: Array,
-) -> tuple[float, float]:
-    """Solve the program for one point alone; the change of u, and the square of that of the impulse."""
-    change, square = 0.0, 0.0
-    now = max(0.0, impulse[0] - (relative(c, 0, bodies, jacobian, twist) - target) / mobility[0])
-    step = now - impulse[0]
-    if step != 0.0:
-        push(c, 0, step, bodies, answer, twist)
-        impulse[0] = now
-        change = abs(step) * mobility[0]
-        square = step * step * mobility[0]
-    most = friction * now
-    if most == 0.0 and impulse[1] == 0.0 and impulse[2] == 0.0:
-        return change, square
-    one = impulse[1] - relative(c, 1, bodies, jacobian, twist) / mobility[1]
-    two = impulse[2] - relative(c, 2, bodies, jacobian, twist) / mobility[1]
-    size = np.sqrt(one * one + two * two)
-    if size > most:
-        share = most / size
-        one, two = share * one, share * two
-    for row, wanted in ((1, one), (2, two)):
-        step = wanted - impulse[row]
-        if step != 0.0:
-            push(c, row, step, bodies, answer, twist)
-            impulse[row] = wanted
-            change = max(change, abs(step) * mobility[1])
-            square += step * step * mobility[1]
-    return change, square
-
-
-@compiled()
-def solve(
-    chosen: Indices,
-    bodies: Indices,
-    jacobian: Array,
-    answer: Array,
-    mobility: Array,
-    friction: Array,
-    target: Array,
-    twist: Array,
-    impulse: Array,
-    tolerance: float,
-    most: int,
-) -> int:
-    """Solve the program of the points `chosen`; how many sweeps it took.
-
-    Args:
-        chosen: (k,) points of the program.
-        bodies: (m, 2).
-        jacobian: (m, 3, 2, 6).
-        answer: (m, 3, 2, 6).
-        mobility: (m, 2).
-        friction: (m,) coefficients.
-        target: (m,) least u_n after it, m/s.
-        twist: (n, 6) velocities with the impulses at the start; changed in place.
-        impulse: (m, 3) along n, t1, t2, N s; a start, changed in place.
-        tolerance: a sweep that changes no u by more ends it, m/s.
-        most: sweeps, the last of which is always one of projection.
-    """
-    count = len(chosen)
-    before, way = np.empty((count, 3)), np.zeros((count, 3))
-    last = np.inf
-    for sweep in range(most):
-        change, square = 0.0, 0.0
-        for number in range(count):
-            place = number if sweep % 2 == 0 else count - 1 - number
-            c = chosen[place]
-            for row in range(3):
-                before[place, row] = impulse[c, row]
-            if mobility[c, 0] > 0.0:
-                largest, moved = _sweep(
-                    c, bodies, jacobian, answer, mobility[c], friction[c], target[c], twist, impulse[c]
-                )
-                change, square = max(change, largest), square + moved
-        if change < tolerance or sweep == most - 1:
-            return sweep + 1
-        share, last = square / last, square
-        for place in range(count):
-            c = chosen[place]
-            for row in range(3):
-                if share < 1.0:
-                    farther = share * way[place, row]
-                    way[place, row] = farther + impulse[c, row] - before[place, row]
-                    if farther != 0.0:
-                        push(c, row, farther, bodies, answer, twist)
-                        impulse[c, row] += farther
-                else:
-                    way[place, row] = 0.0
-    return most
-
-
-@compiled()
-def residuals(
-    bodies: Indices,
-    jacobian: Array,
-    mobility: Array,
-    friction: Array,
-    target: Array,
-    twist: Array,
-    impulse: Array,
-) -> tuple[float, float]:
-    """Largest violation of Signorini's and of Coulomb's law over all points, both m/s: see `solve`."""
-    signorini, coulomb = 0.0, 0.0
-    for c in range(len(bodies)):
-        if mobility[c, 0] <= 0.0:
-            continue
-        open_by = relative(c, 0, bodies, jacobian, twist) - target[c]
-        signorini = max(signorini, abs(min(impulse[c, 0] * mobility[c, 0], open_by)))
-        one = impulse[c, 1] - relative(c, 1, bodies, jacobian, twist) / mobility[c, 1]
-        two = impulse[c, 2] - relative(c, 2, bodies, jacobian, twist) / mobility[c, 1]
-        size = np.sqrt(one * one + two * two)
-        share = min(1.0, friction[c] * impulse[c, 0] / max(size, 1e-300))
-        off = np.sqrt((share * one - impulse[c, 1]) ** 2 + (share * two - impulse[c, 2]) ** 2)
-        coulomb = max(coulomb, off * mobility[c, 1])
-    return signorini, coulomb
 
 
 @compiled()

@@ -6,20 +6,23 @@ The pair that approaches fastest comes first. At one point the impulse is that o
     j_t = -min(mu j, sticking) u_t / |u_t|
 
 where `sticking` is the impulse that ends the sliding. Where several points of a pair touch (a box falls flat), the pair
-has one program with u_n+ >= -e u_n- at every point. An impulse that would add kinetic energy, as friction can where its
-direction is coupled with the normal (Kane and Levinson, 1985), is reduced until it adds none.
+has one program with u_n+ >= -e u_n- at every point. Where a body has joints, they are part of that program. An impulse
+that would add kinetic energy, as friction can where its direction is coupled with the normal (Kane and Levinson, 1985),
+is reduced until it adds none.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
-from wholebody.dynamics.contact_kernel import coupling, push, relative, solve
+from wholebody.dynamics.contact_kernel import coupling, push, relative
+from wholebody.dynamics.solve_kernel import solve
 
 EXACT = 1e-10  # m/s: to which the program of one pair is solved
 SWEEPS = 200  # of it
+VISITS = 20_000  # of its points
 
 
 @compiled()
@@ -33,6 +36,8 @@ def resolve(
     mobility: Array,
     restitution: Array,
     friction: Array,
+    held: Array,
+    jointed: Mask,
     twist: Array,
     slow: float,
     most: int,
@@ -43,14 +48,16 @@ def resolve(
 
     Args:
         touching: (k,) contact points that touch.
-        pair: (m,) pair of each point; the other arrays are as in `contact_kernel`.
+        pair: (m - j,) pair of each contact point; the other arrays are as in `contact_kernel`.
         bodies: (m, 2).
-        axes: (m, 3, 3).
+        axes: (m - j, 3, 3).
         jacobian: (m, 3, 2, 6).
         answer: (m, 3, 2, 6).
         mobility: (m, 2).
-        restitution: (m,).
-        friction: (m,).
+        restitution: (m - j,).
+        friction: (m - j,).
+        held: (j, 3, 3) as in `solve_kernel.solve`; the last j points are those of joints.
+        jointed: (n,) bodies that have joints.
         twist: (n, 6) changed in place.
         slow: approach that is no impact, m/s.
         most: events.
@@ -60,8 +67,9 @@ def resolve(
     Returns:
         How many events there were, and whether all are resolved.
     """
-    chosen, before = np.empty(len(touching), dtype=np.intp), np.empty((len(touching), 3))
-    target = np.zeros(len(pair))
+    joints = len(held)
+    chosen, before = np.empty(len(touching) + joints, dtype=np.intp), np.zeros((len(touching) + joints, 3))
+    target, hold = np.zeros(len(pair)), np.zeros((joints, 3))
     for event in range(most):
         worst, speed = -1, -slow
         for c in touching:
@@ -79,17 +87,26 @@ def resolve(
                     impulse[c, row] = 0.0
                 target[c] = -restitution[c] * before[count, 0]
                 count += 1
+        points = count
+        if jointed[bodies[worst, 0]] or jointed[bodies[worst, 1]]:
+            for c in range(len(pair), len(bodies)):
+                chosen[count], impulse[c] = c, 0.0
+                before[count] = 0.0
+                count += 1
         if count == 1:
             _single(
                 worst, bodies, jacobian, answer, mobility, restitution[worst], friction[worst], twist, before[0],
                 impulse[worst],
             )  # fmt: skip
         else:
-            solve(chosen[:count], bodies, jacobian, answer, mobility, friction, target, twist, impulse, EXACT, SWEEPS)
+            solve(
+                chosen[:count], bodies, jacobian, answer, mobility, friction, target, held, hold, twist, impulse, EXACT,
+                VISITS, SWEEPS,
+            )  # fmt: skip
             _lose(chosen[:count], bodies, jacobian, answer, twist, before, impulse)
         events[event, 0], events[event, 1] = worst, -speed
         events[event, 2:] = 0.0
-        for number in range(count):
+        for number in range(points):
             for row in range(3):
                 for k in range(3):
                     events[event, 2 + k] += impulse[chosen[number], row] * axes[chosen[number], row, k]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
 
 
@@ -85,6 +85,7 @@ def doubtful(
     radius: Array,
     axes: Array,
     plane: Array,
+    found: Mask,
 ) -> int:
     """How many of the near pairs may have been deeper in each other than `depth` during a step.
 
@@ -108,8 +109,9 @@ def doubtful(
         radius: (pieces,).
         axes: (pieces, 3).
         plane: (pieces, 4).
+        found: (k,) room for which they are; all false.
     """
-    found = 0
+    doubts = 0
     for c in range(len(pair)):
         p, q = pair[c, 0], pair[c, 1]
         a, b = body[p], body[q]
@@ -139,8 +141,9 @@ def doubtful(
                 end = _part(pair[c], turned, before, points, start, count, radius, axes, plane)
                 since = min(since, 1.0 - _share(gap_after[c] - sag, end - sag, -depth))
         if until < since:
-            found += 1
-    return found
+            found[c] = True
+            doubts += 1
+    return doubts
 
 
 @compiled()

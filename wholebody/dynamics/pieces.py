@@ -7,7 +7,9 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 import pinocchio as pin
 
+from wholebody import checks
 from wholebody.arrays import Array, Indices, Mask
+from wholebody.errors import InputError
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.proximity import Kinematics, PairTable, Proximity
@@ -69,7 +71,8 @@ class Pieces:
         """Gather bodies, pieces and pairs.
 
         Raises:
-            InputError: two materials can meet of which neither knows the other.
+            InputError: two materials can meet of which neither knows the other, or a thing has a joint to itself.
+            UnknownNameError: a joint names a thing that is not there.
         """
         figure, objects = scene.figure, scene.objects
         free = [thing for thing in objects.values() if thing.body is not None]
@@ -134,6 +137,9 @@ class Pieces:
         first, second = np.triu_indices(len(pieces), 1)
         a, b = self.body[first], self.body[second]
         kept = (a != b) & (self.dynamic[a] | self.dynamic[b])
+        for names in held_together(scene):
+            one, other = (self.index[name] for name in names)
+            kept &= ~(((a == one) & (b == other)) | ((a == other) & (b == one)))
         for i, j in zip(first[kept].tolist(), second[kept].tolist(), strict=True):
             geometry.addCollisionPair(pin.CollisionPair(i, j))
         self.table = PairTable(pin.Model(), geometry)
@@ -188,3 +194,23 @@ def segment_placements(scene: Scene, q: Array) -> dict[str, pin.SE3]:
     pin.updateFramePlacements(model, data)
     names = {*scene.figure.segments, *(thing.segment for thing in scene.objects.values() if thing.segment is not None)}
     return {name: pin.SE3(data.oMf[scene.frame_id(name)]) for name in names}
+
+
+def held_together(scene: Scene) -> tuple[tuple[str, str], ...]:
+    """Names of things that joints hold, each with what holds it.
+
+    Raises:
+        UnknownNameError: there is no such thing.
+        InputError: a thing is joined to itself.
+    """
+    found = []
+    known = [name for name, thing in scene.objects.items() if thing.segment is None]
+    for name, thing in scene.objects.items():
+        for joint in () if thing.body is None else thing.body.joints:
+            if joint.to is None:
+                continue
+            checks.known(joint.to, known, "thing", f"the joint of {name!r}")
+            if joint.to == name:
+                raise InputError(f"{name!r} has a joint to itself; name another thing, or None for the world")
+            found.append((name, joint.to))
+    return tuple(found)

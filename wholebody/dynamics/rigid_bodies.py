@@ -19,13 +19,22 @@ import pinocchio as pin
 from wholebody import checks
 from wholebody.arrays import Array, Mask
 from wholebody.checks import TIME_STEP
-from wholebody.dynamics import contact_kernel, impact_kernel, motion_kernel, passing_kernel
+from wholebody.dynamics import (
+    contact_kernel,
+    impact_kernel,
+    joint_kernel,
+    motion_kernel,
+    passing_kernel,
+    solve_kernel,
+)
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
 from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord
+from wholebody.dynamics.joints import CLOSED, Joints
+from wholebody.dynamics.passing import Before, passed
 from wholebody.dynamics.pieces import Pieces
 from wholebody.dynamics.sleeping import Sleepers
-from wholebody.dynamics.step_program import NOTHING, SKIN, StepProgram
+from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram
 from wholebody.errors import InputError
 from wholebody.geometry.placement import FARTHEST, placement
 from wholebody.geometry.proximity import Contacts
@@ -37,14 +46,16 @@ LONGEST = 10.0  # s: of a frame, which is 2,400 steps
 SHORTEST = 1e-6  # s: of a step that ends with an impact
 INSIDE = 1e-4  # m: a step that leaves pieces deeper in each other is made again with half the time
 LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
-PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
 HALVINGS = 6  # of a step, at most
+CAREFUL = 2  # of them before pieces are parted by displacements
 MARGIN = 2e-3  # m: pairs are looked at from this much farther than bodies come in a step
-STOPS = 12  # early ends of steps in a frame, at most
+STOPS = 8  # early ends of steps in a frame, at most
 DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
 FASTEST = 1e3  # m/s2: of gravity
 STRONGEST = 1e6  # N s
 PARTINGS = 4  # rounds of parting pieces after a step
+CLOSINGS = 6  # programs of a step with joints, at most: each closes what the one before left by bodies' turning
+FINE = 1e-5  # s: in shorter steps joints only keep their velocities; rounding over such a time is no velocity
 
 
 class RigidBodies:
@@ -72,8 +83,9 @@ class RigidBodies:
         compiled_kernel()
         self._pieces, self.state = pieces, BodiesState(scene, pieces)
         self.names, self.notes, self.time = pieces.names, pieces.notes, 0.0
-        self._finder, self._old = ContactFinder(pieces), NOTHING
-        self._sleepers = Sleepers(self.state)
+        self._joints = Joints(scene, pieces)
+        self._finder, self._old = ContactFinder(pieces), Impulses.nothing(len(self._joints))
+        self._sleepers = Sleepers(self.state, self._joints.together())
         self._falling = pieces.dynamic.copy()
         self._near: Contacts
         self._look(SUBSTEP)
@@ -124,7 +136,17 @@ class RigidBodies:
         """
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
         lever = pin.skew(point - self.state.position[number])
-        return np.asarray(np.eye(3) / self._pieces.mass[number] - lever @ self._inverse_inertia(number) @ lever)
+        inverse = self._inverse_inertia(number)
+        if not self._joints.jointed[number]:
+            return np.asarray(np.eye(3) / self._pieces.mass[number] - lever @ inverse @ lever)
+        found, movable = np.empty((3, 3)), self.state.moving | self._joints.linked(number)
+        for axis in range(3):
+            twist = np.zeros_like(self.state.twist)
+            twist[number, axis] = 1.0 / self._pieces.mass[number]
+            twist[number, 3:] = inverse @ lever[:, axis]
+            self._joints.keep(self.state, twist, movable)
+            found[:, axis] = twist[number, :3] - lever @ twist[number, 3:]
+        return found
 
     def push(self, name: str, impulse: Array, point: Array) -> None:
         """Give a body that moves by itself an impulse (3,) at a place (3,) in the world, N s; it wakes.
@@ -140,7 +162,9 @@ class RigidBodies:
         lever = point - self.state.position[number]
         self.state.velocity[number] += impulse / self._pieces.mass[number]
         self.state.spin[number] += self._inverse_inertia(number) @ np.cross(lever, impulse)
-        self.state.moving[number] = True
+        self.state.moving |= self._joints.linked(number)
+        if self._joints.jointed[number]:
+            self._joints.keep(self.state, self.state.twist, self.state.moving)
 
     def _inverse_inertia(self, number: int) -> Array:
         rotation = self.state.rotation[number]
@@ -196,7 +220,7 @@ class RigidBodies:
         """Advance by at most a time: to its end, to the next impact, or to where a shorter step leads."""
         state = self.state
         self._sleepers.wake(self._near)
-        program = StepProgram(state, self._finder.points(self._near), self.gravity)
+        program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
         events, ended = program.resolve_impacts()
         self._record(events, program, record)
         program.look(self._falling)
@@ -204,21 +228,23 @@ class RigidBodies:
         first = float(program.hits.min(initial=np.inf))
         if not together and first < time:
             time, record.stops = max(first, SHORTEST), record.stops - 1
-        kept, near, margin, start = state.kept(), self._near, self._margin, self._old
+        before, start, weight = Before(state, self._near, self._margin), self._old, float(np.linalg.norm(self.gravity))
         for halving in range(HALVINGS + 1):
-            program.solve(time, together, start)
-            impulse, pushed = program.world_impulse(), program.pushed()
-            self._falling = ~pushed
-            self._drift(time, pushed)
+            self._move(program, time, together, start, before.kept)
+            impulse = program.world_impulse()
             record.steps += 1
             least = self._look(SUBSTEP)
-            clear = least >= -INSIDE and self._parted(near, margin, kept[0], time)
-            if clear or halving == HALVINGS:
+            if halving == HALVINGS:
                 break
-            state.restore(kept)
+            if least >= (LEAST_GAP if halving < CAREFUL else -INSIDE):
+                ways = self._ways(time)
+                if not passed(state, before, self._near, self._margin, ways, time, weight):
+                    break
+            state.restore(before.kept)
             start, time = program.remembered(time), 0.5 * time
         record.time += time
         self._old = program.remembered(time)
+        self._joints.keep(state, state.twist, state.moving)
         np.add.at(record.impulse, program.points.bodies[:, 1], impulse)
         np.add.at(record.impulse, program.points.bodies[:, 0], -impulse)
         record.contacts = int((impulse != 0.0).any(axis=1).sum())
@@ -227,6 +253,26 @@ class RigidBodies:
         if least < LEAST_GAP:
             least = self._part(least)
         record.deepest = max(record.deepest, -least)
+
+    def _move(
+        self, program: StepProgram, time: float, together: bool, start: Impulses, kept: tuple[Array, Array, Array]
+    ) -> None:
+        """Solve the program of a step and move the bodies, again until joints are closed at its end."""
+        joints, state = self._joints, self.state
+        hold = np.zeros((len(joints), 3))
+        for closing in range(CLOSINGS):
+            program.solve(time, together, start, hold)
+            pushed = program.pushed()
+            self._drift(time, pushed)
+            self._falling = ~pushed
+            if not len(joints) or time < FINE or closing == CLOSINGS - 1:
+                return
+            off = joints.off(state)
+            if np.abs(off).max() <= CLOSED:
+                return
+            hold -= off / time
+            start = program.remembered(time)
+            state.restore(kept)
 
     def _record(self, events: Array, program: StepProgram, record: FrameRecord) -> None:
         points = program.points
@@ -261,34 +307,11 @@ class RigidBodies:
         speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * self._pieces.levers
         return np.asarray((speed + np.where(state.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
 
-    def _parted(self, near: Contacts, margin: Array, kept: Array, time: float) -> bool:
-        """Whether no pieces can have been in each other on the way from positions (n, 3) that were kept.
-
-        `near` were the pairs within margins (n,) of both bodies before the step.
-        """
-        pieces, after = self._pieces, self._near
-        if not (self._ways(time) <= margin).all():
-            return False
-        bodies = pieces.body[near.pair]
-        found = np.full(len(pieces.table.pairs), -1, dtype=np.intp)
-        found[after.number] = np.arange(len(after.number))
-        found = found[near.number]
-        listed = found >= 0
-        gap, normal = self._margin[bodies].sum(axis=1), np.zeros((len(listed), 3))
-        gap[listed], normal[listed] = after.distance[found[listed]], after.normal[found[listed]]
-        spin, fall = np.linalg.norm(self.state.spin, axis=1), float(np.linalg.norm(self.gravity))
-        doubtful = passing_kernel.doubtful(
-            near.pair, np.ascontiguousarray(near.distance), np.ascontiguousarray(near.normal), gap, normal,
-            near.placements, after.placements, pieces.body, self.state.position - kept, spin * time, pieces.levers,
-            fall * time**2 / 8.0, PASSING, *pieces.heights,
-        )  # fmt: skip
-        return int(doubtful) == 0
-
     def _part(self, least: float) -> float:
         """Part pieces that are nearer than `LEAST_GAP`, by the least displacements; the least distance then."""
         state = self.state
         for _ in range(PARTINGS):
-            program = StepProgram(state, self._finder.points(self._near), self.gravity)
+            program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
             motion_kernel.displace(state.position, state.rotation, program.parting(0.5 * SKIN), state.moving)
             least = self._look(SUBSTEP)
             if least >= LEAST_GAP:
@@ -334,16 +357,19 @@ def compiled_kernel() -> Any:
     motion_kernel.world_inverses(unit, unit, mask, unit.copy())
     motion_kernel.place_pieces(one, unit, one, np.zeros(1, dtype=np.intp), turned, turned.copy())
     laid = np.zeros((0, 3, 3)), np.zeros((0, 3, 2, 6)), np.zeros((0, 3, 2, 6)), np.zeros((0, 2))
+    held, hold, levers = np.zeros((0, 3, 3)), vectors, np.zeros((0, 2, 3))
     contact_kernel.lay(pairs, vectors, vectors, one, mass, unit, *laid)
-    contact_kernel.solve(none, pairs, *laid[1:], some, some, twist, vectors, 1.0, 1)
-    contact_kernel.residuals(pairs, laid[1], laid[3], some, some, twist, vectors)
+    joint_kernel.place(pairs, levers, mask[:0], one, unit, levers, vectors)
+    joint_kernel.lay(pairs, mask[:0], levers, mass, unit, *laid[1:], held)
+    solve_kernel.solve(none, pairs, *laid[1:], some, some, held, hold, twist, vectors, 1.0, 1, 1)
+    solve_kernel.residuals(pairs, laid[1], laid[3], some, some, hold, twist, vectors)
     contact_kernel.rates(pairs, laid[1], twist, vectors)
     contact_kernel.apply(pairs, laid[2], twist, vectors)
     contact_kernel.start_from(none, vectors, vectors, none, none, vectors, laid[0], 1.0, vectors)
-    impact_kernel.resolve(none, none, pairs, *laid, some, some, twist, 1.0, 1, vectors, np.zeros((1, 5)))
+    impact_kernel.resolve(none, none, pairs, *laid, some, some, held, mask, twist, 1.0, 1, vectors, np.zeros((1, 5)))
     passing_kernel.doubtful(
         pairs, some, vectors, some, vectors, turned, turned, none, one, mass, mass, 0.0, 1.0, vectors,
-        none, none, some, vectors, np.zeros((0, 4)),
+        none, none, some, vectors, np.zeros((0, 4)), mask[:0],
     )  # fmt: skip
     passing_kernel.join(none, none, none, none)
     return motion_kernel

@@ -17,8 +17,9 @@ from wholebody.checks import known, number, posture, whole
 from wholebody.errors import InputError
 from wholebody.figures import load
 from wholebody.figures.figure import Figure
-from wholebody.geometry.shapes import Box, HalfSpace, Sphere
+from wholebody.geometry.shapes import Box, Capsule, HalfSpace, Sphere
 from wholebody.matter.body import Body
+from wholebody.matter.joints import BallJoint, Hinge
 from wholebody.methods.inputs import SEED
 from wholebody.scene import Scene
 from wholebody.tracking.scenes import FRAMES_OF_A_SCRIPT
@@ -36,6 +37,8 @@ DOMINO = (0.008, 0.024, 0.048)  # m
 DOMINOES = 12
 STEP = (0.25, 1.0, 0.17)  # m: tread, width and rise of a stair
 STEPS = 6
+DOOR = (0.04, 0.90, 2.00)  # m: thickness, width and height of the door
+BAG = (0.17, 0.55)  # m: radius and length of the hanging bag
 WRIST = 0.105  # m: of the wrist above the table, so that bent fingers just clear it
 INDEX = 0.018  # m: of the index to the left of the wrist
 BLUE, RED, OAK = (0.30, 0.42, 0.58, 1.0), (0.72, 0.25, 0.20, 1.0), (0.60, 0.48, 0.36, 1.0)
@@ -177,6 +180,33 @@ def _things_to_walk_into(scene: Scene) -> None:
     scene.add(Sphere(0.12), name="ball", at=(1.15, 0.35, 0.12 + GAP), color=RED, body=Body(density=60.0))
 
 
+def _door(scene: Scene) -> None:
+    width, height = DOOR[1:]
+    x, middle = 0.75, 0.5 * height + 0.01
+    hinge = Hinge((0.0, -0.5 * width, 0.0), axis=(0.0, 0.0, 1.0))
+    for side in (-1.0, 1.0):
+        at = (x, side * (0.5 * width + 0.03 + 0.25), 0.5 * (height + 0.1))
+        name = "left wall" if side > 0.0 else "right wall"
+        scene.add(Box((0.10, 0.50, height + 0.1)), name=name, at=at, color=OAK)
+    scene.add(Box(DOOR), name="door", at=(x, 0.0, middle), color=BLUE, body=Body(mass=12.0, joints=[hinge]))
+
+
+def _bag(scene: Scene) -> None:
+    radius, length = BAG
+    x, beam, low = 0.75, 2.30, 1.15
+    top = low + 0.5 * length + radius
+    rope = beam - 0.05 - top
+    scene.add(Box((0.10, 1.2, 0.10)), name="beam", at=(x, 0.0, beam), color=OAK)
+    scene.add(
+        Capsule(0.015, rope - 0.03), name="rope", at=(x, 0.0, top + 0.5 * rope), color=OAK,
+        body=Body(mass=1.0, joints=[BallJoint((0.0, 0.0, 0.5 * rope), to="beam")]),
+    )  # fmt: skip
+    scene.add(
+        Capsule(radius, length), name="bag", at=(x, 0.0, low), color=RED,
+        body=Body(mass=15.0, joints=[BallJoint((0.0, 0.0, top - low), to="rope")]),
+    )  # fmt: skip
+
+
 # ---- the hand: position of the wrist, and the glove
 
 
@@ -242,26 +272,40 @@ def _aside(figure: Figure) -> Keys:
 # ---- the avatar
 
 
-def _walk_into(figure: Figure) -> Keys:
-    def at(x: float, degrees: Mapping[str, float]) -> Array:
-        values = {}
-        for name, angle in degrees.items():
-            for joint in (name, f"left_{name}", f"right_{name}"):
-                if joint in figure.joints:
-                    values[joint] = math.radians(angle)
-        q = figure.with_joints(figure.posture("standing"), values)
-        q[0] = x
-        return figure.clamp(q)
+def _walking(figure: Figure, x: float, degrees: Mapping[str, float]) -> Array:
+    """The avatar as it stands, with joints at some degrees, at a place along x."""
+    values = {}
+    for name, angle in degrees.items():
+        for joint in (name, f"left_{name}", f"right_{name}"):
+            if joint in figure.joints:
+                values[joint] = math.radians(angle)
+    q = figure.with_joints(figure.posture("standing"), values)
+    q[0] = x
+    return figure.clamp(q)
 
-    hanging = {"shoulder_flexion": 5.0, "elbow_flexion": 15.0}
-    ahead = {"shoulder_flexion": 45.0, "elbow_flexion": 50.0, "shoulder_abduction": 8.0}
+
+HANGING = {"shoulder_flexion": 5.0, "elbow_flexion": 15.0}  # degrees: arms
+AHEAD = {"shoulder_flexion": 45.0, "elbow_flexion": 50.0, "shoulder_abduction": 8.0}
+
+
+def _walk_into(figure: Figure) -> Keys:
     return [
-        (0.0, at(-0.4, hanging)),
-        (0.8, at(-0.2, ahead)),
-        (2.0, at(0.7, ahead)),
-        (0.8, at(0.7, ahead)),
-        (1.5, at(-0.2, hanging)),
-        (0.8, at(-0.4, hanging)),
+        (0.0, _walking(figure, -0.4, HANGING)),
+        (0.8, _walking(figure, -0.2, AHEAD)),
+        (2.0, _walking(figure, 0.7, AHEAD)),
+        (0.8, _walking(figure, 0.7, AHEAD)),
+        (1.5, _walking(figure, -0.2, HANGING)),
+        (0.8, _walking(figure, -0.4, HANGING)),
+    ]
+
+
+def _walk_through(figure: Figure) -> Keys:
+    return [
+        (0.0, _walking(figure, -0.4, HANGING)),
+        (0.8, _walking(figure, -0.2, AHEAD)),
+        (3.5, _walking(figure, 1.7, AHEAD)),
+        (0.8, _walking(figure, 1.9, HANGING)),
+        (1.0, _walking(figure, 1.9, HANGING)),
     ]
 
 
@@ -284,6 +328,14 @@ _PLANS: dict[str, _Plan] = {
     "avatar_and_cartons": _Plan(
         "an avatar walks with its hands ahead into two cartons, one on the other, and a ball",
         "avatar", _things_to_walk_into, _walk_into, (3.4, -3.4, 1.9), (0.5, 0.0, 0.85),
+    ),
+    "door": _Plan(
+        "an avatar walks with its hands ahead against a swinging door, and through it",
+        "avatar", _door, _walk_through, (4.4, -3.4, 2.4), (0.9, 0.0, 0.95),
+    ),
+    "bag": _Plan(
+        "an avatar walks with its hands ahead into a bag that hangs from a beam, and back",
+        "avatar", _bag, _walk_into, (3.4, -3.4, 1.9), (0.4, 0.0, 1.1),
     ),
 }  # fmt: skip
 

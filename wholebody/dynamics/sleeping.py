@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from wholebody.arrays import Indices
 from wholebody.dynamics import passing_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.geometry.proximity import Contacts
@@ -16,9 +17,9 @@ TOUCHING = 1e-3  # m: nearer bodies wake each other
 class Sleepers:
     """Which bodies sleep. A body sleeps and wakes together with all that touch each other."""
 
-    def __init__(self, state: BodiesState) -> None:
-        """Let all be awake."""
-        self._state = state
+    def __init__(self, state: BodiesState, together: Indices) -> None:
+        """Let all be awake; `together` (k, 2) are bodies that joints hold together."""
+        self._state, self._together = state, together
         self._slow_for = np.zeros(len(state.position))
         self._island = np.arange(len(state.position))
 
@@ -26,6 +27,11 @@ class Sleepers:
     def count(self) -> int:
         """How many bodies sleep."""
         return int((self._state.pieces.dynamic & ~self._state.moving).sum())
+
+    def _touching(self, near: Contacts) -> Indices:
+        """Bodies (k, 2) that touch, or that a joint holds together."""
+        touching: Indices = self._state.pieces.body[near.pair[near.distance < TOUCHING]]
+        return np.concatenate([touching, self._together])
 
     def look(self, near: Contacts, dt: float) -> None:
         """Let islands sleep that have been slow for long; `near` are the pairs at the end of a frame of `dt` s."""
@@ -35,7 +41,7 @@ class Sleepers:
         self._slow_for = np.where(slow, self._slow_for + dt, 0.0)
         if not (self._slow_for[state.moving] >= PATIENCE).any():
             return
-        body = state.pieces.body[near.pair[near.distance < TOUCHING]]
+        body = self._touching(near)
         island = np.arange(len(state.position))
         passing_kernel.join(body[:, 0].copy(), body[:, 1].copy(), state.pieces.dynamic.astype(np.intp), island)
         least = np.full(len(island), np.inf)
@@ -52,7 +58,7 @@ class Sleepers:
         asleep = state.pieces.dynamic & ~state.moving
         if not asleep.any():
             return
-        body = state.pieces.body[near.pair[near.distance < TOUCHING]]
+        body = self._touching(near)
         speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * state.pieces.levers
         pushing = (speed > STILL) & (state.moving | state.given)
         for one, other in ((0, 1), (1, 0)):

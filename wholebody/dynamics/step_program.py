@@ -1,4 +1,4 @@
-"""The contacts of one step: what is the same however long the step becomes, and the program of its impulses."""
+"""The contacts and joints of one step: what is the same however long it becomes, and the program of its impulses."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
-from wholebody.dynamics import contact_kernel, impact_kernel
+from wholebody.dynamics import contact_kernel, impact_kernel, solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactPoints
+from wholebody.dynamics.joints import JointRows, Joints
 
 SKIN = 5e-5  # m: gap at which bodies rest: coal's distances stay positive, its normals right to 0.02 rad
 TOUCH = 1e-5  # m: a gap larger than SKIN by this still touches
 SLOW = 0.02  # m/s: slower approaches are no impacts; 20 um of fall
 TOLERANCE = 1e-4  # m/s: of the program of a step; 0.4 um of its way
-FEWEST, MOST, VISITS = 50, 1000, 40_000  # sweeps of it, and points times sweeps: more is exacter and slower
+MOST, VISITS = 1000, 40_000  # sweeps of it, and points times sweeps: more is exacter and slower
 SAME_POINT = 0.01  # m: contact points nearer than this, in the body, are the same from step to step
 MOST_EVENTS = 1000  # at one stop
 RELAXED = 1e-9  # m/s: by which a step that ends with an impact may overshoot
@@ -28,25 +29,36 @@ class Impulses(NamedTuple):
         pair: (k,) pair of each point.
         local: (k, 3) the point in the first body's axes.
         impulse: (k, 3) on the second body, in the world, N s.
+        held: (j, 3) of the joints, likewise.
         time: of the step, seconds.
     """
 
     pair: Indices
     local: Array
     impulse: Array
+    held: Array
     time: float
 
+    @staticmethod
+    def nothing(joints: int) -> Impulses:
+        """Zero, for a number of joint points."""
+        return Impulses(np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((joints, 3)), 1.0)
 
-NOTHING = Impulses(np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros((0, 3)), 1.0)
+    def over(self, time: float) -> Impulses:
+        """The same forces during another time."""
+        share = time / self.time
+        return self._replace(impulse=share * self.impulse, held=share * self.held, time=time)
 
 
 class _Laid(NamedTuple):
-    """What the loops need of all points; see `contact_kernel`."""
+    """What the loops need of all points, those of joints at the end; see `contact_kernel` and `solve_kernel`."""
 
+    bodies: Indices
     axes: Array
     jacobian: Array
     answer: Array
     mobility: Array
+    held: Array
 
 
 class StepProgram:
@@ -56,18 +68,18 @@ class StepProgram:
         points: the contact points.
         speed: (m,) rate of each gap before the step, m/s.
         hits: (m,) time to the impact of each point; infinite where there is none.
-        impulse: (m, 3) answer of `solve` along the axes of each point, N s.
+        impulse: (m + j, 3) answer of `solve` along the axes of each point, N s; those of joints are at the end.
         residuals: Signorini's and Coulomb's, m/s.
     """
 
-    def __init__(self, state: BodiesState, points: ContactPoints, gravity: Array) -> None:
+    def __init__(self, state: BodiesState, points: ContactPoints, gravity: Array, joints: Joints) -> None:
         """Lay out the points."""
-        self.state, self.points, self.gravity = state, points, gravity
+        self.state, self.points, self.gravity, self.joints = state, points, gravity, joints
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
         self._touching = points.gap <= SKIN + TOUCH
         self._laid = self._lay(state.moving)
-        self.impulse = np.zeros((len(points.gap), 3))
+        self.impulse = np.zeros((len(points.gap) + len(joints), 3))
         self.residuals = (0.0, 0.0)
         self._local = state.local(points.bodies[:, 0], points.point)
         self.look(state.moving)
@@ -75,27 +87,33 @@ class StepProgram:
     def look(self, falling: Mask) -> None:
         """Read the present velocities: approaches and times of impact; `falling` (n,) are bodies that nothing bears."""
         bodies, normal = self.points.bodies, self.points.normal
-        self.speed = self._rates(self.state.twist)[:, 0]
+        self.speed = self._rates(self.state.twist)[: len(normal), 0]
         fall = (self.state.moving & falling).astype(float)
         self._pull = (fall[bodies[:, 1]] - fall[bodies[:, 0]]) * (normal @ self.gravity)
         self.hits = times(self.points.gap - SKIN, self.speed, self._pull)
         self.hits[(self.speed > -SLOW) | self._touching] = np.inf
 
     def _rates(self, twist: Array) -> Array:
-        """Relative velocities (m, 3) along the axes of the points."""
-        found = np.empty((len(self.points.gap), 3))
-        contact_kernel.rates(self.points.bodies, self._laid.jacobian, twist, found)
+        """Relative velocities (m + j, 3) along the axes of the points."""
+        found = np.empty((len(self._laid.bodies), 3))
+        contact_kernel.rates(self._laid.bodies, self._laid.jacobian, twist, found)
         return found
 
     def _lay(self, movable: Mask) -> _Laid:
-        state, points, count = self.state, self.points, len(self.points.gap)
+        state, points, joints = self.state, self.points, self.joints
+        count, whole = len(points.gap), len(points.gap) + len(joints)
+        bodies = np.concatenate([points.bodies, joints.bodies]) if len(joints) else points.bodies
         laid = _Laid(
-            np.empty((count, 3, 3)), np.empty((count, 3, 2, 6)), np.empty((count, 3, 2, 6)), np.empty((count, 2))
-        )
+            bodies, np.empty((count, 3, 3)), np.empty((whole, 3, 2, 6)), np.empty((whole, 3, 2, 6)),
+            np.empty((whole, 2)), np.empty((len(joints), 3, 3)),
+        )  # fmt: skip
         contact_kernel.lay(
             points.bodies, points.normal, points.point, state.position, np.where(movable, 1.0 / state.pieces.mass, 0.0),
-            state.inverse_inertia(movable), *laid,
+            state.inverse_inertia(movable), laid.axes, laid.jacobian, laid.answer, laid.mobility,
         )  # fmt: skip
+        if len(joints):
+            own = (laid.jacobian[count:], laid.answer[count:], laid.mobility[count:], laid.held)
+            joints.lay(state, movable, JointRows(*own))
         return laid
 
     def resolve_impacts(self) -> tuple[Array, bool]:
@@ -110,84 +128,93 @@ class StepProgram:
         laid = self._lay(state.moving | weighed) if weighed.any() else self._laid
         twist, events = state.twist.copy(), np.zeros((MOST_EVENTS, 5))
         count, ended = impact_kernel.resolve(
-            np.flatnonzero(self._touching), points.pair, points.bodies, *laid, self._restitution, self._friction, twist,
-            SLOW, MOST_EVENTS, np.zeros((len(points.gap), 3)), events,
+            np.flatnonzero(self._touching), points.pair, laid.bodies, laid.axes, laid.jacobian, laid.answer,
+            laid.mobility, self._restitution, self._friction, laid.held, self.joints.jointed, twist, SLOW, MOST_EVENTS,
+            np.zeros_like(self.impulse), events,
         )  # fmt: skip
         state.twist[state.moving] = twist[state.moving]
         return events[:count], ended
 
-    def solve(self, time: float, together: bool, old: Impulses) -> None:
+    def solve(self, time: float, together: bool, old: Impulses, hold: Array) -> None:
         """Change the velocities to those at the end of a step of this time.
 
         Args:
             time: seconds.
             together: whether impacts during the step bounce by this program; else the step ends with the first.
             old: impulses of the step before.
+            hold: (j, 3) velocity of the joint points of B seen from those of A, m/s.
         """
         state, points = self.state, self.points
         state.velocity[state.moving] += time * self.gravity
         target = np.where(points.gap > SKIN, (SKIN - points.gap) / time, 0.0)
         ends = self.hits <= time * (1.0 + 1e-9)
-        start = old._replace(impulse=old.impulse * (time / old.time))
+        start = old.over(time)
         if together:
             bouncing = ends | (self._touching & (self.speed < -SLOW))
             if bouncing.any():
                 before = state.twist.copy()
-                self._solve(np.where(bouncing, -self._restitution * self.speed, target), start)
+                self._solve(np.where(bouncing, -self._restitution * self.speed, target), start, hold)
                 # the work of the impulses is that along the mean of the velocities before and after
-                if float((self._rates(0.5 * (before + state.twist)) * self.impulse).sum()) <= 0.0:
+                rates = self._rates(0.5 * (before + state.twist))
+                rates[len(target) :] -= 0.5 * hold  # what closes joints is no work
+                if float((rates * self.impulse).sum()) <= 0.0:
                     return
                 state.twist[:] = before
         else:  # bodies that nothing bears move with the mean of both velocities
             target = np.where(ends, target + 0.5 * np.minimum(self._pull, 0.0) * time - RELAXED, target)
-        self._solve(target, start)
+        self._solve(target, start, hold)
 
-    def _solve(self, target: Array, start: Impulses) -> None:
-        state, points = self.state, self.points
-        axes, jacobian, answer, mobility = self._laid
+    def _solve(self, target: Array, start: Impulses, hold: Array) -> None:
+        state, points, laid, count = self.state, self.points, self._laid, len(self.points.gap)
         self.impulse[:] = 0.0
         if len(start.pair):
             head = np.full(len(state.pieces.table.pairs), -1, dtype=np.intp)
-            contact_kernel.start_from(*start[:3], head, points.pair, self._local, axes, SAME_POINT, self.impulse)
-            contact_kernel.apply(points.bodies, answer, state.twist, self.impulse)
-        contact_kernel.solve(
-            np.arange(len(points.gap)), points.bodies, jacobian, answer, mobility, self._friction, target, state.twist,
-            self.impulse, TOLERANCE, sweeps(len(points.gap)),
+            contact_kernel.start_from(
+                start.pair, start.local, start.impulse, head, points.pair, self._local, laid.axes, SAME_POINT,
+                self.impulse,
+            )  # fmt: skip
+        self.impulse[count:] = start.held
+        contact_kernel.apply(laid.bodies, laid.answer, state.twist, self.impulse)
+        solve_kernel.solve(
+            np.arange(len(laid.bodies)), laid.bodies, laid.jacobian, laid.answer, laid.mobility, self._friction, target,
+            laid.held, hold, state.twist, self.impulse, TOLERANCE, VISITS, MOST,
         )  # fmt: skip
-        self.residuals = contact_kernel.residuals(
-            points.bodies, jacobian, mobility, self._friction, target, state.twist, self.impulse
+        self.residuals = solve_kernel.residuals(
+            laid.bodies, laid.jacobian, laid.mobility, self._friction, target, hold, state.twist, self.impulse
         )
 
     def world_impulse(self) -> Array:
-        """Impulses (m, 3) on the second bodies, along the world's axes, N s."""
-        return np.asarray(np.einsum("cr,crk->ck", self.impulse, self._laid.axes))
+        """Impulses (m, 3) of the contacts on the second bodies, along the world's axes, N s."""
+        return np.asarray(np.einsum("cr,crk->ck", self.impulse[: len(self.points.gap)], self._laid.axes))
 
     def pushed(self) -> Mask:
         """Bodies (n,) on which a contact acts."""
         found: Mask = np.zeros(len(self.state.moving), dtype=bool)
-        found[self.points.bodies[self.impulse[:, 0] > 0.0]] = True
+        found[self.points.bodies[self._bearing()]] = True
         return found
 
     def remembered(self, time: float) -> Impulses:
         """What the next program starts from."""
-        kept = np.flatnonzero(self.impulse[:, 0] > 0.0)
-        return Impulses(self.points.pair[kept], self._local[kept], self.world_impulse()[kept], time)
+        kept, count = np.flatnonzero(self._bearing()), len(self.points.gap)
+        return Impulses(
+            self.points.pair[kept], self._local[kept], self.world_impulse()[kept], self.impulse[count:].copy(), time
+        )
+
+    def _bearing(self) -> Mask:
+        """Contact points (m,) that bear something."""
+        found: Mask = self.impulse[: len(self.points.gap), 0] > 0.0
+        return found
 
     def parting(self, gap: float) -> Array:
         """Least displacements (n, 6) of all bodies, metres and radians, that part every point by a gap."""
-        points, count = self.points, len(self.points.gap)
-        _, jacobian, answer, mobility = self._laid
+        points, laid = self.points, self._laid
         way = np.zeros_like(self.state.twist)
-        contact_kernel.solve(
-            np.arange(count), points.bodies, jacobian, answer, mobility, np.zeros(count), gap - points.gap, way,
-            np.zeros((count, 3)), 0.01 * gap, sweeps(count),
+        solve_kernel.solve(
+            np.arange(len(laid.bodies)), laid.bodies, laid.jacobian, laid.answer, laid.mobility,
+            np.zeros(len(points.gap)), gap - points.gap, laid.held, -self.joints.off(self.state), way,
+            np.zeros_like(self.impulse), 0.01 * gap, VISITS, MOST,
         )  # fmt: skip
         return way
-
-
-def sweeps(count: int) -> int:
-    """Most sweeps for a number of points."""
-    return min(max(VISITS // max(count, 1), FEWEST), MOST)
 
 
 def times(gap: Array, speed: Array, pull: Array) -> Array:

@@ -1,7 +1,9 @@
 """Lengths, masses and radii of a body from sex, stature and mass.
 
-Lengths and masses are fractions (de Leva 1996; ANSUR II), radii are linear fits to ANSUR II,
-``r = c0 + cq sqrt(mass / stature) + cH stature``; the tables in ``figures/data`` name the source of every column.
+Masses are fractions (de Leva 1996). Radii are linear fits to ANSUR II, ``c0 + cq sqrt(mass / stature) + cH stature``.
+Lengths of limbs, joint centres and some thicknesses are of the same form; `wholebody.figures.fit` chooses their
+coefficients so that the dimensions of the model are those of ANSUR II. The tables in ``figures/data`` name the source
+of every column.
 """
 
 from __future__ import annotations
@@ -30,28 +32,40 @@ BODY_MASS_INDEX_RANGE = (13.0, 50.0)
 
 _SEXES = {"male": "M", "female": "F"}
 
+_FITTED_LENGTHS = ("thigh", "shank", "upper_arm", "forearm", "hand")
+_ENDS = {
+    "elbow_flexion": "upper_arm",
+    "wrist_flexion": "forearm",
+    "knee_flexion": "thigh",
+    "ankle_dorsiflexion": "shank",
+}
+"""Joints at the ends of segments with a fitted length."""
+
 # Expected mass at a stature, log-log fit to ANSUR II: mass = a stature^b.
 _EXPECTED_MASS = {"M": (27.41, 1.999), "F": (23.00, 2.192)}
 
 
-_FOLDER = Path(__file__).parent / "data"
+FOLDER = Path(__file__).parent / "data"
 
 Row = dict[str, str]
 
 
 @dataclass(frozen=True)
 class Body:
-    """One person; all other quantities follow from these three.
+    """One person; all other quantities follow from these.
 
     Attributes:
         sex: "male" or "female".
         stature: metres.
         mass: kilograms.
+        deviations: how much larger fitted sizes (see `fitted`) are than those of most people of this build: name and
+            metres.
     """
 
     sex: str
     stature: float
     mass: float
+    deviations: tuple[tuple[str, float], ...] = ()
 
     @property
     def column(self) -> str:
@@ -62,23 +76,69 @@ class Body:
         """Return a number of the segment table for this sex, without conversion (mostly a fraction of the stature)."""
         return float(_row("segments", "name", name)[f"{quantity}_{self.column}"])
 
+    def fitted(self, name: str) -> float:
+        """Return a size of the table "fit", metres: a length of a limb, a joint centre or a thickness."""
+        row = _row("fit", "name", name)
+        c0, cq, ch = (float(row[f"{self.column}_{part}"]) for part in ("c0", "cq", "cH"))
+        size = c0 + cq * math.sqrt(self.mass / self.stature) + ch * self.stature
+        return size + sum(more for which, more in self.deviations if which == name)
+
     def length(self, segment: str) -> float:
         """Length of a segment, metres."""
-        return self.segment(segment, "length") * self.stature
+        part = segment.removeprefix("left_").removeprefix("right_")
+        if part in _FITTED_LENGTHS:
+            return self.fitted(part)
+        length = self.segment(segment, "length") * self.stature
+        return length if part in ("foot", "toes", "clavicle") else length * self._trunk_scale()
+
+    def origin(self, joint: str) -> tuple[float, float, float]:
+        """Position of a joint in the frame of its parent, metres."""
+        row = _row("joints", "name", joint)
+        x, y, z = (float(row[f"o{axis}_{self.column}"]) * self.stature for axis in "xyz")
+        side, _, rest = joint.partition("_")
+        if side not in ("left", "right"):
+            return x, y, z * self._trunk_scale()
+        if rest == "clavicle_protraction":
+            return x, y, z * self._trunk_scale()
+        if rest == "shoulder_flexion":
+            return self.fitted("shoulder_x"), math.copysign(self.fitted("shoulder_y"), y), self.fitted("shoulder_z")
+        if rest in _ENDS:
+            return x, y, -self.fitted(_ENDS[rest])
+        return x, y, z
+
+    def _trunk_scale(self) -> float:
+        """How much longer the trunk and head are than their shares of the stature, because the legs are shorter."""
+        leg = self.ankle_height + self.fitted("thigh") + self.fitted("shank")
+        shares = self.segment("left_thigh", "length") + self.segment("left_shank", "length")
+        return (self.stature - leg) / (self.stature * (1.0 - shares) - self.ankle_height)
+
+    @property
+    def ankle_height(self) -> float:
+        """Height of the ankle joint above the sole, metres."""
+        toe = float(_row("joints", "name", "left_toe_extension")[f"oz_{self.column}"])
+        return (self.segment("left_toes", "radius_b") - toe) * self.stature
 
     def segment_mass(self, segment: str) -> float:
         """Mass of a segment, kilograms; all of them add up to the mass of the body."""
         total = sum(float(row[f"mass_{self.column}"]) for row in table("segments"))
         return self.segment(segment, "mass") / total * self.mass
 
+    def source_length(self, segment: str) -> float:
+        """Length that the fractions of a segment's centre of mass and gyration belong to, metres.
+
+        The landmarks of de Leva's segments differ from those of the model's, most for the thighs of women.
+        """
+        fraction = _row("segments", "name", segment)[f"source_length_{self.column}"]
+        return float(fraction) * self.stature if fraction else self.length(segment)
+
     def center_of_mass(self, segment: str) -> Array:
         """Centre of mass of a segment in its own frame, shape (3,), metres."""
-        return self.length(segment) * np.array([self.segment(segment, f"com_{axis}") for axis in "xyz"])
+        return self.source_length(segment) * np.array([self.segment(segment, f"com_{axis}") for axis in "xyz"])
 
     def inertia(self, segment: str) -> Array:
         """Principal moments about the centre of mass, along x, y, z, shape (3,), kg m^2: ``m (k l)^2``."""
         gyration = np.array([self.segment(segment, f"k{axis}") for axis in "xyz"])
-        return self.segment_mass(segment) * (gyration * self.length(segment)) ** 2
+        return self.segment_mass(segment) * (gyration * self.source_length(segment)) ** 2
 
     def radius(self, part: str) -> float:
         """Radius of a body part, metres: circumference / 2 pi, or half a breadth (``*_y``) or depth (``*_x``)."""
@@ -145,14 +205,14 @@ def table(name: str) -> tuple[Row, ...]:
 
     Args:
         name: "joints", "segments", "radii_ansur", "percentiles", "design_cases", "spheres39", "sphere_exclusions",
-            "reach_cones" or "hand".
+            "reach_cones", "hand", "fit" or "dimensions".
 
     Raises:
         UnknownNameError: there is no such table.
     """
-    path = _FOLDER / f"{name}.csv"
+    path = FOLDER / f"{name}.csv"
     if not path.is_file():
-        raise UnknownNameError("table", name, [file.stem for file in _FOLDER.glob("*.csv")])
+        raise UnknownNameError("table", name, [file.stem for file in FOLDER.glob("*.csv")])
     with path.open(encoding="utf-8", newline="") as file:
         return tuple(csv.DictReader(line for line in file if not line.startswith("#")))
 

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array, Indices
+from wholebody.figures.motion_ranges import MotionRange
 from wholebody.figures.reach_cones import ReachCone
 
 ROOT_JOINT = "root_joint"
@@ -142,6 +143,8 @@ class Description(NamedTuple):
         collision_groups: segment to the group whose parts are never tested against each other; may be empty.
         effort: joint to weight of its effort; joints that are not named have 1.
         excluded: pairs of pieces that are not tested, with the reason.
+        ranges: ranges of motion that more than one joint angle decides; a problem takes them by default.
+        root_effort: weight of the root's position [rad^2/m^2] and of its rotation in the effort.
         notes: sentences on what had to be changed about the geometry of a file.
     """
 
@@ -154,6 +157,8 @@ class Description(NamedTuple):
     collision_groups: Mapping[str, str] = MappingProxyType({})
     effort: Mapping[str, float] = MappingProxyType({})
     excluded: tuple[ExcludedPair, ...] = ()
+    ranges: Mapping[str, MotionRange] = MappingProxyType({})
+    root_effort: tuple[float, float] = (0.0, 0.0)
     notes: tuple[str, ...] = ()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from wholebody.figures.anthropometry import Body, keyed
@@ -9,18 +10,23 @@ from wholebody.figures.anthropometry import Body, keyed
 RELAXED = 0.93
 """The arm's circumferences were measured flexed; relaxed they are 5 to 8 % less (estimate)."""
 
-HAND_BREADTH = {"M": 0.0503, "F": 0.0480}
-"""Hand breadth as a fraction of stature (ANSUR II)."""
-
 PALM_LENGTH = {"M": 0.603, "F": 0.600}
 """Palm length as a fraction of hand length (ANSUR II)."""
 
-FOOT_LENGTH = {"M": 0.1544, "F": 0.1513}
-"""Foot length as a fraction of stature (ANSUR II)."""
-
-EYE_HEIGHT = 0.936
 CHIN_HEIGHT = 0.870
-"""Fractions of stature (Drillis & Contini, in Winter 2009)."""
+"""Fraction of stature (Drillis & Contini, in Winter 2009)."""
+
+
+THUMB_TIP = 0.675
+"""End of the thumb, which lies beside the index finger, in hand lengths from the wrist: 0.26 behind that finger's
+(estimate)."""
+
+MIDDLE_TIP = 0.991
+"""End of the stretched middle finger, in hand lengths from the wrist: the sum of its parts in the table "hand"."""
+
+GRIP = 0.31
+"""Centre of a rod in the hand, in hand lengths from the wrist: what forearm-hand length leaves of forearm to centre of
+grip in ANSUR II (481 and 355 mm in 28 men)."""
 
 
 class Finger(NamedTuple):
@@ -45,15 +51,22 @@ class Dimensions:
         self.toe_half_height = person.segment("left_toes", "radius_b") * height
         self.toe_length = person.segment("left_toes", "length") * height
         self.sole = toe[2] - self.toe_half_height
-        self.heel_x = toe[0] + self.toe_length - FOOT_LENGTH[column] * height
+        self.heel_x = toe[0] + self.toe_length - person.fitted("foot_length")
         self.foot_half_width = person.segment("left_foot", "radius_a") * height
         self.hip_height = -self.sole + person.length("left_thigh") + person.length("left_shank")
 
         self.hand_length = person.length("left_hand")
-        self.hand_breadth = HAND_BREADTH[column] * height
+        self.hand_breadth = person.fitted("hand_breadth")
         self.palm_length = PALM_LENGTH[column] * self.hand_length
         self.palm_half_thickness = keyed_hand("palm", "depth") * self.hand_breadth
         self.index = self._finger("index")
+        self.thumb = Finger(
+            0.58 * self.hand_breadth,
+            0.22 * self.hand_length,
+            THUMB_TIP * self.hand_length,
+            keyed_hand("thumb_dp", "width") * self.hand_breadth,
+        )
+        self.grip = GRIP * self.hand_length
 
         above = sum(self.joint(name)[2] for name in _UPWARD)
         self.head_top = height - self.hip_height - above
@@ -61,15 +74,15 @@ class Dimensions:
         self.head_half_length = person.radius("head_x")
         self.head_bottom = self.head_top - (1.0 - CHIN_HEIGHT) * height
         self.head_x = person.center_of_mass("head")[0]
-        self.head_radius = 0.5 * (self.head_half_breadth + self.head_half_length)
-        self.eye_z = self.head_top - (1.0 - EYE_HEIGHT) * height
-        self.eye_x = self.head_x + self.head_radius
+        self.eye_z = self.head_top - person.fitted("eye")
+        # The skull is a capsule from front to back; its front at the height of the eyes.
+        below = self.head_top - self.head_half_breadth - self.eye_z
+        front = self.head_half_length - self.head_half_breadth
+        self.eye_x = self.head_x + front + math.sqrt(max(self.head_half_breadth**2 - below**2, 0.0))
 
     def joint(self, name: str) -> tuple[float, float, float]:
         """Position of a joint in its parent segment's frame."""
-        row, body = keyed("joints", "name")[name], self.body
-        x, y, z = (float(row[f"o{axis}_{body.column}"]) * body.stature for axis in "xyz")
-        return x, y, z
+        return self.body.origin(name)
 
     def _finger(self, finger: str) -> Finger:
         length = sum(keyed_hand(f"{finger}_{part}", "length") for part in ("pp", "mp", "dp"))

@@ -13,6 +13,7 @@ from wholebody import checks
 from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
+from wholebody.figures.grounding import Among, grounded
 from wholebody.figures.reduction import reduced_parts
 
 LARGEST = 1e6
@@ -74,12 +75,14 @@ class Figure:
         frames: names of frames for goals.
         segments: names of the links; they are frames too.
         cones: reach cones of shoulders and hips.
+        ranges: ranges of motion that more than one joint angle decides, by name; see `figures.motion_ranges`.
         collision_groups: segment to collision group ("torso_head", "left_arm", ...).
         excluded_pairs: pairs of pieces that are never tested, with the reason.
         notes: sentences on what had to be changed about the geometry of a file.
         limits: joint limits as arrays.
+        loaded_as: name or path and options by which `wb.load` made it; None for one made in another way.
         followers: joint to the law by which it follows another (mimic).
-        effort_weights: (nv,) weight of each degree of freedom in the effort; 0 for the root.
+        effort_weights: (nv,) weight of each degree of freedom in the effort.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
     """
 
@@ -104,8 +107,10 @@ class Figure:
         self.chains = MappingProxyType(dict(description.chains))
         self.frames, self.segments = description.frames, description.segments
         self.cones = MappingProxyType(dict(description.cones))
+        self.ranges = MappingProxyType(dict(description.ranges))
         self.collision_groups = MappingProxyType(dict(description.collision_groups))
         self.excluded_pairs, self.notes = description.excluded, description.notes
+        self.loaded_as: tuple[str, dict[str, Any]] | None = None
         self._description = description
         self._made: dict[str, Array] = {}
         first = model.joints[1] if model.njoints > 1 else None
@@ -115,13 +120,14 @@ class Figure:
         self._joints = tuple(name for name in self._joint_ids if name != ROOT_JOINT)
         self.limits = limits_of(model)
         self.followers = MappingProxyType(followers_of(model))
-        root = slice(0, 6 if self.root == "free" else 0)
+        root = 6 if self.root == "free" else 0
         self.effort_weights = np.ones(model.nv)
         for joint, weight in description.effort.items():
             if joint in self._joint_ids:
                 self.effort_weights[self.dofs([joint])] = weight
         self.neutral_weights = np.ones(model.nv)
-        self.effort_weights[root] = self.neutral_weights[root] = 0.0
+        self.neutral_weights[:root] = 0.0
+        self.effort_weights[:root] = np.repeat(description.root_effort, 3)[:root]
 
     def __repr__(self) -> str:
         return (
@@ -137,7 +143,8 @@ class Figure:
             for name, part in self._description._asdict().items()
         }
         visual = None if self.visual is self.geometry else self.visual
-        return Figure, (self.name, self.model, self.geometry, self.detail, Description(**known), visual)
+        made_from = (self.name, self.model, self.geometry, self.detail, Description(**known), visual)
+        return Figure, made_from, {"loaded_as": self.loaded_as}
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -299,6 +306,22 @@ class Figure:
         q = self._checked(q).copy()
         q[self.limits.idx_q] = np.clip(q[self.limits.idx_q], self.limits.lower, self.limits.upper)
         return q
+
+    def grounded(self, q: Array, scene: Among) -> Array:
+        """Return a copy of q moved vertically until the lowest segments stand on the things of a scene.
+
+        Args:
+            q: (nq,).
+            scene: a scene of this figure; things that it carries are not looked at.
+
+        Raises:
+            InputError: the root is fixed, nothing is below the figure, or the scene has another figure.
+        """
+        if self.root != "free":
+            raise InputError(f"{self.name} has a fixed root and stays where it is; load it with root='free'")
+        if getattr(scene, "model", None) is not self.model:
+            raise InputError(f"grounded: give a scene of this figure, not {checks.shown(scene)}; see wb.Scene(figure)")
+        return grounded(self.model, self.segments, self._checked(q), scene)
 
     def reduced(self, joints: str | Sequence[str], posture: str | Array | None = None) -> Figure:
         """Return a figure that keeps only some joints; the others are locked, and pairs that cannot move are dropped.

@@ -16,7 +16,7 @@ from wholebody.errors import UnknownNameError
 from wholebody.figures import human_capsules, human_hulls, human_spheres
 from wholebody.figures.anthropometry import Body, body, describe, table
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
-from wholebody.figures.dimensions import Dimensions
+from wholebody.figures.dimensions import MIDDLE_TIP, Dimensions
 
 DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
     "spheres": human_spheres.solids,
@@ -74,7 +74,7 @@ def _joints(person: Body) -> tuple[Joint, ...]:
     child = {row["name"]: row["child_segment"] for row in rows} | {"root": "pelvis"}
     joints = []
     for row in rows:
-        x, y, z = (float(row[f"o{axis}_{person.column}"]) * person.stature for axis in "xyz")
+        x, y, z = person.origin(row["name"])
         a, b, c = (float(value) for value in row["axis"].split())
         low, high = math.radians(float(row["lower_deg"])), math.radians(float(row["upper_deg"]))
         joints.append(
@@ -88,6 +88,10 @@ def landmarks(size: Dimensions) -> tuple[Landmark, ...]:
 
     - ``<side>_palm``: on the skin in the middle of the palm; x along the fingers, z out of the palm.
     - ``<side>_index_tip``: end of the index finger; axes as the palm.
+    - ``<side>_thumb_tip``: end of the thumb, which lies beside the index finger; axes as the palm.
+    - ``<side>_middle_tip``: where the middle finger ends if it is stretched. The piece of the three other fingers ends
+      earlier, because they curl where the index finger points.
+    - ``<side>_grip``: centre of a rod of 35 mm in the closed hand; axes as the palm.
     - ``<side>_shoulder`` ... ``<side>_ankle``: joint centres, on the segment nearer the root, with its axes.
     - ``<side>_heel``, ``<side>_ball``, ``<side>_sole``, ``<side>_toe_tip``: below the foot; x forward, z up.
     - ``head_top``: on the vertex; ``gaze``: between the eyes, x in the direction of looking.
@@ -99,10 +103,13 @@ def landmarks(size: Dimensions) -> tuple[Landmark, ...]:
     for side, sign in (("left", 1.0), ("right", -1.0)):
         # Hanging hand: fingers -z, palm towards the thigh, which is -y on the left.
         palm = np.column_stack([[0.0, 0.0, -1.0], [sign, 0.0, 0.0], [0.0, -sign, 0.0]])
-        length, thick, index = size.palm_length, size.palm_half_thickness, size.index
+        length, thick, index, thumb = size.palm_length, size.palm_half_thickness, size.index, size.thumb
         marks += [
             Landmark(f"{side}_palm", f"{side}_hand", place(0.0, -sign * thick, -0.6 * length, palm)),
             Landmark(f"{side}_index_tip", f"{side}_hand", place(index.x, 0.0, -index.tip, palm)),
+            Landmark(f"{side}_thumb_tip", f"{side}_hand", place(thumb.x, 0.0, -thumb.tip, palm)),
+            Landmark(f"{side}_middle_tip", f"{side}_hand", place(0.0, 0.0, -MIDDLE_TIP * size.hand_length, palm)),
+            Landmark(f"{side}_grip", f"{side}_hand", place(0.0, -sign * (thick + 0.0175), -size.grip, palm)),
             Landmark(f"{side}_shoulder", f"{side}_clavicle", place(*size.joint(f"{side}_shoulder_flexion"))),
             Landmark(f"{side}_elbow", f"{side}_upper_arm", place(*size.joint(f"{side}_elbow_flexion"))),
             Landmark(f"{side}_wrist", f"{side}_forearm", place(*size.joint(f"{side}_wrist_flexion"))),

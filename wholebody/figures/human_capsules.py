@@ -13,6 +13,16 @@ from wholebody.arrays import Array
 from wholebody.figures.body_spec import Solid, place
 from wholebody.figures.dimensions import RELAXED, Dimensions
 
+FACE = 0.75
+"""Radius of the face and jaw in half breadths of the head (estimate)."""
+
+YIELD = 0.4
+"""Share of the thigh's radius by which flesh gives way where the thigh presses on the belly or the other thigh: 29 to
+41 mm from the small woman to the large man (estimate). These are tested against the core that is left."""
+
+CLAVICLE = 0.017
+"""Radius of the shoulder girdle as a fraction of stature (estimate)."""
+
 # Turns a capsule's own axis z into y.
 _ACROSS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
@@ -31,45 +41,68 @@ def _trunk(size: Dimensions) -> Iterator[Solid]:
     neck = 0.9 * size.body.radius("neck")
     length = size.body.length("neck")
     yield _between("neck", "neck", neck, (0.0, 0.0, 0.1 * length), (0.0, 0.0, 0.9 * length))
-    radius = size.head_radius
-    yield _between(
-        "head",
-        "head",
-        radius,
-        (size.head_x, 0.0, size.head_bottom + radius),
-        (size.head_x, 0.0, size.head_top - radius),
-    )
+    skull, face = size.head_half_breadth, FACE * size.head_half_breadth
+    half = size.head_half_length - skull
+    top = size.head_top - skull
+    yield _between("head:0", "head", skull, (size.head_x - half, 0.0, top), (size.head_x + half, 0.0, top))
+    front = size.eye_x - face
+    yield _between("head:1", "head", face, (front, 0.0, size.eye_z), (front, 0.0, size.head_bottom + face))
 
 
 def _limbs(size: Dimensions) -> Iterator[Solid]:
-    person, radius = size.body, size.body.radius
-    for side in ("left", "right"):
+    for side, sign in (("left", 1.0), ("right", -1.0)):
         yield clavicle(size, side)
-        upper, fore = person.length("left_upper_arm"), person.length("left_forearm")
-        arm = RELAXED * radius("upper_arm")
-        yield _down(f"{side}_upper_arm:0", f"{side}_upper_arm", arm, 0.05 * upper, 0.45 * upper)
-        yield _down(f"{side}_upper_arm:1", f"{side}_upper_arm", 0.9 * arm, 0.55 * upper, upper)
-        elbow, wrist = 0.9 * RELAXED * radius("forearm"), radius("wrist")
-        yield _down(f"{side}_forearm", f"{side}_forearm", 0.5 * (elbow + wrist), 0.05 * fore, 0.95 * fore)
+        yield from _arm(size, side, sign)
         yield from hand(size, side)
-
-        thigh, shank = person.length("left_thigh"), person.length("left_shank")
-        high, low = radius("thigh"), radius("thigh_low")
-        yield _down(f"{side}_thigh:0", f"{side}_thigh", 0.92 * high, 0.12 * thigh, 0.4 * thigh)
-        yield _down(f"{side}_thigh:1", f"{side}_thigh", low, 0.6 * thigh, 0.98 * thigh)
-        calf = 0.7 * radius("calf") + 0.3 * radius("ankle")
-        yield _down(f"{side}_shank", f"{side}_shank", calf, 0.08 * shank, 0.92 * shank)
+        yield from _leg(size, side, sign)
         yield from foot(size, side)
 
 
+def _arm(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
+    """Deltoid and upper arm, elbow, forearm, wrist."""
+    person, radius = size.body, size.body.radius
+    upper, fore = person.length("left_upper_arm"), person.length("left_forearm")
+    arm, elbow = RELAXED * radius("upper_arm"), person.fitted("elbow_back")
+    out, top = sign * (person.fitted("deltoid") - arm), person.fitted("shoulder_top") - arm
+    name = f"{side}_upper_arm"
+    yield _between(f"{name}:0", name, arm, (0.0, out, min(top, 0.0)), (0.0, 0.3 * out, -0.45 * upper))
+    low = 0.88 * arm
+    yield _between(f"{name}:1", name, low, (0.0, 0.0, -0.55 * upper), (low - elbow, 0.0, -0.95 * upper))
+    thick, wrist = RELAXED * radius("forearm"), radius("wrist")
+    yield _down(f"{side}_forearm:0", f"{side}_forearm", thick, thick - elbow, 0.40 * fore)
+    yield _down(f"{side}_forearm:1", f"{side}_forearm", wrist, 0.45 * fore, fore - wrist)
+
+
+def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
+    """Thigh with its hip, knee, calf, ankle. On a seat the underside of the thigh is level with the pelvis'."""
+    person, radius = size.body, size.body.radius
+    thigh, shank = person.length("left_thigh"), person.length("left_shank")
+    high = 0.5 * (person.fitted("seat") + person.fitted("thigh_top"))
+    front, out = high - person.fitted("seat"), sign * (person.fitted("hip_side") - high)
+    name = f"{side}_thigh"
+    yield _between(f"{name}:0", name, high, (front, out, -0.12 * thigh), (front, 0.3 * out, -0.42 * thigh))
+    core = (1.0 - YIELD) * high
+    yield _between(f"{name}:2", name, core, (front, 0.3 * out, -0.3 * thigh), (front, 0.3 * out, -0.42 * thigh))
+    knee = person.fitted("knee_front")
+    yield _down(f"{name}:1", name, knee, 0.6 * thigh, 0.98 * thigh)
+    calf, ankle = 0.96 * radius("calf"), 1.04 * radius("ankle")
+    name = f"{side}_shank"
+    yield _between(f"{name}:0", name, calf, (-0.1 * calf, 0.0, -0.1 * shank), (-0.25 * calf, 0.0, -0.42 * shank))
+    yield _down(f"{name}:1", name, ankle, 0.55 * shank, 0.94 * shank)
+
+
 def clavicle(size: Dimensions, side: str) -> Solid:
-    """Shoulder girdle: a capsule from beside the breastbone to the shoulder joint."""
-    shoulder = np.array(size.joint(f"{side}_shoulder_flexion"))
-    return _between(f"{side}_clavicle", f"{side}_clavicle", 0.028 * size.stature, 0.25 * shoulder, 0.9 * shoulder)
+    """Shoulder girdle: a level capsule from beside the breastbone to the shoulder joint, as high as the acromion."""
+    x, y, z = size.joint(f"{side}_shoulder_flexion")
+    radius = CLAVICLE * size.stature
+    height = z + size.body.fitted("shoulder_top") - radius
+    return _between(
+        f"{side}_clavicle", f"{side}_clavicle", radius, (0.25 * x, 0.25 * y, height), (0.9 * x, 0.9 * y, height)
+    )
 
 
 def hand(size: Dimensions, side: str) -> Iterator[Solid]:
-    """Palm, index finger, and the three others slightly shortened: at rest they curl, and the index leads a reach."""
+    """Palm, index finger, thumb, and the three others slightly shortened: they curl, and the index finger leads."""
     segment, thick, breadth = f"{side}_hand", size.palm_half_thickness, size.hand_breadth
     palm, index = size.palm_length, size.index
     box = coal.Box(breadth, 2.0 * thick, palm)
@@ -82,6 +115,9 @@ def hand(size: Dimensions, side: str) -> Iterator[Solid]:
     yield _between(
         f"{segment}:2", segment, radius, (index.x, 0.0, -index.knuckle), (index.x, 0.0, -(index.tip - radius))
     )
+    thumb = size.thumb
+    root = (0.36 * breadth, 0.0, -thumb.knuckle)
+    yield _between(f"{segment}:3", segment, thumb.radius, root, (thumb.x, 0.0, -(thumb.tip - thumb.radius)))
 
 
 def foot(size: Dimensions, side: str) -> Iterator[Solid]:
@@ -110,11 +146,10 @@ def trunk_parts(size: Dimensions) -> tuple[TrunkPart, ...]:
     """Return positions and half sizes of the parts from the pelvis to the thorax."""
     radius, height, length = size.body.radius, size.stature, size.body.length
     waist_x, waist_y, chest_x, chest_y = radius("waist_x"), radius("waist_y"), radius("chest_x"), radius("chest_y")
+    rear, seat = 0.95 * radius("hip_x"), size.body.fitted("seat")
     low, up, ribs, chest = (length(name) for name in ("lower_lumbar", "upper_lumbar", "lower_thorax", "thorax"))
     return (
-        TrunkPart(
-            "pelvis", -0.004 * height, 0.004 * height, 0.95 * radius("hip_x"), 0.97 * radius("hip_y"), 0.06 * height
-        ),
+        TrunkPart("pelvis", rear - size.body.fitted("buttock"), rear - seat, rear, 0.97 * radius("hip_y"), rear),
         TrunkPart("lower_lumbar", 0.010 * height, 0.5 * low, 0.95 * waist_x, 0.95 * waist_y, 1.3 * low),
         TrunkPart("upper_lumbar", 0.004 * height, 0.5 * up, 0.95 * waist_x, 0.93 * waist_y, 1.1 * up),
         TrunkPart("lower_thorax", 0.014 * height, 0.5 * ribs, 0.95 * chest_x, 0.95 * chest_y, 1.2 * ribs),

@@ -14,8 +14,13 @@ from wholebody.figures.description import Chain, Description, ExcludedPair, Join
 from wholebody.figures.figure import Figure
 from wholebody.figures.human import human_spec
 from wholebody.figures.human_pairs import body_pairs, collision_group, sphere_pairs
+from wholebody.figures.motion_ranges import human_ranges
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
+
+ROOT_EFFORT = (5.0, 2.0)
+"""Weight of the root in a person's effort, beside 1 of an arm: of its position [rad^2/m^2] and of its rotation.
+ESTIMATE: without it a person bows and walks away before an arm is lifted."""
 
 
 def human_figure(
@@ -33,11 +38,18 @@ def human_figure(
         InputError: an impossible body.
         UnknownNameError: an unknown detail.
     """
-    return figure_of(human_spec(body(sex, stature, mass), detail), detail)
+    person = body(sex, stature, mass)
+    return figure_of(human_spec(person, detail), detail, person.sex)
 
 
-def figure_of(spec: BodySpec, detail: str) -> Figure:
-    """Return the figure of a human specification, whole or with some joints fixed."""
+def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
+    """Return the figure of a human specification, whole or with some joints fixed.
+
+    Args:
+        spec: the specification.
+        detail: of its pieces.
+        sex: "male" or "female" gives it the ranges of motion and the effort of a person; None leaves them out.
+    """
     model = model_of(spec)
     tested, excluded = (sphere_pairs if detail == "spheres" else body_pairs)(spec.solids)
     geometry = geometry_of(model, spec.solids, tested)
@@ -54,6 +66,8 @@ def figure_of(spec: BodySpec, detail: str) -> Figure:
         collision_groups={segment: collision_group(segment) for segment in segments},
         effort={row["name"]: float(row["effort_weight"]) for row in table("joints")},
         excluded=(*(ExcludedPair(*entry) for entry in excluded), *rigid),
+        ranges={} if sex is None else human_ranges(sex, joints),
+        root_effort=(0.0, 0.0) if sex is None else ROOT_EFFORT,
     )
     return Figure(spec.name, model, geometry, detail, description)
 

@@ -1,4 +1,4 @@
-"""The person in convex polyhedra: tapered limbs and elliptic trunk, the closest of the three details to a body."""
+"""The person in convex polyhedra: an elliptic trunk, and limbs like the capsules, which is closest to a body."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ import pinocchio as pin
 
 from wholebody.figures import hulls, human_capsules
 from wholebody.figures.body_spec import Solid, place
-from wholebody.figures.dimensions import RELAXED, Dimensions
+from wholebody.figures.dimensions import Dimensions
+
+_TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck")
 
 
 def solids(size: Dimensions) -> tuple[Solid, ...]:
     """Return the pieces of a person, all of them convex polyhedra."""
-    return (*_trunk(size), *_limbs(size))
+    rest = [solid for solid in human_capsules.solids(size) if solid.name not in _TRUNK]
+    return (*_trunk(size), *(_hull_of(solid) for solid in rest))
 
 
 def _trunk(size: Dimensions) -> Iterator[Solid]:
@@ -23,31 +26,6 @@ def _trunk(size: Dimensions) -> Iterator[Solid]:
         yield _solid(part.segment, hulls.ellipsoid(radii, part.segment), part.x, part.z)
     neck, length = 0.9 * size.body.radius("neck"), size.body.length("neck")
     yield _solid("neck", hulls.tapered(neck, neck, 0.8 * length, "neck"), 0.0, 0.9 * length)
-    half_height = 0.5 * (size.head_top - size.head_bottom)
-    radii = (size.head_radius, size.head_half_breadth, half_height)
-    yield _solid("head", hulls.ellipsoid(radii, "head"), size.head_x, size.head_top - half_height)
-
-
-def _limbs(size: Dimensions) -> Iterator[Solid]:
-    person, radius = size.body, size.body.radius
-    upper, fore = person.length("left_upper_arm"), person.length("left_forearm")
-    thigh, shank = person.length("left_thigh"), person.length("left_shank")
-    arm, elbow, wrist = RELAXED * radius("upper_arm"), 0.9 * RELAXED * radius("forearm"), radius("wrist")
-    high, low, calf, ankle = radius("thigh"), radius("thigh_low"), radius("calf"), radius("ankle")
-    for side in ("left", "right"):
-        yield _hull_of(human_capsules.clavicle(size, side))
-        yield _down(f"{side}_upper_arm:0", arm, arm, 0.05 * upper, 0.45 * upper)
-        yield _down(f"{side}_upper_arm:1", 0.95 * arm, 0.8 * arm, 0.55 * upper, upper)
-        yield _down(f"{side}_forearm", elbow, wrist, 0.05 * fore, 0.95 * fore)
-        yield from (_hull_of(solid) for solid in human_capsules.hand(size, side))
-        yield _down(f"{side}_thigh:0", 0.92 * high, 0.85 * high, 0.12 * thigh, 0.4 * thigh)
-        yield _down(f"{side}_thigh:1", 1.05 * low, 0.95 * low, 0.6 * thigh, 0.98 * thigh)
-        yield _down(f"{side}_shank", calf, ankle, 0.15 * shank, 0.95 * shank)
-        yield from (_hull_of(solid) for solid in human_capsules.foot(size, side))
-
-
-def _down(name: str, first: float, last: float, start: float, end: float) -> Solid:
-    return _solid(name, hulls.tapered(first, last, end - start, name), 0.0, -start)
 
 
 def _solid(name: str, hull: tuple[Any, pin.SE3], x: float, z: float) -> Solid:

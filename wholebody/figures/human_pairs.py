@@ -17,8 +17,13 @@ _TRUNK = "parts of the trunk and head meet along the spine"
 _NEIGHBOURS = "neighbours that overlap at their joint"
 _SHOULDER = "the shoulder lies on the ribs"
 _HIP = "the thigh presses on pelvis and belly"
-_THIGHS = "the upper thighs rest against each other"
+_CORE = "the core of the thigh is there for the belly and the other thigh"
+_FAR = "feet do not reach head and shoulders"
+_THIGHS = "the upper thighs press on each other; their cores are tested"
 _SAME = "same segment"
+
+_UPPER = ("thorax", "neck", "head", "left_clavicle", "right_clavicle")
+_FOOT = ("foot", "toes")
 
 _NEXT = {
     frozenset(pair)
@@ -78,9 +83,13 @@ def _reason(a: Solid, b: Solid) -> str | None:
         return _SHOULDER
     if part_b == "thigh" and a.segment == "pelvis":
         return _HIP
-    if b.name.endswith("_thigh:0") and a.segment in ("lower_lumbar", "upper_lumbar", "lower_thorax"):
+    if b.name.endswith("_thigh:0") and a.segment in ("lower_lumbar", "upper_lumbar"):
         return _HIP
-    if a.name.endswith("_thigh:0") and b.name.endswith("_thigh:0"):
+    if b.name.endswith("_thigh:2") and not (a.segment == "upper_lumbar" or a.name.endswith(("_thigh:1", "_thigh:2"))):
+        return _CORE
+    if (part_b in _FOOT or b.name.endswith("_shank:1")) and a.segment in _UPPER:
+        return _FAR
+    if a.name.endswith("_thigh:0") and b.name.endswith(("_thigh:0", "_thigh:1")):
         return _THIGHS
     return None
 

@@ -46,7 +46,7 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
     name = str(path(spec, "load: spec"))
     if name in builders:
         _check_options(builders[name], options, f"load({name!r})")
-        return builders[name](**options)
+        return _remembered(builders[name](**options), name, options)
     if Path(name).suffix == "" and not is_file(name):
         raise UnknownNameError("figure", name, builders, "load")
     if Path(name).suffix and Path(name).suffix.lower() not in (".urdf", ".xml", ".xacro"):
@@ -54,7 +54,13 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
     check_file(name, "figure")
     builder = xml_figure if Path(name).suffix.lower() == ".xml" else urdf_figure
     _check_options(builder, options, f"load({name!r})")
-    return builder(name, **options)
+    return _remembered(builder(name, **options), name, options)
+
+
+def _remembered(figure: Figure, name: str, options: dict[str, Any]) -> Figure:
+    """The figure, with what it was loaded from."""
+    figure.loaded_as = (name if name in ("human", "avatar", "hand") else str(Path(name).resolve()), dict(options))
+    return figure
 
 
 def _check_options(builder: Callable[..., Figure], options: dict[str, Any], where: str) -> None:

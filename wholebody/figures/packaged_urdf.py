@@ -60,7 +60,7 @@ def write_human(path: str | os.PathLike[str], person: Body) -> None:
     from wholebody.figures.urdf_extension import extension_text
 
     spec = human_spec(person)
-    _write(Path(path), urdf_text(spec, extension_text(figure_of(spec, "capsules"))))
+    _write(Path(path), urdf_text(spec, extension_text(figure_of(spec, "capsules", person.sex))))
 
 
 def packaged_files() -> dict[str, str]:

@@ -15,6 +15,7 @@ from wholebody.figures.description import Articulated
 GAP = 0.004
 """Least distance of any two pieces in a named posture, metres; arms and legs move outwards if a build needs it."""
 
+_DOWN = np.array([0.0, 0.0, -1.0])
 _SPREAD_STEP = math.radians(1.0)
 _SPREAD_STEPS = 45
 
@@ -122,20 +123,21 @@ def lowest(figure: Articulated, q: Array) -> float:
     geometry_data = pin.GeometryData(figure.geometry)
     pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry_data, q)
     return min(
-        _lowest_of(piece.geometry, placement)
+        -support(piece.geometry, placement, _DOWN)
         for piece, placement in zip(figure.geometry.geometryObjects, geometry_data.oMg, strict=True)
     )
 
 
-def _lowest_of(shape: Any, placement: pin.SE3) -> float:
-    height, row = float(placement.translation[2]), np.asarray(placement.rotation)[2]
+def support(shape: Any, placement: pin.SE3, direction: Array) -> float:
+    """How far a piece reaches along a unit direction (3,), metres from the origin."""
+    far, row = float(placement.translation @ direction), np.asarray(placement.rotation).T @ direction
     kind = type(shape).__name__
     if kind == "Sphere":
-        return height - float(shape.radius)
+        return far + float(shape.radius)
     if kind == "Capsule":
-        return height - float(shape.radius) - abs(float(row[2])) * float(shape.halfLength)
+        return far + float(shape.radius) + abs(float(row[2])) * float(shape.halfLength)
     if kind == "Box":
-        return height - float(np.abs(row) @ np.asarray(shape.halfSide))
+        return far + float(np.abs(row) @ np.asarray(shape.halfSide))
     if kind == "Ellipsoid":
-        return height - float(np.linalg.norm(row * np.asarray(shape.radii)))
-    return height + float((np.asarray(shape.points()) @ row).min())
+        return far + float(np.linalg.norm(row * np.asarray(shape.radii)))
+    return far + float((np.asarray(shape.points()) @ row).max())

@@ -12,6 +12,7 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair
+from wholebody.figures.motion_ranges import CoupledRange, EllipseAxis, EllipticRange, MotionRange
 
 _LOCKED = "locked together"
 
@@ -63,9 +64,35 @@ def reduced_parts(figure: Articulated, keep: tuple[str, ...], q: Array) -> Reduc
         collision_groups=old.collision_groups,
         effort=old.effort,
         excluded=(*old.excluded, *fixed),
+        ranges=_ranges(old.ranges, names, figure.joint_values(q), frames),
+        root_effort=old.root_effort,
         notes=old.notes,
     )
     return ReducedParts(small, geometry, visual, description)
+
+
+def _ranges(
+    ranges: Mapping[str, MotionRange], kept: set[str], values: Mapping[str, float], frames: Mapping[str, pin.Frame]
+) -> dict[str, MotionRange]:
+    """Ranges of motion of the kept joints; what locked joints share is moved into bounds and offsets."""
+    found: dict[str, MotionRange] = {}
+    for name, part in ranges.items():
+        if isinstance(part, CoupledRange):
+            moving = {joint: factor for joint, factor in part.joints.items() if joint in kept}
+            still = sum(factor * values[joint] for joint, factor in part.joints.items() if joint not in kept)
+            if moving:
+                found[name] = CoupledRange(moving, part.bound - still)
+        elif isinstance(part, EllipticRange):
+            if any(joint in kept for axis in part.axes for joint in axis.joints):
+                found[name] = EllipticRange(tuple(_without_locked(axis, kept, values) for axis in part.axes))
+        elif frames[part.reference].parentJoint != frames[part.limb].parentJoint:
+            found[name] = part
+    return found
+
+
+def _without_locked(axis: EllipseAxis, kept: set[str], values: Mapping[str, float]) -> EllipseAxis:
+    still = sum(values[joint] for joint in axis.joints if joint not in kept)
+    return axis._replace(joints=tuple(joint for joint in axis.joints if joint in kept), offset=axis.offset + still)
 
 
 def drop_rigid_pairs(geometry: pin.GeometryModel) -> list[ExcludedPair]:

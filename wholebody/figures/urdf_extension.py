@@ -1,7 +1,8 @@
 """An extension of URDF: the element ``<wholebody>``, which our figures write and read.
 
 Other programs ignore it. With it the figure that is read from a file equals the figure that was written: its pairs,
-postures, groups, chains, frames for goals, reach cones, collision groups and weights of effort. All parts are by name::
+postures, groups, chains, frames for goals, reach cones, ranges of motion, collision groups and weights of effort. All
+parts are by name::
 
     <wholebody root="free" detail="capsules">
       <frames names="left_palm left_index_tip"/>
@@ -11,6 +12,13 @@ postures, groups, chains, frames for goals, reach cones, collision groups and we
       <posture name="standing" root="0 0 0.93 0 0 0 1" joints="left_elbow_flexion" values="0.26"/>
       <untested reason="same segment" pairs="left_hand:0 left_hand:1"/>
       <cone name="left_shoulder" reference="thorax" limb="left_upper_arm" axis="0 0 -1" visible="1 0 0" corners="..."/>
+      <coupled_range name="left_hamstrings" joints="left_hip_flexion left_knee_flexion" factors="1 -0.9"
+       bound="1.08"/>
+      <elliptic_range name="neck">
+        <angle joints="neck1_lateral" lower="-0.78" upper="0.78" offset="0"/>
+      </elliptic_range>
+      <twist_range name="left_shoulder_twist" reference="thorax" limb="left_upper_arm" center="..." sign="-1"
+       bound="1.7" slope="0 0 1.38"/>
       <collision_group name="left_arm" segments="left_forearm left_hand"/>
       <effort joints="left_clavicle_elevation" weights="1000"/>
     </wholebody>
@@ -22,7 +30,8 @@ ones and those whose pieces are on one joint.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NoReturn
@@ -37,9 +46,19 @@ from wholebody.checks import shown
 from wholebody.errors import FileFormatError, UnknownNameError, WholebodyError
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, JointCone
 from wholebody.figures.figure import Figure
+from wholebody.figures.motion_ranges import (
+    LARGEST_ELLIPSE,
+    CoupledRange,
+    EllipseAxis,
+    EllipticRange,
+    MotionRange,
+    TwistRange,
+)
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.figures.xml_reading import numbers
+
+_RANGES = ("coupled_range", "elliptic_range", "twist_range")
 
 
 def extension_text(figure: Figure) -> str:
@@ -69,6 +88,7 @@ def extension_text(figure: Figure) -> str:
         ends = {"reference": cone.reference, "limb": cone.limb, "axis": _text(cone.axis)}
         shape = {"visible": _text(cone.cone.visible), "corners": _text(cone.cone.vertices.ravel())}
         SubElement(made, "cone", {"name": name, **ends, **shape})
+    _add_ranges(made, known.ranges)
     collision_groups: dict[str, list[str]] = {}
     for segment, name in known.collision_groups.items():
         collision_groups.setdefault(name, []).append(segment)
@@ -77,6 +97,8 @@ def extension_text(figure: Figure) -> str:
     effort = {joint: weight for joint, weight in known.effort.items() if joint in figure.joints}
     if effort:
         SubElement(made, "effort", joints=" ".join(effort), weights=_text(effort.values()))
+    if any(known.root_effort):
+        SubElement(made, "root_effort", weights=_text(known.root_effort))
     ElementTree.indent(made, space="  ", level=1)
     return "  " + ElementTree.tostring(made, encoding="unicode").rstrip() + "\n"
 
@@ -135,6 +157,8 @@ class _Reader:
             },
             effort=efforts,
             excluded=excluded,
+            ranges={self._name(item): self._range(item) for tag in _RANGES for item in self._all(tag)},
+            root_effort=self._root_effort(),
             notes=notes,
         )
         return Figure(name, self.model, self.geometry, self.element.get("detail", "own"), description)
@@ -181,6 +205,41 @@ class _Reader:
         ends = [self._names(item, end, "frame", self.frames)[0] for end in ("reference", "limb")]
         return JointCone(cone, ends[0], ends[1], np.array(numbers(item, "axis", place, 3)))
 
+    def _range(self, item: Element) -> MotionRange:
+        place = self._place(item)
+        if item.tag == "coupled_range":
+            joints = self._names(item, "joints", "joint", self.joints)
+            factors = numbers(item, "factors", place, len(joints))
+            return CoupledRange(dict(zip(joints, factors, strict=True)), numbers(item, "bound", place, 1)[0])
+        if item.tag == "elliptic_range":
+            axes = [self._ellipse_axis(angle, place) for angle in item.findall("angle")]
+            if not 0 < len(axes) <= LARGEST_ELLIPSE:
+                self._fail(f"<elliptic_range> {shown(item.get('name'))} has {len(axes)} angles; give 1 to 3")
+            return EllipticRange(tuple(axes))
+        reference, limb = (self._names(item, end, "frame", self.frames)[0] for end in ("reference", "limb"))
+        center = np.array(numbers(item, "center", place, 9)).reshape(3, 3)
+        if np.abs(center @ center.T - np.eye(3)).max() > 1e-6 or np.linalg.det(center) < 0.0:
+            self._fail(f"<twist_range> {shown(item.get('name'))} has a center that is no rotation")
+        sign = math.copysign(1.0, numbers(item, "sign", place, 1)[0])
+        bound, slope = numbers(item, "bound", place, 1)[0], np.array(numbers(item, "slope", place, 3))
+        return TwistRange(reference, limb, center, sign, bound, slope)
+
+    def _ellipse_axis(self, angle: Element, place: str) -> EllipseAxis:
+        joints = self._names(angle, "joints", "joint", self.joints)
+        low, high, offset = (numbers(angle, name, place, 1)[0] for name in ("lower", "upper", "offset"))
+        if not low < 0.0 < high:
+            self._fail(f"<angle> of {place} goes from {low:g} to {high:g}; zero is to be between them")
+        return EllipseAxis(joints, low, high, offset)
+
+    def _root_effort(self) -> tuple[float, float]:
+        found = self._all("root_effort")
+        if not found:
+            return 0.0, 0.0
+        position, rotation = numbers(found[-1], "weights", self._place(found[-1]), 2)
+        if min(position, rotation) < 0.0:
+            self._fail("<root_effort> has a negative weight; weights are zero or more")
+        return position, rotation
+
     def _all(self, tag: str) -> list[Element]:
         return self.element.findall(tag)
 
@@ -214,6 +273,22 @@ def _placed(figure: Articulated, root: Array | None, values: dict[str, float]) -
     if root is not None and figure.root == "free":
         q[:7] = root
     return figure.with_joints(q, values)
+
+
+def _add_ranges(made: Element, ranges: Mapping[str, MotionRange]) -> None:
+    for name, part in ranges.items():
+        if isinstance(part, CoupledRange):
+            texts = {"joints": " ".join(part.joints), "factors": _text(part.joints.values())}
+            SubElement(made, "coupled_range", {"name": name, **texts, "bound": _text([part.bound])})
+        elif isinstance(part, EllipticRange):
+            ellipse = SubElement(made, "elliptic_range", name=name)
+            for axis in part.axes:
+                low, high, offset = (_text([value]) for value in axis[1:])
+                SubElement(ellipse, "angle", joints=" ".join(axis.joints), lower=low, upper=high, offset=offset)
+        else:
+            ends = {"name": name, "reference": part.reference, "limb": part.limb, "center": _text(part.center.ravel())}
+            bound = {"sign": _text([part.sign]), "bound": _text([part.bound]), "slope": _text(part.slope)}
+            SubElement(made, "twist_range", {**ends, **bound})
 
 
 def _text(values: Iterable[float] | Array) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.checks import shown
-from wholebody.errors import FileFormatError
+from wholebody.errors import FileFormatError, one_line
 from wholebody.files import read_bytes
 
 MOST_BYTES = 64 * 2**20
@@ -40,10 +40,11 @@ def read_xml(path: Path, kind: str) -> Element:
     except ElementTree.ParseError as error:
         if not _is_text(data):
             raise FileFormatError(f"{path}: this is not a text file; give a {kind}") from None
-        raise FileFormatError(f"{path}: the XML is broken ({error}); mend that place") from None
+        raise FileFormatError(f"{path}: the XML is broken ({one_line(str(error))}); mend that place") from None
     except (LookupError, ValueError) as error:
         raise FileFormatError(
-            f"{path}: its encoding cannot be read ({error}); save the file as UTF-8 and say so in its first line"
+            f"{path}: its encoding cannot be read ({one_line(str(error))}); save the file as UTF-8 and say so in its "
+            "first line"
         ) from None
 
 

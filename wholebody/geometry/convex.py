@@ -17,7 +17,6 @@ from wholebody.geometry.components import Component, enclosed_volume, split_comp
 from wholebody.geometry.hull import hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, cached
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
-from wholebody.geometry.simplified_hull import simplified_hull
 
 if TYPE_CHECKING:
     from wholebody.runner import Child
@@ -182,9 +181,9 @@ def _part_pieces(
     if whole.volume - part.volume <= CONVEX_VOLUME * part.volume:
         return [whole]
     pieces: list[Piece] = []
-    for corners in _coacd(part, max_vertices, threshold, name, child):
+    for corners in _coacd(part, threshold, name, child):
         try:
-            pieces.append(hull_piece(corners, name))
+            pieces.append(hull_piece(corners, name, (max_vertices, max_vertices)))
         except InputError:
             pieces += _thickened(corners, name, notes)
     return pieces
@@ -210,7 +209,7 @@ MOST_SECONDS = 40.0
 """Time limit of CoACD for one part, seconds; the largest of real robots took a fraction of it."""
 
 
-def _coacd(part: Component, max_vertices: int, threshold: float, name: str, child: Child) -> list[Array]:
+def _coacd(part: Component, threshold: float, name: str, child: Child) -> list[Array]:
     if find_spec("coacd") is None:
         raise MissingPackageError("a mesh that is not convex needs coacd: pip install coacd")
     from wholebody.runner import EndedError
@@ -223,7 +222,7 @@ def _coacd(part: Component, max_vertices: int, threshold: float, name: str, chil
         if error.overtime:
             raise InputError(f"{name}: CoACD found no convex pieces in {MOST_SECONDS:g} s; {_MEND}") from None
         raise InputError(f"{name}: CoACD cannot cut it into convex pieces; {_MEND}") from None
-    return [simplified_hull(np.asarray(corners, dtype=float), max_vertices) for corners in parts]
+    return [np.asarray(corners, dtype=float) for corners in parts]
 
 
 def run_coacd(vertices: Array, faces: NDArray[np.int32], threshold: float) -> list[Array]:

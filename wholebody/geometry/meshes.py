@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
-from wholebody.errors import FileFormatError, InputError, MissingPackageError
+from wholebody.errors import FileFormatError, InputError, MissingPackageError, one_line
 from wholebody.files import check_file
 from wholebody.geometry.convex import check_mesh
 
@@ -63,7 +63,7 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
             vertices *= _metres(scene.units)
     except Exception as error:  # trimesh's readers raise many kinds of errors
         raise FileFormatError(
-            f"mesh {path}: it cannot be read ({type(error).__name__}: {error}); export it again"
+            f"mesh {path}: it cannot be read ({type(error).__name__}: {one_line(str(error))}); export it again"
         ) from error
     finally:
         quiet.setLevel(level)

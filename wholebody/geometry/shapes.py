@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from itertools import pairwise
 from os import PathLike
-from typing import Literal
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 import pinocchio as pin
@@ -27,10 +28,28 @@ MAX_VERTICES = (8, 256)
 MOST_CORNERS = 2**31
 """Greatest index of a vertex."""
 
+SIDES = 64
+"""Sides of the prism that stands for a cylinder: 64 are 0.12 % of the radius too far out; fewer are coarser."""
+
+SECTORS, TUBE_SIDES = 24, 12
+"""Pieces of a ring, and sides of its tube: 24 and 12 are 1 % of the radius and 4 % of the tube too far out."""
+
 THRESHOLD = (0.01, 1.0)
 """Least and greatest `Mesh.threshold`."""
 
-__all__ = ["Box", "Capsule", "Ellipsoid", "HalfSpace", "Hull", "Mesh", "Piece", "Shape", "Sphere"]
+__all__ = [
+    "Box",
+    "Capsule",
+    "Cylinder",
+    "Ellipsoid",
+    "HalfSpace",
+    "Hull",
+    "Mesh",
+    "Piece",
+    "Shape",
+    "Sphere",
+    "Torus",
+]
 
 
 class Shape(ABC):
@@ -112,6 +131,80 @@ class Capsule(Shape):
 
 
 @dataclass(frozen=True)
+class Cylinder(Shape):
+    """A cylinder along z, centred at its origin: one hull, a prism of `SIDES` sides around it.
+
+    The prism is nowhere inside the cylinder, and at its edges 0.12 % of the radius outside.
+
+    Attributes:
+        radius: metres.
+        length: along z, metres.
+    """
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", check_length(self.radius, "Cylinder radius"))
+        object.__setattr__(self, "length", check_length(self.length, "Cylinder length"))
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """One coal Convex."""
+        ring = around(self.radius, SIDES)
+        ends = [np.column_stack([ring, np.full(SIDES, z)]) for z in (-0.5 * self.length, 0.5 * self.length)]
+        return (hull_piece(np.vstack(ends), "Cylinder"),)
+
+    @property
+    def added_volume(self) -> float:
+        """What the prism adds: n tan(pi / n) / pi - 1."""
+        return SIDES * math.tan(math.pi / SIDES) / math.pi - 1.0
+
+
+@dataclass(frozen=True)
+class Torus(Shape):
+    """A ring about z, centred at its origin, such as a steering wheel: `SECTORS` convex pieces around it.
+
+    On the outer side the pieces cover the ring; on the inner side a sector is as straight as a chord, and up to 0.9 %
+    of the radius of the ring is missing at its ends.
+
+    Attributes:
+        radius: from the centre to the middle of the tube, metres.
+        tube: radius of the tube, metres; less than `radius`.
+    """
+
+    radius: float
+    tube: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", check_length(self.radius, "Torus radius"))
+        object.__setattr__(self, "tube", check_length(self.tube, "Torus tube"))
+        if not self.tube < self.radius:
+            raise InputError(f"Torus tube is {self.tube:g} m; give less than the radius of {self.radius:g} m")
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """One coal Convex a sector: the hull of the tube's circles at both of its ends."""
+        across = around(self.tube, TUBE_SIDES)
+        outwards = 1.0 / math.cos(math.pi / SECTORS)
+        circles = []
+        for angle in np.linspace(0.0, 2.0 * math.pi, SECTORS + 1):
+            reach = (self.radius + across[:, 0]) * outwards
+            circles.append(np.column_stack([reach * math.cos(angle), reach * math.sin(angle), across[:, 1]]))
+        return tuple(hull_piece(np.vstack(pair), "Torus") for pair in pairwise(circles))
+
+    @property
+    def added_volume(self) -> float:
+        """What the pieces add to the ring, of the volume 2 pi^2 R r^2."""
+        exact = 2.0 * math.pi**2 * self.radius * self.tube**2
+        return sum(piece.volume for piece in self.pieces()) / exact - 1.0
+
+
+def around(radius: float, sides: int) -> Array:
+    """Corners (sides, 2) of the regular polygon around a circle."""
+    angles = 2.0 * math.pi * np.arange(sides) / sides
+    return np.column_stack([np.cos(angles), np.sin(angles)]) * (radius / math.cos(math.pi / sides))
+
+
+@dataclass(frozen=True)
 class Ellipsoid(Shape):
     """An ellipsoid, centred at its origin. Its distances are accurate to 1e-6 m and 1e-5 of its size.
 
@@ -184,12 +277,26 @@ class Hull(Shape):
         return (hull_piece(self.points, "Hull"),)
 
 
+@runtime_checkable
+class HasTriangles(Protocol):
+    """A mesh of another library, such as trimesh."""
+
+    @property
+    def vertices(self) -> ArrayLike:
+        """(n, 3)."""
+
+    @property
+    def faces(self) -> ArrayLike:
+        """(m, 3) indices of vertices."""
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh(Shape):
     """A triangle mesh, split into convex pieces when they are first needed.
 
     Attributes:
-        source: path of an OBJ, STL, glTF, GLB or COLLADA file, or a pair of arrays (vertices (n, 3), faces (m, 3)).
+        source: path of an OBJ, STL, glTF, GLB or COLLADA file, a pair of arrays (vertices (n, 3), faces (m, 3)), or
+            an object that has them as `vertices` and `faces`, such as a trimesh.Trimesh; kept as a pair of arrays.
         scale: metres for each unit of the file: 0.001 for millimetres.
         up: axis of the file that points up; with "y" the mesh is rotated: y to z, and the file's z to -y.
         max_vertices: most vertices of a piece of a decomposition; convex parts keep all of theirs.
@@ -199,7 +306,7 @@ class Mesh(Shape):
         faces: (m, 3), read-only.
     """
 
-    source: str | PathLike[str] | tuple[ArrayLike, ArrayLike]
+    source: str | PathLike[str] | tuple[ArrayLike, ArrayLike] | HasTriangles
     scale: float = 1.0
     up: Literal["z", "y"] = "z"
     max_vertices: int = 32
@@ -212,6 +319,8 @@ class Mesh(Shape):
         choice(self.up, ("z", "y"), "Mesh up")
         whole(self.max_vertices, "Mesh max_vertices", *MAX_VERTICES)
         number(self.threshold, "Mesh threshold", *THRESHOLD)
+        if not isinstance(self.source, (str, PathLike, tuple, list)) and isinstance(self.source, HasTriangles):
+            object.__setattr__(self, "source", (self.source.vertices, self.source.faces))
         if isinstance(self.source, (str, PathLike)):
             vertices, faces = read_mesh(path(self.source, "Mesh source"))
         elif isinstance(self.source, (tuple, list)) and len(self.source) == 2:
@@ -222,7 +331,8 @@ class Mesh(Shape):
             faces = corners  # type: ignore[assignment]
         else:
             raise InputError(
-                f"Mesh source is {shown(self.source)}; give the path of a file, or a pair of arrays (vertices, faces)"
+                f"Mesh source is {shown(self.source)}; give the path of a file, a trimesh.Trimesh, or a pair of "
+                "arrays (vertices, faces)"
             )
         with np.errstate(over="ignore"):  # overflowed values are refused as not finite
             vertices = vertices * scale

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from wholebody import checks
 from wholebody.errors import InputError
+from wholebody.matter.joints import BallJoint, joints
 from wholebody.matter.materials import DEFAULT, Material, material
 
 LIGHTEST, HEAVIEST = 1e-9, 1e9  # kg
@@ -26,6 +28,7 @@ class Body:
         material: "wood", "human", "metal", or a `Material` of your own.
         velocity: (3,) of the centre of mass at the start, m/s.
         angular_velocity: (3,) at the start about the world's axes, rad/s.
+        joints: `wb.Hinge` and `wb.BallJoint` that hold it to other things or to the world.
     """
 
     density: float | None = None
@@ -33,6 +36,7 @@ class Body:
     material: Material | str = DEFAULT
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     angular_velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    joints: Sequence[BallJoint] = ()
 
     def __post_init__(self) -> None:
         if self.density is not None and self.mass is not None:
@@ -45,6 +49,7 @@ class Body:
             density = checks.number(density, "Body density", THINNEST, DENSEST, "kg/m3, such as 700 for wood")
             object.__setattr__(self, "density", density)
         object.__setattr__(self, "material", material(self.material, "Body material"))
+        object.__setattr__(self, "joints", joints(self.joints))
         for name in ("velocity", "angular_velocity"):
             values = checks.numbers(getattr(self, name), (3,), f"Body {name}")
             if np.abs(values).max() > FASTEST or float((values**2).sum()) > FASTEST**2:

@@ -9,7 +9,18 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.errors import InputError
-from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Shape, Sphere
+from wholebody.geometry.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Hull,
+    Mesh,
+    Shape,
+    Sphere,
+    Torus,
+)
 from wholebody.matter.body import HEAVIEST, LIGHTEST, Body
 
 
@@ -59,6 +70,11 @@ def _of_density_one(shape: Shape, name: str) -> tuple[pin.Inertia, str]:
     if isinstance(shape, Capsule):
         volume = np.pi * shape.radius**2 * (shape.length + 4.0 / 3.0 * shape.radius)
         return pin.Inertia.FromCapsule(volume, shape.radius, shape.length), ""
+    if isinstance(shape, Cylinder):
+        volume = np.pi * shape.radius**2 * shape.length
+        return pin.Inertia.FromCylinder(volume, shape.radius, shape.length), ""
+    if isinstance(shape, Torus):
+        return _of_torus(shape), ""
     import trimesh
 
     if isinstance(shape, Mesh):
@@ -74,6 +90,14 @@ def _of_density_one(shape: Shape, name: str) -> tuple[pin.Inertia, str]:
         hull = trimesh.convex.convex_hull(np.array(piece.geometry.points()))
         total = total + piece.placement.act(_of_mesh(hull))
     return total, f"{name!r} is no closed mesh: its mass is that of its convex pieces"
+
+
+def _of_torus(shape: Torus) -> pin.Inertia:
+    """Of a ring with the radii R and r: I_z = m (R^2 + 3/4 r^2), I_x = I_y = m (R^2 / 2 + 5/8 r^2)."""
+    big, small = shape.radius**2, shape.tube**2
+    mass = 2.0 * np.pi**2 * shape.radius * small
+    moments = (0.5 * big + 0.625 * small, 0.5 * big + 0.625 * small, big + 0.75 * small)
+    return pin.Inertia(mass, np.zeros(3), mass * np.diag(moments))
 
 
 def _of_mesh(mesh: Any) -> pin.Inertia:

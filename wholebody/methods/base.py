@@ -129,12 +129,15 @@ def refusal(method: str, terms: Sequence[str]) -> str | None:
 
 
 def named_terms(problem: Problem) -> list[tuple[str, object]]:
-    """All terms of a problem, each with its index and class, such as "constraints[1], Balance"."""
+    """The terms that were stated, each with its index and class, such as "constraints[1], Balance".
+
+    Those that a problem has by default are not among them: a method may leave them to the assessment.
+    """
     groups: tuple[tuple[str, Sequence[object]], ...] = (
         ("goals", problem.goals),
-        ("constraints", problem.constraints),
+        ("constraints", problem.stated),
         ("bounds", problem.bounds),
-        ("measures", problem.measures),
+        ("measures", problem.measures if problem.measures_given else ()),
     )
     return [
         (f"{group}[{number}], {type(term).__name__}", term)

@@ -42,7 +42,8 @@ class DampedLeastSquares:
     """Damped least squares, the textbook method: goals and equalities, limits by clamping, without contacts.
 
     Takes every goal, and constraints that are equalities (`Hold`, `Plane` with side "on"); bounds such as `Freeze` too.
-    Inequalities (`Balance`, `ReachCones`, `Plane` with side "above") are refused by name. Measures are reported, not
+    Inequalities (`Balance`, `ReachCones`, `Plane` with side "above") are refused by name, but for those that a person
+    has by default: they are left to the assessment. Measures are reported, not
     minimised: each step is the least motion, and there is one start. It may end in penetration, and then reports it.
 
     Attributes:
@@ -154,7 +155,7 @@ class _Descent:
 
     def _held(self) -> Array:
         """Errors of all equalities."""
-        return _joined([term.lower - np.atleast_1d(term.value(self._state)) for term in self._problem.constraints])
+        return _joined([term.lower - np.atleast_1d(term.value(self._state)) for term in self._problem.stated])
 
     def _wanted(self) -> Array:
         """Errors of all goals, multiplied by the roots of their weights."""
@@ -173,7 +174,7 @@ class _Descent:
     def _step(self, held: Array, wanted: Array) -> Array:
         """Displacement (nv,), within the limits."""
         problem, state = self._problem, self._state
-        of_held = _jacobian(problem.constraints, state)
+        of_held = _jacobian(problem.stated, state)
         of_wanted = _jacobian(problem.goals, state) * np.repeat(
             [goal.weight**0.5 for goal in problem.goals], [np.atleast_1d(g.error(state)).size for g in problem.goals]
         ).reshape(-1, 1)
@@ -240,6 +241,6 @@ def _unsupported(problem: Problem) -> list[str]:
     """Constraints that are not equalities."""
     return [
         f"constraints[{number}], {type(term).__name__} (it is no equality)"
-        for number, term in enumerate(problem.constraints)
+        for number, term in enumerate(problem.stated)
         if not np.array_equal(term.lower, term.upper)
     ]

@@ -6,6 +6,8 @@ size, and the damping grows while steps alternate in direction.
 
 from __future__ import annotations
 
+import threading
+import time
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -26,6 +28,31 @@ REGULAR = 1e-3  # share of the measures' weight: weight of the motion itself
 DAMPING = 1e-3  # weight of the motion after a step opposed to the previous one, against goals of weight 1
 STIFFER, LOOSER = 4.0, 0.5  # factors on that, after another such step and after any other
 MOST_DAMPING = 10.0
+FIRM = 1e-4  # m, rad: what must hold and is missed by less than this is no reason to prefer an earlier posture
+
+
+class Stopwatch(threading.local):
+    """Adds up the time that this thread spends within it.
+
+    Attributes:
+        seconds: so far, wall time.
+    """
+
+    def __init__(self) -> None:
+        """Begin at 0."""
+        self.seconds = self._began = 0.0
+
+    def __enter__(self) -> None:
+        """Begin to count."""
+        self._began = time.perf_counter()
+
+    def __exit__(self, *_: object) -> None:
+        """Add what went by."""
+        self.seconds += time.perf_counter() - self._began
+
+
+TOOL = Stopwatch()
+"""Runs while a tool computes, so that its time is told apart from what states problems to it and judges its steps."""
 
 
 class StepError(Exception):
@@ -59,12 +86,17 @@ class Settings(NamedTuple):
         iterations: most steps.
         longest: most that a joint or the root moves in one step [rad, m].
         decay: of the measures' weight from one step to the next.
+        best: whether the answer is the best posture of all, in place of the last one: for tools that may go in and do
+            not lead out again.
+        least: fewest steps before the goals count as met, for tools that get out of the way of what comes.
     """
 
     tolerance: float
     iterations: int
     longest: float
     decay: float
+    best: bool = False
+    least: int = 0
 
 
 class Iteration:
@@ -88,18 +120,27 @@ class Iteration:
         self.trace: list[TraceEntry] = []
         self.steps, self.rested, self.failure = 0, False, ""
         self._damping, self._last = 0.0, np.zeros(problem.scene.model.nv)
+        self._best, self._best_rank = self.q, (np.inf, np.inf)
 
     def go(self) -> None:
         """Iterate until everything is met, nothing moves, the tool fails, or steps or time run out."""
+        self._iterate()
+        if self._settings.best:
+            self.q = self._best
+
+    def _iterate(self) -> None:
         settings, model = self._settings, self._problem.scene.model
         enough, length = SHARE * settings.tolerance, 0.0
         while True:
             error, violation = self._look()
             self.trace.append(TraceEntry(error, violation, 0.0, length))
             self._control.tell(self.trace[-1])
-            if max(error, violation) <= enough and self._apart(enough):
+            if self._settings.best:
+                self._rank(error, violation)
+            early = self.steps < settings.least
+            if not early and max(error, violation) <= enough and self._lack(self.q) <= enough + COAL_ACCURACY:
                 return
-            if self.steps and length <= REST * settings.tolerance:
+            if self.steps and not early and length <= REST * settings.tolerance:
                 self.rested = True
                 return
             if self.steps == settings.iterations or self._control.over:
@@ -127,6 +168,19 @@ class Iteration:
         self._last = move
         return move
 
+    def _lack(self, q: Array) -> float:
+        """What the worst pair lacks of its clearance at a posture (nq,) [m]."""
+        clearances = self._problem.clearances
+        near = self._proximity.query(self._state.update(q), float(clearances.max(initial=0.0)))
+        return float((clearances[near.number] - near.distance).max(initial=0.0))
+
+    def _rank(self, error: float, violation: float) -> None:
+        """Keep the present posture if it is the best so far: least broken, then nearest; of equal ones the last."""
+        broken = max(violation, self._lack(self.q))
+        rank = (max(broken, self._settings.tolerance, FIRM), error)
+        if rank <= self._best_rank:
+            self._best, self._best_rank = self.q, rank
+
     def _look(self) -> tuple[float, float]:
         """The largest error of a goal and of a constraint, metres or radians."""
         state = self._state.update(self.q)
@@ -139,9 +193,3 @@ class Iteration:
             value = np.atleast_1d(term.value(state))
             violations.append(float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0)))
         return max(errors), max(violations)
-
-    def _apart(self, tolerance: float) -> bool:
-        """Whether all pairs keep their clearance."""
-        clearances = self._problem.clearances
-        near = self._proximity.query(self._state, float(clearances.max(initial=0.0)))
-        return bool((near.distance >= clearances[near.number] - tolerance - COAL_ACCURACY).all())

@@ -41,7 +41,7 @@ class Equipment:
         to: the segment that carries it.
         at: its placement in the segment's frame; as for `Scene.add`.
         rests_on: segments that it is not tested against.
-        color: red, green, blue and, if wanted, alpha, each from 0 to 1.
+        color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
         filling: the spheres that fill it, once `filled`.
     """
 
@@ -95,7 +95,7 @@ class Equipment:
             side: of the segment in the figure's zero posture, in which x is forward and y left.
             height: of the middle of the shape's bounding box above the segment's origin, metres.
             sideways: of its middle to the left (on the left and right side: forward) of the segment's origin, metres.
-            color: red, green, blue and, if wanted, alpha, each from 0 to 1.
+            color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
 
         Raises:
             UnknownNameError: the figure has no such segment, or there is no such side.

@@ -3,7 +3,8 @@
 The joints that move a goal are active. So is every joint of an equality (a held foot, a closed loop) that an active
 joint moves: without it the equality would lock the others. A joint beyond its limits is active, and one between two
 pieces that are too near at the start, because they need repair. A joint that a measure combines with others is active,
-because the measure would have no bound. All other joints stay where they start.
+because the measure would have no bound; a square of `Rhythm` does so only where one of its joints is active, because it
+is never less than zero. All other joints stay where they start.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ from wholebody.tasks.base import Constraint, Goal, Measure
 from wholebody.tasks.discomfort import Discomfort
 from wholebody.tasks.displacement import Displacement
 from wholebody.tasks.effort import Effort
+from wholebody.tasks.rhythm import Rhythm
 
-SEPARABLE = (Effort, Displacement, Discomfort)  # measures that are sums over joints
+SEPARABLE = (Effort, Displacement, Discomfort)  # measures that are sums over joints; `Rhythm` is one over its squares
 SAMPLES = 6  # postures at which the dependence of rows that are no wrenches on joints is tested
 NOTHING = 1e-9  # entries of a Jacobian below this are rounding
 STEPS = 200  # between a joint's limits, in the search for its least share of the measures
@@ -57,11 +59,12 @@ def active_joints(problem: Problem, lock: bool = True) -> ActiveJoints:
     for goal in problem.goals:
         moving |= _columns(goal, walk).any(axis=0)
     for measure in problem.measures:
-        if not isinstance(measure, SEPARABLE):
+        if not isinstance(measure, (*SEPARABLE, Rhythm)):
             moving |= _slopes(measure, walk)
     moving |= _out_of_limits(problem) | _too_near(problem)
     rows = [(term, _columns(term, walk), *_kinds(term, walk.start())) for term in problem.constraints]
-    moving = _closed(moving & ~frozen[joint_of], rows, frozen[joint_of])
+    squares = _squares(problem)
+    moving = _closed(moving & ~frozen[joint_of], rows, squares, frozen[joint_of])
     joints = np.zeros(model.njoints, dtype=bool)
     joints[joint_of[moving]] = True
     if not (lock and joints.any()):
@@ -69,17 +72,39 @@ def active_joints(problem: Problem, lock: bool = True) -> ActiveJoints:
         joints[0] = False
     locked = ~joints[joint_of] & ~frozen[joint_of]
     helpers = [type(term).__name__ for term, columns, equal, _ in rows if columns[~equal][:, locked].any()]
-    return ActiveJoints(joints, frozen, tuple(dict.fromkeys(helpers)), _excess(problem, locked))
+    kept = sum(value for places, value in squares if locked[places].any() and not joints[joint_of[places]].any())
+    return ActiveJoints(joints, frozen, tuple(dict.fromkeys(helpers)), _excess(problem, locked) + kept)
 
 
-def _closed(moving: Mask, rows: list[tuple[Constraint, Mask, Mask, Mask]], frozen: Mask) -> Mask:
-    """Add the joints of equalities that move already, and of inequalities that need repair, until none is new."""
+def _squares(problem: Problem) -> list[tuple[list[int], float]]:
+    """Places in the tangent and value at the start of each square of `Rhythm`."""
+    terms = [measure for measure in problem.measures if isinstance(measure, Rhythm)]
+    return [
+        (places, term.weight * weight * excess * excess)
+        for term in terms
+        for weight, excess, places, _ in term.parts(problem.start)
+    ]
+
+
+def _closed(
+    moving: Mask,
+    rows: list[tuple[Constraint, Mask, Mask, Mask]],
+    squares: list[tuple[list[int], float]],
+    frozen: Mask,
+) -> Mask:
+    """Add joints until none is new.
+
+    They are those of equalities and squares that move already, and of inequalities that need repair.
+    """
     while True:
         before = moving.copy()
         for _, columns, equal, broken in rows:
             for row in np.flatnonzero(equal | broken):
                 if broken[row] or (columns[row] & moving).any():
                     moving |= columns[row] & ~frozen
+        for places, _ in squares:
+            if moving[places].any():
+                moving[places] |= ~frozen[places]
         if (moving == before).all():
             return moving
 

@@ -151,7 +151,9 @@ class EmbeddedBound(Bound):
         return np.asarray(low)[self.embedding.idx_v], np.asarray(high)[self.embedding.idx_v]
 
 
-def restated_term(term: _T, scene: Surroundings, start: Array, embedding: Embedding) -> Term | None:
+def restated_term(
+    term: Term, scene: Surroundings, start: Array, embedding: Embedding, *, holds: bool = False
+) -> Term | None:
     """The term on the smaller figure: resolved anew if that gives the same function, otherwise embedded.
 
     Rows of a constraint that no joint moves, and that hold, are dropped; None if all rows are dropped.
@@ -161,9 +163,10 @@ def restated_term(term: _T, scene: Surroundings, start: Array, embedding: Embedd
         scene: of the smaller figure.
         start: (small nq,).
         embedding: of the smaller in the whole figure.
+        holds: whether a term that is a goal and a constraint stands among the constraints.
     """
     embedded: Term
-    if isinstance(term, Goal):
+    if isinstance(term, Goal) and not holds:
         embedded = EmbeddedGoal(term, embedding)
     elif isinstance(term, Constraint):
         embedded = EmbeddedConstraint(term, embedding)
@@ -178,6 +181,8 @@ def restated_term(term: _T, scene: Surroundings, start: Array, embedding: Embedd
         wanted, rows = _moving_rows(wanted)
         if not rows:
             return None
+    if term.touching:  # of the whole scene's pieces, which the smaller scene may leave out or enlarge
+        return embedded
     try:
         anew = term.resolve(scene, start)
         values = _values(anew, state, start)

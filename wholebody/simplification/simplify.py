@@ -49,6 +49,7 @@ class _Smaller:
 
     figure: Figure
     geometry: pin.GeometryModel
+    piece_owner: tuple[str, ...]
 
     @property
     def model(self) -> pin.Model:
@@ -87,7 +88,7 @@ def leave_out(problem: Problem, parts: Parts) -> Simplified:
     embedding = Embedding(whole.model, figure.model, problem.start)
     start = problem.start[embedding.idx_q]
     numbers, rigid = _moving_pairs(problem, geometry)
-    terms = _terms(problem, _Smaller(figure, geometry), start, embedding)
+    terms = _terms(problem, _Smaller(figure, geometry, whole.piece_owner), start, embedding)
     if parts.pairs:
         frozen = np.flatnonzero(part.frozen).tolist() if part is not None else []
         still = [dof for j in frozen for dof in _dofs(figure, whole.model.names[j])]
@@ -100,8 +101,9 @@ def leave_out(problem: Problem, parts: Parts) -> Simplified:
     kept = _kept_pieces(whole, numbers) if parts.pairs else list(range(geometry.ngeoms))
     small = _scene(whole, figure, geometry, kept, numbers, pieces)
     made = Problem(
-        small, start, goals=terms[0], constraints=[*terms[1], *terms[2]], measures=terms[3], clearance=problem.clearance
-    )
+        small, start, goals=terms[0], constraints=[*terms[1], *terms[2]], measures=terms[3],
+        clearance=problem.clearance, range_of_motion=False, balance=False,
+    )  # fmt: skip
     made.clearances = problem.clearances[numbers]
     made.measures_given = problem.measures_given
     return Simplified(made, problem, _left_out(problem, made, part, len(numbers), rigid, grown), embedding)
@@ -132,16 +134,22 @@ def _terms(
     problem: Problem, small: _Smaller, start: Array, embedding: Embedding
 ) -> tuple[list[Goal], list[Constraint], list[Bound], list[Measure]]:
     """Goals, constraints, bounds and measures on the smaller figure."""
-    if small.figure is problem.scene.figure:
-        return list(problem.goals), list(problem.constraints), list(problem.bounds), list(problem.measures)
+    same = small.figure is problem.scene.figure
 
-    def restated(terms: tuple[Term, ...]) -> list[Term]:
-        found = [restated_term(term, small, start, embedding) for term in terms]
+    def restated(terms: tuple[Term, ...], *, holds: bool = False) -> list[Term]:
+        found = [
+            term if same and not term.touching else restated_term(term, small, start, embedding, holds=holds)
+            for term in terms
+        ]
         return [term for term in found if term is not None]
 
+    if same:
+        goals, constraints = restated(problem.goals), restated(problem.constraints, holds=True)
+        return goals, constraints, list(problem.bounds), list(problem.measures)  # type: ignore[return-value]
     bounds = tuple(bound for bound in problem.bounds if not isinstance(bound, Freeze))  # frozen joints are locked
     return (
-        restated(problem.goals), restated(problem.constraints), restated(bounds), restated(problem.measures),
+        restated(problem.goals), restated(problem.constraints, holds=True),
+        restated(bounds), restated(problem.measures),
     )  # type: ignore[return-value]  # fmt: skip
 
 

@@ -8,17 +8,13 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from wholebody.checks import shown
-from wholebody.errors import UnknownNameError
+from wholebody.checks import FAR, color, shown, slipped
+from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
 from wholebody.taskfile.where import Where
 from wholebody.tasks.inputs import FARTHEST
 
-FAR = 1e15
-"""Values beyond this get no hint at a wrong unit."""
-
 _SLIPS = {
-    "m": ((0.01, "centimetres"), (0.001, "millimetres")),
     "rad": ((math.pi / 180.0, "degrees"),),
     "kg": ((0.001, "grams"),),
 }
@@ -72,6 +68,8 @@ class Number(Kind):
         return value if self.whole else float(value)
 
     def _slip(self, value: float) -> str:
+        if self.unit == "m":
+            return slipped(value, self.low, self.high) or "; change it"
         for factor, unit in _SLIPS.get(self.unit, ()):
             if abs(value) < FAR and self.low <= value * factor <= self.high:
                 return f"; if it is in {unit}, write {value * factor:.6g}"
@@ -117,6 +115,23 @@ class Placement(Kind):
         if isinstance(value, list) and len(value) == 3:
             return POSITION.read(value, where)
         raise where.fault(f"{shown(value)} is no place; write {self.words}")
+
+
+@dataclass(frozen=True)
+class Color(Kind):
+    """Numbers, a name or a hexadecimal code."""
+
+    @property
+    def words(self) -> str:
+        """The three ways of writing it."""
+        return 'red, green, blue and, if given, alpha, each from 0 to 1; a name such as "steelblue"; or "#rrggbb"'
+
+    def read(self, value: Any, where: Where) -> tuple[float, float, float, float]:
+        """Return red, green, blue and alpha."""
+        try:
+            return color(tuple(value) if isinstance(value, list) else value, "color")
+        except InputError:
+            raise where.fault(f"{shown(value)} is not {self.words}; write one of these") from None
 
 
 @dataclass(frozen=True)
@@ -253,3 +268,4 @@ FRAME = Name("frame", lambda figure: {*figure.frames, *figure.segments, *figure.
 SEGMENT = Name("segment", lambda figure: figure.segments)
 POSTURE = Name("posture", lambda figure: figure.postures)
 CONE = Name("reach cone", lambda figure: figure.cones)
+RANGE = Name("range of motion", lambda figure: figure.ranges)

@@ -10,7 +10,7 @@ from wholebody.taskfile.things import FIGURES, SHAPES
 
 _THING = (
     Key("at", PLACEMENT, "its placement; the origin if left out"),
-    Key("color", kinds.Several(Number(0.0, 1.0), 3), "red, green, blue and, if given, alpha"),
+    Key("color", kinds.Color(), "of the thing; chosen by the viewer if left out"),
 )
 
 _BODY = (
@@ -28,6 +28,8 @@ TOP = (
         kinds.Several(kinds.Several(kinds.Text(), 2), example='[["right_hand", "table"]]'),
         "pairs of segments or objects whose clearance is 0",
     ),
+    Key("range_of_motion", kinds.Flag(), "whether a person keeps ranges of motion and reach cones; true if left out"),
+    Key("balance", kinds.Flag(), "whether the centre of mass stays above the feet; if left out, where a person stands"),
 )
 
 TABLES = {
@@ -55,7 +57,12 @@ TABLES = {
     ),
     "attach": Table(
         "A thing that the figure carries.",
-        (Key("name", kinds.Text(), "of the thing", True), Key("to", FRAME, "the frame that carries it", True), *_THING),
+        (
+            Key("name", kinds.Text(), "of the thing", True),
+            Key("to", FRAME, "the frame that carries it", True),
+            Key("rests_on", kinds.Several(kinds.Text()), "more segments and carried things that it may touch"),
+            *_THING,
+        ),
         True,
         "shape",
         forms=SHAPES,

@@ -109,6 +109,8 @@ def task_from(contents: Contents, file: Path) -> Task:
             measures=terms["measure"] or None,
             clearance=top.values.get("clearance", 0.0),
             touching=top.values.get("touching", ()),
+            range_of_motion=top.values.get("range_of_motion", True),
+            balance=top.values.get("balance"),
         ),
     )
     method = contents.one("method")
@@ -164,9 +166,7 @@ def _scene(contents: Contents, figure: Figure) -> Scene:
     scene = Scene(figure)
     for entry in [*contents.tables.get("object", ()), *contents.tables.get("attach", ())]:
         options = dict(entry.values)
-        thing = {name: options.pop(name) for name in ("name", "at", "color", "to") if name in options}
-        if "color" in thing:
-            thing["color"] = _color(thing["color"], entry.where.at("color"))
+        thing = {name: options.pop(name) for name in ("name", "at", "color", "to", "rests_on") if name in options}
         thing |= _said(entry.where, lambda options=options: _body(options))  # type: ignore[misc]
         shape = _shape(entry, options)
         add: Callable[..., Scene] = scene.attach if "to" in thing else scene.add
@@ -222,13 +222,6 @@ def _view(contents: Contents, scene: Scene) -> View:
     return view
 
 
-def _color(parts: list[float], where: Where) -> tuple[float, float, float, float]:
-    if len(parts) > 4:
-        raise where.fault(f"has {len(parts)} parts; write red, green, blue and, if wanted, alpha")
-    red, green, blue, alpha = (*parts, 1.0)[:4]
-    return red, green, blue, alpha
-
-
 def _file(name: str, where: Where) -> Path:
     """A file that the task file names, relative to its folder."""
     path = where.file.parent / name
@@ -239,7 +232,8 @@ def _file(name: str, where: Where) -> Path:
 
 
 def _goal_name(entry: Entry) -> str:
-    moved = entry.values.get("frame", entry.values.get("target", "") if entry.name == "posture" else "")
+    named = ("frame", "part", "on", "hand", *(("target",) if entry.name == "posture" else ()))
+    moved = next((entry.values[key] for key in named if key in entry.values), "")
     return f"{entry.name} {moved}".strip()
 
 

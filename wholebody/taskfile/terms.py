@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import wholebody
@@ -21,6 +22,53 @@ def _number(allowed: Range) -> Number:
 def _weight(unit: str) -> Key:
     return Key("weight", WEIGHT, f"factor on its square [{unit}]; 1 if left out")
 
+
+_THING = kinds.Text()
+
+CONTACTS = {
+    "touch": Form(
+        "Bring a surface of the figure to that of a thing; they may slide along each other.",
+        (
+            Key("part", _THING, "a segment, a piece, or a frame whose origin touches", True),
+            Key("thing", _THING, "a thing, a piece such as chair:2, or another segment", True),
+            _weight("1/m^2"),
+        ),
+        tasks.Touch,
+    ),
+    "lean": Form(
+        "Lean a segment on a thing; a side of it faces the thing.",
+        (
+            Key("on", _THING, "the thing", True),
+            Key("part", kinds.SEGMENT, "the segment; thorax if left out"),
+            Key("side", DIRECTION, "in the segment's axes, towards the thing; backwards if left out"),
+            _weight("1/m^2, 1/rad^2"),
+        ),
+        tasks.Lean,
+    ),
+    "sit": Form(
+        "Sit on a thing, with the back at another.",
+        (
+            Key("on", _THING, "the seat: a thing or a piece of one", True),
+            Key("back", _THING, "what the trunk touches; none if left out"),
+            Key("pelvis", kinds.SEGMENT, "the segment that sits; pelvis if left out"),
+            Key("trunk", kinds.SEGMENT, "the uppermost segment that may touch the back; thorax if left out"),
+            _weight("1/m^2, 1/rad^2"),
+        ),
+        tasks.Sit,
+    ),
+    "grasp": Form(
+        "Take hold of a thing with a hand.",
+        (
+            Key("hand", kinds.Choice(("left", "right")), "the hand", True),
+            Key("thing", _THING, "what is taken", True),
+            Key("kind", kinds.Choice(("palm", "power", "pinch")), "flat on a face, around a bar, or by the fingertips"),
+            Key("side", DIRECTION, "where the face looks that a palm takes; to the hand's side if left out"),
+            _weight("1/m^2, 1/rad^2"),
+        ),
+        tasks.Grasp,
+    ),
+}
+"""Contacts; each is a goal and a constraint, by the table in which it stands."""
 
 GOALS = {
     "point": Form(
@@ -91,6 +139,7 @@ GOALS = {
         ),
         tasks.Posture,
     ),
+    **CONTACTS,
 }
 
 CONSTRAINTS = {
@@ -132,6 +181,22 @@ CONSTRAINTS = {
         (Key("names", kinds.Several(kinds.CONE), "which cones; all if left out"),),
         tasks.ReachCones,
     ),
+    "range_of_motion": Form(
+        "Keep two-joint muscles, upper arms and neck within their ranges.",
+        (Key("names", kinds.Several(kinds.RANGE), "which ranges; all if left out"),),
+        tasks.RangeOfMotion,
+    ),
+    "stand": Form(
+        "Stand with flat soles on a thing; the feet may slide, and the centre of mass stays over them.",
+        (
+            Key("on", _THING, "what the figure stands on", True),
+            Key("feet", kinds.Several(kinds.SEGMENT), "segments whose soles stand; both feet if left out"),
+            Key("balance", kinds.Flag(), "false for who also sits, leans or holds on; true if left out"),
+            Key("margin", Number(0.0, 0.5, "m"), "distance from the edges of the polygon; 0 if left out"),
+        ),
+        tasks.Stand,
+    ),
+    **{name: replace(form, keys=form.keys[:-1]) for name, form in CONTACTS.items()},  # a constraint has no weight
 }
 
 MEASURES = {
@@ -140,6 +205,9 @@ MEASURES = {
         "Distance of joints from neutral, and nearness to their limits.", (_weight("no unit"),), tasks.Discomfort
     ),
     "displacement": Form("Displacement from the neutral posture.", (_weight("1/rad^2"),), tasks.Displacement),
+    "rhythm": Form(
+        "How clavicles follow the arms, and the lumbar spine the pelvis.", (_weight("no unit"),), tasks.Rhythm
+    ),
     "potential_energy": Form("Lifting and lowering of segments.", (_weight("1/J^2"),), tasks.PotentialEnergy),
 }
 

@@ -36,6 +36,19 @@ SHAPES = {
         (Key("radius", LENGTH, "around the segment", True), Key("length", LENGTH, "of the segment", True)),
         shapes.Capsule,
     ),
+    "cylinder": Form(
+        "A cylinder along z, centred.",
+        (Key("radius", LENGTH, "of the cylinder", True), Key("length", LENGTH, "along z", True)),
+        shapes.Cylinder,
+    ),
+    "torus": Form(
+        "A ring about z, centred, such as a steering wheel.",
+        (
+            Key("radius", LENGTH, "from the centre to the middle of the tube", True),
+            Key("tube", LENGTH, "radius of the tube; less than the radius", True),
+        ),
+        shapes.Torus,
+    ),
     "ellipsoid": Form(
         "An ellipsoid, centred.", (Key("semi_axes", kinds.Vector(3, LENGTH), "half lengths", True),), shapes.Ellipsoid
     ),

@@ -9,13 +9,19 @@ from wholebody.tasks.discomfort import Discomfort
 from wholebody.tasks.displacement import Displacement
 from wholebody.tasks.effort import Effort
 from wholebody.tasks.frame import Frame, Orientation
+from wholebody.tasks.grasp import Grasp
 from wholebody.tasks.hold import Hold
 from wholebody.tasks.plane import Plane
 from wholebody.tasks.point import Point
 from wholebody.tasks.posture import Posture
 from wholebody.tasks.potential_energy import PotentialEnergy
+from wholebody.tasks.range_of_motion import RangeOfMotion
 from wholebody.tasks.reach_cones import ReachCones
 from wholebody.tasks.relative import Relative
+from wholebody.tasks.rhythm import Rhythm
+from wholebody.tasks.sit import Sit
+from wholebody.tasks.stand import Stand
+from wholebody.tasks.touch import Lean, Touch
 
 __all__ = [
     "Axis",
@@ -29,15 +35,22 @@ __all__ = [
     "Frame",
     "Freeze",
     "Goal",
+    "Grasp",
     "Hold",
+    "Lean",
     "Measure",
     "Orientation",
     "Plane",
     "Point",
     "Posture",
     "PotentialEnergy",
+    "RangeOfMotion",
     "ReachCones",
     "Relative",
+    "Rhythm",
+    "Sit",
+    "Stand",
     "StepLimit",
     "Term",
+    "Touch",
 ]

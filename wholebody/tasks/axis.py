@@ -74,7 +74,7 @@ class Axis(Goal):
         where = f"Axis({shown(self.frame)})"
         if (self.direction is None) == (self.toward is None):
             raise InputError(f"{where} takes either a direction or a place to point toward; give one of the two")
-        object.__setattr__(self, "basis", _frame_about(inputs.direction(self.axis, f"{where}: axis")))
+        object.__setattr__(self, "basis", across(inputs.direction(self.axis, f"{where}: axis")))
         if self.direction is None:
             wanted = inputs.point(self.toward, f"{where}: toward")
         else:
@@ -145,7 +145,7 @@ class Axis(Goal):
         return min(atan2(sine, along) / sine, STEEPEST)
 
 
-def _frame_about(axis: Array) -> Array:
+def across(axis: Array) -> Array:
     """(3, 3) rows: two directions perpendicular to a unit vector, and the vector itself."""
     helper = np.zeros(3)
     helper[int(np.argmin(np.abs(axis)))] = 1.0

@@ -41,6 +41,10 @@ class Surroundings(Protocol):
     def geometry(self) -> Any:
         """The pin.GeometryModel with all pieces."""
 
+    @property
+    def piece_owner(self) -> tuple[str, ...]:
+        """The segment or thing that every piece is part of."""
+
 
 def filled(term: _T, **values: object) -> _T:
     """Copy of an immutable term with some of its fields set."""
@@ -52,6 +56,11 @@ def filled(term: _T, **values: object) -> _T:
 
 class Term:
     """Base of goals, constraints, bounds and measures."""
+
+    @property
+    def touching(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of segments and things that the term brings together: their clearance is zero; once resolved."""
+        return ()
 
     def resolve(self: _T, scene: Surroundings, start: Array) -> _T:
         """Copy of the term that is ready to be evaluated on the scene.

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from wholebody.bench.compare.advice import advice, choices, standings
-from wholebody.bench.compare.charts import curve, profile
+from wholebody.bench.compare.charts import curve, groups, performance
 from wholebody.bench.compare.front import OURS, front, fronts, time_to
+from wholebody.bench.compare.paired import best
+from wholebody.bench.compare.rankings import rankings, seeds_in_words, sensitivity
 from wholebody.bench.compare.record import ANSWERED, FAILED, REFUSED, Record
 from wholebody.bench.compare.results import QUANTITIES, Results
 from wholebody.bench.compare.summary import summaries
@@ -152,11 +154,64 @@ def test_refusals_are_left_out_of_shares_and_seen_in_counts() -> None:
     some = [record("x", number, 1e-4, 0.1 * (number + 1), 1e-6) for number in range(3)]
     some += [record("x", number, 1e-4, inf, inf, outcome=REFUSED, status="") for number in (3, 4)]
     made = results(some)
-    times, cases = profile(made, "s", "x", 1e-3)
-    assert (times, cases) == (pytest.approx([0.1, 0.2, 0.3]), 3)
     (row,) = summaries(made)
     assert (row.cases, row.refused, row.success) == (5, 2, 1.0)
     assert not row.dependable
+
+
+def test_performance_profiles_are_of_the_problems_that_all_took() -> None:
+    """By hand: problem 0 is b's by two, 1 is a's by ten, 2 is solved by a alone, 3 b refuses."""
+    times = {"a": (0.2, 0.1, 0.5, 0.1), "b": (0.1, 1.0, 0.1, 0.1)}
+    made = results(
+        *(
+            [
+                record(name, number, 1e-4, seconds, 0.5 if (name, number) == ("b", 2) else 1e-6)
+                for number, seconds in enumerate(listed)
+            ]
+            for name, listed in times.items()
+        ),
+    )
+    refused = record("b", 3, 1e-4, inf, inf, outcome=REFUSED, status="")
+    made = results(
+        [*(one for name in "ab" for one in made.default("s", name) if (name, one.number) != ("b", 3))], [refused]
+    )
+    found = performance(made, "s", ["a", "b"], 1e-3)
+    assert found["a"] == (pytest.approx([1.0, 1.0, 2.0]), 3)
+    assert found["b"] == (pytest.approx([1.0, 10.0]), 3)
+
+
+def test_a_chart_has_at_most_six_methods_and_further_ones_stand_beside_ours() -> None:
+    names = ["qp", "qp/daqp", "qp/osqp", "newton/slack", "newton/kkt", "ccd", "dls", "placo", "mink", "pink"]
+    found = groups(names)
+    assert all(len(group) <= 6 and group[0] == "qp" for group in found)
+    assert found[0] == ("qp", "newton/slack", "ccd", "dls", "placo", "mink")
+    assert {name for group in found for name in group} == set(names)
+    assert groups(["a", "b"]) == [("a", "b")]
+    assert groups([]) == []
+
+
+def test_nobody_is_the_fastest_of_four_problems() -> None:
+    few = {("s", number): 0.1 for number in range(4)}
+    assert best({"a": few, "b": dict.fromkeys(few, 9.0)}) == ("a", "b")
+    many = {("s", number): 0.1 for number in range(9)}
+    assert best({"a": many, "b": dict.fromkeys(many, 9.0)}) == ("a",)
+
+
+def test_methods_that_differ_are_ranked_and_seeds_that_matter_are_named() -> None:
+    def made(name: str, seconds: float, fails: int = 99) -> list[Record]:
+        return [
+            record(name, number, 1e-4, seconds * (1 + 0.01 * number), 0.5 if number % 3 == fails else 1e-6)
+            for number in range(30)
+        ]
+
+    found = results(made("fast", 0.1), made("slow", 0.4), made("uneven", 0.1, fails=1))
+    (one,) = rankings(found)
+    assert one.ranking is not None
+    assert one.ranking.methods[0] == "fast"
+    assert one.ranking.cases == 30
+    rows = sensitivity(found)
+    assert [row.method for row in rows if row.differs] == ["uneven"]
+    assert "`uneven` in a set (10 of 10, 0 of 10, 10 of 10)" in seeds_in_words(rows, {"s": "a set"})
 
 
 def test_advice_names_the_dependable_and_the_fast() -> None:

@@ -18,4 +18,6 @@ def test_what_a_method_compiles_is_not_taken_for_what_its_solves_cost(fakes: Mod
     assert not chunk.fault
     assert chunk.spent["sleeps"] >= 0.4
     assert chunk.spent["compiles"] < 1.5  # which it takes to compile
+    assert chunk.cold["compiles"] >= 1.5  # the first time in its process
+    assert 0.0 < chunk.kernel < 5.0
     assert [record.outcome for record in chunk.records] == ["answered", "answered", "failed"]

@@ -68,16 +68,38 @@ def test_every_solve_is_in_the_table(folder: Path) -> None:
 
 
 def test_charts_are_there_in_both_kinds(folder: Path) -> None:
-    for name in ("compare-arm", "compare-arm-profile"):
+    for name, label in (
+        ("compare-arm", "time of a solve [ms]"),
+        ("compare-arm-profile", "time over that of the fastest method"),
+        ("compare-overview", "solved [%]"),
+    ):
         assert (folder / "out" / "charts" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-        assert "time of a solve [ms]" in (folder / "out" / "charts" / f"{name}.svg").read_text()
+        assert label in (folder / "out" / "charts" / f"{name}.svg").read_text()
+
+
+def test_every_set_and_every_method_has_a_page(folder: Path) -> None:
+    pages = {path.name: path.read_text() for path in (folder / "out" / "pages").iterdir()}
+    assert set(pages) == {"set-arm.html", *(f"method-{name}.html" for name in ("solves", "lies", "refuses", "hangs"))}
+    assert "100.0 [34, 100]" in pages["set-arm.html"]  # two of two, by Wilson
+    assert pages["set-arm.html"].count("<svg") == 2
+    assert "A fake that lies. It lies." in pages["method-lies.html"]
+    for text in pages.values():
+        assert not FETCHED.search(text)
+        assert all(name in pages for name in re.findall(r'href="([^"]+\.html)"', text))
+
+
+def test_the_report_has_intervals_and_names_no_winner_of_two_problems(folder: Path) -> None:
+    page = (folder / "out" / publishing.PAGE).read_text()
+    assert "100.0 % [34, 100]" in page
+    assert "fewer than three methods share five problems, so nobody is ranked" in page
+    assert "differs between the seeds by more than chance" in page
 
 
 def test_the_report_asks_the_network_for_nothing(folder: Path) -> None:
     page = (folder / "out" / publishing.PAGE).read_text()
     shown = re.sub(r'<script id="[^"]*" type="application/octet-stream">[^<]*</script>', "", page)
     assert not FETCHED.search(shown)
-    assert shown.count("<svg") == 2
+    assert shown.count("<svg") == 3
 
 
 def test_names_within_the_charts_do_not_meet(folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import daqp
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -98,3 +99,20 @@ def test_the_scaled_form_is_the_same_program(program):
     rows = form.matrix @ scaled
     assert rows[:m] == pytest.approx(form.lower[:m], abs=1e-9 * (1.0 + np.abs(form.lower[:m]).max(initial=0.0)))
     assert (rows[m:] >= form.lower[m:] - 1e-9 * np.abs(form.lower[m:]) - 1e-12).all()
+
+
+def test_daqp_may_refuse_a_program(monkeypatch):
+    """It did where five joints were frozen and two holds contradicted each other (-6: too many equalities)."""
+
+    class Refusing:
+        def setup(self, *_):
+            return -6, 0.0
+
+    monkeypatch.setattr(daqp, "Model", Refusing)
+    program = QuadraticProgram(
+        np.ones(2), np.array([-1.0, 2.0]), np.eye(2)[:1], np.array([0.1]), np.array([3.0]), np.array([[1.0, 1.0]]),
+        np.array([0.2]), np.array([1e4]), np.full(2, -0.5), np.full(2, 0.5),
+    )  # fmt: skip
+    answer = make_solver("daqp").solve_cold(program)
+    assert answer.by != "daqp"
+    assert answer.x == pytest.approx(make_solver("quadprog").solve_cold(program).x, abs=1e-9)

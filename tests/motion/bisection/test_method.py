@@ -20,6 +20,7 @@ from wholebody.motion.clip import Clip
 from wholebody.motion.ready_equipment import equipment
 
 DEEP = 1e-4  # m
+SPREAD = 0.15  # rad: with less, hanging hands are in the thighs
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +36,8 @@ def swing(person: Figure) -> Clip:
         person.with_joints(
             person.neutral,
             {
+                "left_shoulder_abduction": SPREAD,
+                "right_shoulder_abduction": SPREAD,
                 "left_shoulder_flexion": 0.5 * np.sin(t),
                 "right_shoulder_flexion": -0.5 * np.sin(t),
                 "left_elbow_flexion": 0.4 + 0.3 * np.sin(t),

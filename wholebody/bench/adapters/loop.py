@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import operator
 import time
 from abc import ABC, abstractmethod
-from typing import ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
+
+import numpy as np
 
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
 from wholebody.methods import differential
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError, named_terms, refusal
 from wholebody.methods.conclusion import Ending, concluded
@@ -17,10 +21,13 @@ from wholebody.methods.differential import Iteration, Settings
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
-STEP = 0.025  # rad, m: most that anything moves in one iteration; twice that leaves pink no solution more often
-NEAR = 0.1  # m: pairs nearer than this have a row, where a tool has such a setting
-GAIN = 1.0  # share of what is free of a gap that may be used up in one iteration; with less, held feet cannot come back
+NEAR = 0.1  # of the size of a figure: pairs nearer than this have a row, where a tool has such a setting
+SHARE = 0.5  # of the room that a pair has at the start: most of its margin
+QUARTERS = 4  # margins that differ by less than this part of the largest are one: tools have a class for each value
 ITERATIONS = 200  # most, where nothing else is said
+STEPS = 10  # fewest of a frame where things move: rows keep what is beyond a clearance, and ask for the goal beside
+ROOM = 0.02  # m: pairs keep at least this beyond their clearances where things move: pink's default
+AHEAD = 1.5  # times as far as a thing moved in a frame, pairs keep beyond their clearances
 DECAY = 0.6  # of the measures' weight from one iteration to the next
 
 
@@ -39,8 +46,12 @@ class Pull(NamedTuple):
 class Stepper(differential.Stepper, Protocol):
     """A tool, set up for one problem."""
 
-    def begin(self) -> None:
-        """State the problem's present goals, constraints and places of objects by the tool's classes."""
+    def begin(self, room: float) -> None:
+        """State the problem's present goals, constraints and places of objects by the tool's classes.
+
+        Args:
+            room: beside things that move, what pairs keep beyond their clearances [m]; 0 where nothing moves.
+        """
 
 
 class Loop(ABC):
@@ -50,9 +61,14 @@ class Loop(ABC):
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most steps.
         kinds: terms that the tool can express, besides holds of whole frames.
+        longest: most that anything moves in one step, radians and shares of the figure's size.
+        margin: most that a pair keeps beyond its clearance, as a share of the figure's size: 1 mm for a person. Less
+            fits into narrower gaps, more is against what linearised rows leave out.
     """
 
     name: str
+    longest: ClassVar[float] = 0.05
+    margin: ClassVar[float] = 7e-4
     kinds: ClassVar[tuple[type, ...]] = (
         wb.CenterOfMass, wb.Displacement, wb.Effort, wb.Frame, wb.Freeze, wb.Orientation, wb.Point, wb.Posture,
         wb.Relative, wb.StepLimit,
@@ -63,7 +79,9 @@ class Loop(ABC):
         if not 1e-10 <= tolerance <= 0.1:
             raise InputError(f"tolerance is {tolerance}; give metres from 1e-10 to 0.1")
         self.tolerance, self.iterations = tolerance, ITERATIONS if iterations is None else iterations
-        self._built: tuple[Problem, Stepper] | None = None
+        self._built: tuple[tuple[Any, ...], Stepper] | None = None
+        self._places: Array | None = None
+        self._kept = 0.0
 
     @abstractmethod
     def build(self, problem: Problem) -> Stepper:
@@ -83,8 +101,10 @@ class Loop(ABC):
         refused = self._unsupported(problem)
         if refused:
             raise UnsupportedTermError(self.name, refused)
-        if self._built is None or self._built[0] is not problem:
-            self._built = (problem, self.build(problem))
+        asked = problem.scene, problem.goals, problem.constraints, problem.bounds, problem.measures, problem.clearances
+        same = self._built is not None and all(map(operator.is_, self._built[0], asked))
+        if not same:  # another start alone needs no other model
+            self._built = (asked, self.build(problem))
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture.
@@ -99,14 +119,28 @@ class Loop(ABC):
         began = time.perf_counter()
         self.prepare(problem)
         assert self._built is not None
-        stepper, settings = self._built[1], Settings(self.tolerance, self.iterations, STEP, DECAY)
+        stepper, room = self._built[1], self._room(problem)
+        longest = self.longest * max(1.0, size(problem.scene.figure))  # the tool bounds turns and lengths apart
+        settings = Settings(self.tolerance, self.iterations, longest, DECAY, best=True)
+        if room:
+            settings = settings._replace(best=False, least=min(STEPS, self.iterations))
         with problem.borrow() as workspace, Control(None, progress) as control:
-            stepper.begin()
+            stepper.begin(room)
             run = Iteration(problem, workspace, stepper, settings, control)
             run.go()
         failure = f"{self.name} gave up at step {run.steps} ({run.failure})" if run.failure else ""
         ending = Ending(run.q, run.rested, run.steps, tuple(run.trace), f"in {run.steps} steps", "steps", failure)
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+
+    def _room(self, problem: Problem) -> float:
+        """What to keep beyond clearances because things move [m]: as far as one moved since the last solve, or more."""
+        places = np.array([piece.placement.translation for piece in problem.scene.geometry.geometryObjects])
+        before, self._places = self._places, places
+        if before is None or before.shape != places.shape:
+            return self._kept
+        moved = float(np.linalg.norm(places - before, axis=1).max(initial=0.0))
+        self._kept = max(self._kept, ROOM, AHEAD * moved) if moved else self._kept
+        return self._kept
 
     def accepts(self, problem: Problem) -> str | None:
         """None where the tool can express all terms; else the sentence that names those that it cannot."""
@@ -137,8 +171,61 @@ def pulls(problem: Problem) -> list[Pull]:
     return found
 
 
-def kept_apart(problem: Problem) -> list[tuple[int, int, float]]:
-    """Pairs that can move against each other, as two pieces and the clearance asked of them [m].
+def size(figure: Figure) -> float:
+    """Length of the longest chain of joints and frames from the root, metres; a person's is 1 to 2 m.
+
+    What tools bound or look for in metres is given to them as shares of it: 10 cm is far for a hand and near for a
+    crane.
+    """
+    model = figure.model
+    there = np.zeros(model.njoints)
+    for index in range(1, model.njoints):
+        parent = model.parents[index]
+        here = model.jointPlacements[index].translation if parent else np.zeros(3)  # where it stands is no length
+        there[index] = there[parent] + float(np.linalg.norm(here))
+    tips = [there[frame.parentJoint] + float(np.linalg.norm(frame.placement.translation)) for frame in model.frames]
+    return max([*there, *tips], default=0.0) or 1.0
+
+
+def margins(problem: Problem, most: float) -> Array:
+    """What each pair keeps beyond its clearance (pairs,) [m]: at most so much, and no more than the start allows.
+
+    Rows are linear, and steps have a length: a pair that is asked for its clearance exactly ends nearer. One that rests
+    at its clearance has no margin.
+    """
+    found = np.full(len(problem.clearances), most)
+    if most <= 0.0:
+        return found
+    reach = float(problem.clearances.max(initial=0.0)) + most / SHARE
+    with problem.borrow() as workspace:
+        near = workspace.near(problem.scene.figure.clamp(problem.start), reach)
+        room = near.distance - problem.clearances[near.number]
+        found[near.number] = np.clip(SHARE * room, 0.0, most)
+    return np.floor(QUARTERS * found / most) * most / QUARTERS
+
+
+def longest_moves(figure: Figure, longest: float) -> Array:
+    """Most that each degree of freedom moves in one step (nv,), radians and metres."""
+    model, found = figure.model, np.full(figure.model.nv, longest)
+    for joint in list(model.joints)[1:]:
+        if joint.shortname().startswith("JointModelP"):
+            found[joint.idx_v] = longest * size(figure)
+    return found
+
+
+class Pair(NamedTuple):
+    """Two pieces, the clearance asked of them and the margin beyond it [m]."""
+
+    first: int
+    second: int
+    clearance: float
+    margin: float
+
+
+def kept_apart(problem: Problem, margin: float, held: bool = True) -> list[Pair]:
+    """Pairs that can move against each other, with margins of at most `margin` metres.
+
+    `held` says whether hard tasks hold what the problem holds.
 
     A foot that a hard task holds stands on the floor as it does at the start. Its pair and its task would ask for the
     same to first order and for different things to second order, which leaves a program no solution.
@@ -146,11 +233,16 @@ def kept_apart(problem: Problem) -> list[tuple[int, int, float]]:
     pieces = problem.scene.geometry.geometryObjects
     still = {0}
     for term in problem.constraints:
-        if isinstance(term, wb.Hold) and term.relative_to is None and term.orientation:
+        if held and isinstance(term, wb.Hold) and term.relative_to is None and term.orientation:
             still.add(term.residual.place.joint)
-    pairs = zip(problem.scene.geometry.collisionPairs, problem.clearances.tolist(), strict=True)
+    pairs = zip(
+        problem.scene.geometry.collisionPairs,
+        problem.clearances.tolist(),
+        margins(problem, margin).tolist(),
+        strict=True,
+    )
     return [
-        (pair.first, pair.second, clearance)
-        for pair, clearance in pairs
+        Pair(pair.first, pair.second, clearance, margin)
+        for pair, clearance, margin in pairs
         if not {pieces[pair.first].parentJoint, pieces[pair.second].parentJoint} <= still
     ]

@@ -14,37 +14,47 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
-from wholebody.bench.adapters.loop import GAIN, NEAR, STEP, Loop, Stepper, kept_apart, pulls
+from wholebody.bench.adapters.loop import NEAR, Loop, Stepper, kept_apart, longest_moves, pulls, size
 from wholebody.bench.adapters.mjcf import ROOT, mjcf
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
 from wholebody.figures.figure import Figure
-from wholebody.methods.differential import StepError
+from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
+HOLDING = 10.0  # cost of what is held, where goals cost 1
+OUT = 0.1  # of the room beside things that move: what a pair that lacks it gains in one step
 COLLISION_GAIN = 0.5 * DT  # half of what is free of a gap may be used up in one step of a reach; see `MinkTool`
 
 
-def mink_adapter() -> Adapter:
-    """The kinematics of mink in our loop."""
+_DIFFERENCES = (
+    "mink drops pairs of a body and its parent body, and the root against all that is fixed to the world",
+    "mink has no Balance, Plane or ReachCones, and holds whole frames only",
+    "mink minimises Effort and Displacement only",
+    "its model is written for free roots, turning and sliding joints, and for all shapes but ellipsoids",
+)
+
+
+def mink_adapter(variant: str = "") -> Adapter:
+    """The kinematics of mink in our loop: holds as heavy soft tasks, or as equalities where the variant is "hard"."""
+    hard = variant == "hard"
+    loop = HardMinkLoop if hard else MinkLoop
+    holds = "whole holds as equality constraints" if hard else f"whole holds as soft ones of cost {HOLDING:g}"
+    more = "pairs that equality constraints keep in place are left out, since their rows leave mink no solution"
     return Adapter(
-        name="mink",
-        make=MinkLoop,
-        prepare=MinkLoop.prepare,
+        name=loop.name,
+        make=loop,
+        prepare=loop.prepare,
         loose=(*few(5, 10, 20), *LADDER),
         setup="mink.solve_ik on a MuJoCo model made from ours, with DAQP: FrameTask, RelativeFrameTask, AxisAlignTask, "
-        "LookAtTask, ComTask and PostureTask (posture and measures, with a weight that fades) as soft tasks, whole "
-        "holds and DofFreezingTask as hard ones, ConfigurationLimit, VelocityLimit and FreeJointVelocityLimit of "
-        f"{STEP} rad or m a step, a CollisionAvoidanceLimit for every clearance that occurs, within {NEAR} m, gain "
-        f"{GAIN} a step; one start, at most 200 steps, the loop of our adapter to placo. Building its model is set-up.",
-        differences=(
-            "mink drops pairs of a body and its parent body, and the root against all that is fixed to the world",
-            "pairs that hard tasks keep in place are left out, since their rows leave mink no solution",
-            "mink has no Balance, Plane or ReachCones, and holds whole frames only",
-            "mink minimises Effort and Displacement only",
-            "its model is written for free roots, turning and sliding joints, and for all shapes but ellipsoids",
-        ),
+        f"LookAtTask, ComTask and PostureTask (posture and measures, with a weight that fades) as soft tasks, {holds}, "
+        f"DofFreezingTask, ConfigurationLimit, VelocityLimit and FreeJointVelocityLimit of {loop.longest} rad or, for "
+        "each metre of the figure, m a step, a CollisionAvoidanceLimit for every clearance that occurs, gain "
+        f"{loop.gain}; for each metre of the figure it looks {100 * NEAR:g} cm far and keeps {1e3 * loop.margin:g} mm "
+        "more than the clearance, less where the start has less room; one start, at most 200 steps, the loop of our "
+        "adapter to placo. Building its model is set-up.",
+        differences=(*_DIFFERENCES, more) if hard else _DIFFERENCES,
     )
 
 
@@ -53,16 +63,29 @@ class MinkLoop(Loop):
 
     name = "mink"
     kinds = (*Loop.kinds, wb.Axis)
+    hard: ClassVar[bool] = False
+    gain: ClassVar[float] = 0.85  # share of what is free of a gap that may be used up in one step: mink's default
 
     def build(self, problem: Problem) -> Stepper:
         """Write the model."""
-        return _MinkStepper(problem)
+        return _MinkStepper(problem, type(self))
+
+
+class HardMinkLoop(MinkLoop):
+    """The same with holds as equality constraints, mink's `constraints`."""
+
+    name = "mink/hard"
+    hard = True
+    longest = 0.025
+    margin = 0.0  # rows that ask for room beside a foot that cannot move leave a program no solution
+    gain = 1.0  # with less, what is held cannot come back
 
 
 class _MinkStepper:
-    def __init__(self, problem: Problem) -> None:
-        self._problem = problem
+    def __init__(self, problem: Problem, loop: type[MinkLoop]) -> None:
+        self._problem, self._loop, self._longest, self._holds_hard = problem, loop, loop.longest, loop.hard
         self._sites: dict[str, tuple[int, Any]] = {}
+        self._room = 0.0
         for term in (*problem.goals, *problem.constraints):
             if isinstance(term, wb.Point):
                 self._site(term.place, term.resolved_offset)
@@ -73,17 +96,21 @@ class _MinkStepper:
                 self._site(term.residual.base)
         self._compile()
 
-    def begin(self) -> None:
+    def begin(self, room: float) -> None:
         """Make the tasks anew, and the model where objects moved since it was made."""
         import mink
 
         problem, scene = self._problem, self._problem.scene
-        if not np.array_equal(self._places(), self._placed):
+        if room != self._room or not np.array_equal(self._places(), self._placed):
+            self._room = room
             self._compile()
         model = self._mujoco
         self._points: list[tuple[Any, str, Array]] = []
         self._tasks = [self._goal(goal) for goal in problem.goals]
-        self._hard = [self._placement(term.residual, 1.0) for term in problem.constraints if isinstance(term, wb.Hold)]
+        cost = 1.0 if self._holds_hard else HOLDING
+        holds = [self._placement(term.residual, cost) for term in problem.constraints if isinstance(term, wb.Hold)]
+        self._hard = holds if self._holds_hard else []
+        self._tasks += [] if self._holds_hard else holds
         frozen = [bound for bound in problem.bounds if isinstance(bound, wb.Freeze)]
         if frozen:
             dofs = {self._dof[dof] for bound in frozen for dof in scene.figure.dofs(bound.joints).tolist()}
@@ -96,18 +123,20 @@ class _MinkStepper:
         """One `solve_ik`, with a time step of one second."""
         import mink
 
-        configuration = self._configuration
-        configuration.update(self._order.theirs(q))
+        configuration, theirs = self._configuration, self._order.theirs(q)
+        with TOOL:
+            configuration.update(theirs)
         for task, site, place in self._points:
             turn = configuration.get_transform_frame_to_world(site, "site").rotation()
             task.set_target(mink.SE3.from_rotation_and_translation(turn, place))
         for task, share in self._comfort:
             task.set_cost(weight**0.5 * share)
         try:
-            velocity = mink.solve_ik(
-                configuration, [*self._tasks, *(task for task, _ in self._comfort)], 1.0, solver="daqp",
-                damping=damping, limits=self._limits, constraints=self._hard or None,
-            )  # fmt: skip
+            with TOOL:
+                velocity = mink.solve_ik(
+                    configuration, [*self._tasks, *(task for task, _ in self._comfort)], 1.0, solver="daqp",
+                    damping=damping, limits=self._limits, constraints=self._hard or None,
+                )  # fmt: skip
         except mink.NoSolutionFound as error:
             raise StepError(f"{type(error).__name__}: its program has no solution") from None
         return np.asarray(velocity, dtype=float)[self._dof]
@@ -152,23 +181,28 @@ class _MinkStepper:
         figure = problem.scene.figure
         self._order = _Order(figure, model)
         self._dof = self._order.dof
+        most, reach = longest_moves(figure, self._longest), size(figure)
         limits = [
             mink.ConfigurationLimit(model, gain=1.0),
-            mink.VelocityLimit(model, dict.fromkeys(figure.joints, STEP)),
+            mink.VelocityLimit(model, {name: float(most[figure.dofs([name])[0]]) for name in figure.joints}),
         ]
         if figure.root == "free":
-            limits.append(mink.FreeJointVelocityLimit(model, STEP, STEP, joint_name=ROOT))
+            limits.append(mink.FreeJointVelocityLimit(model, self._longest * reach, self._longest, joint_name=ROOT))
         names = [piece.name for piece in problem.scene.geometry.geometryObjects]
-        groups: dict[float, list[Any]] = {}
-        for first, second, clearance in kept_apart(problem):
-            groups.setdefault(clearance, []).append(([names[first]], [names[second]]))
-        for clearance, pairs in groups.items():
+        pieces = problem.scene.geometry.geometryObjects
+        groups: dict[tuple[float, float], list[Any]] = {}
+        for pair in kept_apart(problem, self._loop.margin * reach, self._holds_hard):
+            room = 0.0 if pieces[pair.first].parentJoint and pieces[pair.second].parentJoint else self._room
+            asked = pair.clearance + max(pair.margin, room), room
+            groups.setdefault(asked, []).append(([names[pair.first]], [names[pair.second]]))
+        for (clearance, room), pairs in groups.items():
             apart = mink.CollisionAvoidanceLimit(
                 model,
                 pairs,
-                gain=GAIN,
+                gain=self._loop.gain,
                 minimum_distance_from_collisions=clearance,
-                collision_detection_distance=clearance + NEAR,
+                collision_detection_distance=clearance + NEAR * reach,
+                bound_relaxation=-OUT * room,  # without it, a pair that is nearer than it may be stays so
             )
             limits.append(apart)
         return limits

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -68,6 +70,24 @@ def qp_adapter(solver: str) -> Adapter:
         setup=f"wb.QP({said}), all else as it comes: {closes}; stages and seeded starts follow where the first "
         "descent does not reach the goals. Budgets of first fit are wb.QP(measures=False), those of "
         "few iterations have one descent only.",
+    )
+
+
+def one_start(family: str) -> Adapter:
+    """The entrant of "qp", "newton" or "ccd" that has one start, as methods have that know no other."""
+    known: dict[str, tuple[Adapter, Callable[..., Method], str]] = {
+        "qp": (qp_adapter(""), partial(QP, budget=0, restarts=0), "wb.QP(budget=0, restarts=0)"),
+        "newton": (newton_adapter("slack"), partial(wb.Newton, restarts=0), "wb.Newton(restarts=0)"),
+        "ccd": (ccd_adapter(), partial(wb.CCD, restarts=0), "wb.CCD(restarts=0)"),
+    }
+    adapter, kind, said = known[family]
+    return replace(
+        adapter,
+        name=f"{family}/one_start",
+        make=partial(made, kind, {}),
+        hindered=partial(kind, iterations=1),
+        loose=tuple(level for level in adapter.loose if level[1] != FIRST_FIT),
+        setup=f"{said}, all else as it comes; one start, and nothing after the descent from it.",
     )
 
 

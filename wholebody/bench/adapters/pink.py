@@ -14,16 +14,15 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
-from wholebody.bench.adapters.loop import GAIN, STEP, Loop, Stepper, kept_apart, pulls
+from wholebody.bench.adapters.loop import Loop, Stepper, kept_apart, longest_moves, pulls, size
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
-from wholebody.methods.differential import StepError
+from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
 from wholebody.tasks.residuals import PlacementResidual
 
-NEAREST = 60  # pairs that its barrier looks at in a solve; it gets slower with more, and loses contacts with fewer
-NEAREST_IN_STEPS = 20  # the same where time counts
+GAIN = 1.0  # share of what is free of a gap that may be used up in one iteration; with less, held feet cannot come back
+NEAREST = 20  # pairs that its barrier looks at; it gets slower with more
 BARRIER_GAIN = 0.5 / DT  # 1/s: half of what is free of a gap may be used up in one step of a reach
-MARGIN = 1e-3  # m: kept beyond the clearance, since inside its barrier pulls the wrong way
 
 
 def pink_adapter() -> Adapter:
@@ -35,15 +34,16 @@ def pink_adapter() -> Adapter:
         loose=(*few(5, 10, 20), *LADDER),
         setup="pink.solve_ik on our own Pinocchio model, with DAQP: FrameTask, RelativeFrameTask, ComTask and "
         "LinearHolonomicTask (posture and measures, with a weight that fades) as soft tasks, whole holds and frozen "
-        f"joints as hard ones, ConfigurationLimit, VelocityLimit and FloatingBaseVelocityLimit of {STEP} rad or m a "
-        f"step, SelfCollisionBarrier with the {NEAREST} nearest pairs, gain {GAIN} a step, no safe displacement, d_min "
-        "1 mm more than the clearance; one start, at most 200 steps, the loop of our adapter to placo.",
+        f"joints as hard ones, ConfigurationLimit, VelocityLimit and FloatingBaseVelocityLimit of {PinkLoop.longest} "
+        f"rad or, for each metre of the figure, m a step, SelfCollisionBarrier with the {NEAREST} nearest pairs, gain "
+        f"{GAIN} a step, no safe displacement, d_min {1e3 * PinkLoop.margin:g} mm for each metre of the figure more "
+        "than the clearance; one start, at most 200 steps, the loop of our adapter to placo.",
         differences=(
             f"pink's barrier takes the {NEAREST} nearest pairs, whatever their distance",
             "pink's barrier has one least distance for all pairs: those that begin nearer are left out, but for those "
             "with a half-space, which is lowered",
             "pairs that hard tasks keep in place are left out, since their rows leave pink no solution",
-            "inside of something pink's barrier pulls deeper, so 1 mm more than the clearance is kept",
+            "inside of something pink's barrier pulls deeper, so a margin is kept",
             "pink has no task for Axis, no Balance, Plane or ReachCones, and holds whole frames only",
             "pink minimises Effort and Displacement only",
         ),
@@ -54,14 +54,16 @@ class PinkLoop(Loop):
     """Steps of pink."""
 
     name = "pink"
+    longest = 0.025  # twice that leaves pink no solution more often
+    margin = 3.5e-4
 
     def build(self, problem: Problem) -> Stepper:
         """Copy our models."""
-        return _PinkStepper(problem)
+        return _PinkStepper(problem, self.longest, self.margin * size(problem.scene.figure))
 
 
 class _PinkStepper:
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, longest: float, margin: float) -> None:
         from pink.limits import FloatingBaseVelocityLimit
 
         self._problem, figure = problem, problem.scene.figure
@@ -69,14 +71,15 @@ class _PinkStepper:
         for goal in problem.goals:
             if isinstance(goal, wb.Point):
                 _offset_frame(model, goal)
-        model.velocityLimit = np.full(model.nv, STEP)
+        model.velocityLimit = longest_moves(figure, longest)
         if figure.root == "free":
-            model.floating_base_velocity_limit = FloatingBaseVelocityLimit(model, None, STEP, STEP)
+            root = FloatingBaseVelocityLimit(model, None, longest * size(figure), longest)
+            model.floating_base_velocity_limit = root
         self._data = model.createData()
-        self._least = problem.clearance + MARGIN
+        self._least = problem.clearance + margin
         self._geometry, self._pieces = _geometry(problem, self._least)
 
-    def begin(self) -> None:
+    def begin(self, room: float) -> None:
         """Make the tasks anew."""
         from pink.barriers import SelfCollisionBarrier
 
@@ -96,7 +99,7 @@ class _PinkStepper:
             self._comfort.append((self._joints(pull.reference, dofs, np.ones(len(dofs))), np.sqrt(pull.weights[dofs])))
         pairs = len(self._geometry.collisionPairs)
         self._barriers = (
-            [SelfCollisionBarrier(min(NEAREST, pairs), gain=GAIN, safe_displacement_gain=0.0, d_min=self._least)]
+            [SelfCollisionBarrier(min(NEAREST, pairs), gain=GAIN, safe_displacement_gain=0.0, d_min=self._least + room)]
             if pairs
             else []
         )
@@ -105,19 +108,21 @@ class _PinkStepper:
         """One `solve_ik`, with a time step of one second."""
         import pink
 
-        configuration = pink.Configuration(
-            self._model, self._data, q, copy_data=False, collision_model=self._geometry if self._barriers else None
-        )
+        with TOOL:
+            configuration = pink.Configuration(
+                self._model, self._data, q, copy_data=False, collision_model=self._geometry if self._barriers else None
+            )
         for task, place in self._points:
             turn = configuration.get_transform_frame_to_world(task.frame).rotation
             task.set_target(pin.SE3(turn, place))
         for task, share in self._comfort:
             task.cost = weight**0.5 * share
         try:
-            velocity = pink.solve_ik(
-                configuration, [*self._tasks, *(task for task, _ in self._comfort)], 1.0, solver="daqp",
-                damping=damping, barriers=self._barriers, constraints=self._hard, safety_break=False,
-            )  # fmt: skip
+            with TOOL:
+                velocity = pink.solve_ik(
+                    configuration, [*self._tasks, *(task for task, _ in self._comfort)], 1.0, solver="daqp",
+                    damping=damping, barriers=self._barriers, constraints=self._hard, safety_break=False,
+                )  # fmt: skip
         except pink.exceptions.NoSolutionFound as error:
             raise StepError(f"{type(error).__name__}: its program has no solution") from None
         return np.asarray(velocity, dtype=float)
@@ -185,7 +190,7 @@ def _geometry(problem: Problem, least: float) -> tuple[Any, list[tuple[int, Any]
             pieces.append((number, shift))
         return known[number, lower]
 
-    for first, second, clearance in kept_apart(problem):
+    for first, second, clearance, _ in kept_apart(problem, 0.0):
         surface = isinstance(ours.geometryObjects[second].geometry, coal.Halfspace)
         resting = clearance < problem.clearance or (problem.clearance == 0.0 and surface)
         if not resting:
@@ -200,8 +205,7 @@ class PinkTool(Tool):
 
     name = "pink"
     differences: ClassVar[tuple[str, ...]] = (
-        f"pink's barrier takes the {NEAREST_IN_STEPS} nearest pairs, whatever their distance, not all within a "
-        "distance",
+        f"pink's barrier takes the {NEAREST} nearest pairs, whatever their distance, not all within a distance",
     )
 
     def __init__(self, track: Track) -> None:
@@ -227,7 +231,7 @@ class PinkTool(Tool):
         self._feet = [FrameTask(foot, position_cost=1.0, orientation_cost=1.0) for foot in track.feet]
         for task in self._feet:
             task.set_target_from_configuration(self._configuration)
-        pairs = min(NEAREST_IN_STEPS, track.pairs)
+        pairs = min(NEAREST, track.pairs)
         self._barriers = (
             [SelfCollisionBarrier(n_collision_pairs=pairs, gain=BARRIER_GAIN, d_min=track.clearance)] if pairs else []
         )

@@ -10,12 +10,16 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from wholebody.bench.adapters.base import Adapter, Tool
-from wholebody.bench.adapters.own import NEWTONS, ccd_adapter, dls_adapter, newton_adapter, qp_adapter
+from wholebody.bench.adapters.own import NEWTONS, ccd_adapter, dls_adapter, newton_adapter, one_start, qp_adapter
+from wholebody.bench.adapters.starts import FAMILY, ONE, restarted
 from wholebody.bench.track import Track
 from wholebody.errors import MissingPackageError, UnknownNameError
 
 SOLVERS = {"quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
 """Further QP solvers that the extra `solvers` installs: their names in qpsolvers -> the modules they need."""
+
+
+VARIANTS = (f"/{ONE}", f"/{FAMILY}")
 
 
 class _Row(NamedTuple):
@@ -29,10 +33,12 @@ class _Row(NamedTuple):
         return all(find_spec(module) for module in self.modules)
 
 
-def adapters(names: Iterable[str] | None = None) -> tuple[Adapter, ...]:
+def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[Adapter, ...]:
     """The adapters of these names, in the order given; all installed ones where None.
 
     The name of a method with several adapters and none of that name, such as "newton", means all that are installed.
+    Entrants that differ from another in their starts alone, such as "qp/one_start" and "mink/starts", are among several
+    only if `starts` is true.
 
     Raises:
         UnknownNameError: there is no such adapter.
@@ -40,14 +46,17 @@ def adapters(names: Iterable[str] | None = None) -> tuple[Adapter, ...]:
     """
     rows = _rows()
     if names is None:
-        return tuple(row.build() for row in rows.values() if row.installed())
+        return tuple(
+            row.build() for name, row in rows.items() if row.installed() and (starts or not name.endswith(VARIANTS))
+        )
     families = {name.partition("/")[0] for name in rows}
     chosen: dict[str, None] = {}
     for name in names:
         if name in rows:
             chosen[name] = None
         elif name in families:
-            chosen.update(dict.fromkeys(key for key in rows if key.startswith(f"{name}/") and rows[key].installed()))
+            family = (key for key in rows if key.startswith(f"{name}/") and (starts or not key.endswith(VARIANTS)))
+            chosen.update(dict.fromkeys(key for key in family if rows[key].installed()))
         else:
             raise UnknownNameError("method", name, {*rows, *families})
     for name in chosen:
@@ -70,8 +79,9 @@ def _command(row: _Row) -> str:
     return f"pip install 'wholebody[{row.extra}]'"
 
 
-def _outside(name: str) -> Adapter:
-    made: Adapter = getattr(import_module(f"wholebody.bench.adapters.{name}"), f"{name}_adapter")()
+def _outside(name: str, variant: str = "") -> Adapter:
+    build = getattr(import_module(f"wholebody.bench.adapters.{name}"), f"{name}_adapter")
+    made: Adapter = build(variant) if variant else build()
     return made
 
 
@@ -90,8 +100,20 @@ def _rows() -> dict[str, _Row]:
     rows["dls"] = _Row(dls_adapter)
     rows["placo"] = _Row(partial(_outside, "placo"), ("placo",), "placo")
     rows["pink"] = _Row(partial(_outside, "pink"), ("pink", "daqp"), "compare")
-    rows["mink"] = _Row(partial(_outside, "mink"), ("mink", "mujoco", "daqp"), "compare")
+    mink = ("mink", "mujoco", "daqp"), "compare"
+    rows["mink"] = _Row(partial(_outside, "mink"), *mink)
+    rows["mink/hard"] = _Row(partial(_outside, "mink", "hard"), *mink)
+    for family in ("qp", "newton", "ccd"):
+        rows[f"{family}/{ONE}"] = _Row(partial(one_start, family))
+    for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink"):
+        row = rows.get(f"{family}/{ONE}", rows.get(family))
+        assert row is not None
+        rows[f"{family}/{FAMILY}"] = row._replace(build=partial(_restarted, row))
     return rows
+
+
+def _restarted(row: _Row) -> Adapter:
+    return restarted(row.build())
 
 
 STEPPING = {

@@ -95,7 +95,9 @@ def _reader(rng: np.random.Generator) -> Reader:
         )
     if kind == "result":
         return Reader(
-            "from wholebody.cli.result import read\n", "read({path})", _stored({"result.json": "result.json"} | TASK)
+            "from wholebody.taskfile.result import read\n",
+            "read({path})",
+            _stored({"result.json": "result.json"} | TASK),
         )
     if kind == "robot":
         if rng.random() < SHIPPED:

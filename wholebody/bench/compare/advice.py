@@ -8,13 +8,12 @@ from typing import NamedTuple
 
 from wholebody.bench.compare import paired
 from wholebody.bench.compare.front import OURS
-from wholebody.bench.compare.paired import Ratio, named
+from wholebody.bench.compare.paired import named
 from wholebody.bench.compare.record import FLOOR
 from wholebody.bench.compare.results import EFFORT_FLOOR, Results, middle
+from wholebody.bench.compare.statistics import NOTHING, Interval, ratio
 from wholebody.bench.compare.summary import GOOD, Summary
 from wholebody.bench.report import words
-
-NOTHING = Ratio(nan, 0.0, inf, 0)
 
 
 class Choice(NamedTuple):
@@ -55,7 +54,7 @@ class Standing(NamedTuple):
     dependable: int
     worst_set: str
     worst_share: float
-    slowness: Ratio
+    slowness: Interval
     false_claims: int
     deepest_mm: float
 
@@ -111,7 +110,7 @@ def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
                 sum(row.dependable for row in mine),
                 worst.set if worst else "",
                 worst.success if worst else nan,
-                paired.ratio(paired.times(results, results.sets, adapter), base) if base else NOTHING,
+                ratio(paired.times(results, results.sets, adapter), base) if base else NOTHING,
                 sum(row.false_claims for row in mine),
                 max((row.deepest_mm for row in judged if isfinite(row.deepest_mm)), default=nan),
             )
@@ -194,7 +193,7 @@ def effort(value: float) -> str:
     return f"at most +{100 * EFFORT_FLOOR:.2g} %" if value <= EFFORT_FLOOR else f"+{100 * value:.2g} %"
 
 
-def slowness(found: Ratio) -> str:
+def slowness(found: Interval) -> str:
     """A ratio of times with its interval; empty where there are too few problems."""
     if not isfinite(found.value):
         return ""

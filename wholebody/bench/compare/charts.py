@@ -1,8 +1,12 @@
-"""The charts of a comparison: curves of speed against accuracy, a point a budget; the share solved within a time."""
+"""The charts of a comparison, at most six methods each, a method in the same colour everywhere.
+
+One row a set for all of them; performance profiles; curves of speed against accuracy, a point a budget.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,8 +15,11 @@ import numpy as np
 
 from wholebody.bench import plot_style
 from wholebody.bench.adapters.base import Budget
+from wholebody.bench.compare.front import OURS
 from wholebody.bench.compare.record import COARSE, FINE
 from wholebody.bench.compare.results import Quantity, Results, middle
+from wholebody.bench.compare.statistics import wilson
+from wholebody.bench.compare.summary import Summary
 from wholebody.bench.plot_style import method_style
 
 BAND = 30.0  # where points are drawn whose median is no answer: above all values, which are metres, radians, shares
@@ -20,7 +27,7 @@ GREY = "#666666"
 MS = 1e3
 
 
-def speed_accuracy(results: Results, family: str, title: str, path: Path) -> tuple[Path, Path]:
+def speed_accuracy(results: Results, family: str, title: str, adapters: Sequence[str], path: Path) -> tuple[Path, Path]:
     """One panel a quantity: median error over median time at every budget, quartiles and 95 % of the time as bars.
 
     The line of a method joins its best budgets; those that are slower and no more accurate stand beside it, small.
@@ -34,13 +41,13 @@ def speed_accuracy(results: Results, family: str, title: str, path: Path) -> tup
         panel.set_visible(False)
     drawn: dict[str, Any] = {}
     for panel, quantity in zip(panels, quantities, strict=False):
-        for adapter in reversed(results.adapters):
+        for adapter in reversed(adapters):
             points = curve(results, family, adapter, quantity)
             if points:
                 drawn[adapter] = _draw(panel, points, adapter, quantity)
         _dress(panel, quantity, "a frame" if results.moving(family) else "a solve")
     chart.suptitle(title, x=0.01, ha="left", fontsize=13)
-    _legend(chart, results, drawn)
+    _legend(chart, adapters, drawn)
     return plot_style.save(chart, path)
 
 
@@ -95,39 +102,126 @@ def _dress(panel: Any, quantity: Quantity, what: str) -> None:
     panel.set(xlabel=f"time of {what} [ms]", ylabel=quantity.label)
 
 
-def profiles(results: Results, family: str, title: str, path: Path) -> tuple[Path, Path]:
-    """Share of the cases solved within a time at the default budget, to a millimetre and to a tenth of one."""
+def profiles(results: Results, family: str, title: str, adapters: Sequence[str], path: Path) -> tuple[Path, Path]:
+    """Performance profiles at the default budget: share of the cases solved within a factor of the fastest method.
+
+    Dolan and More 2002, "Benchmarking optimization software with performance profiles". At the factor 1 stands how
+    often a method is the fastest, at the right end how often it solves at all. Bands are Wilson's intervals of 95 %.
+    """
     chart, axes = plot_style.figure(1, 2, (11.0, 4.6))
     drawn: dict[str, Any] = {}
-    known = [time for adapter in results.adapters for time in profile(results, family, adapter, COARSE)[0]]
-    start, end = 0.7 * MS * min(known, default=1.0), 1.5 * MS * max(known, default=1.0)
     for panel, tolerance in zip(axes[0], (COARSE, FINE), strict=True):
-        for adapter in reversed(results.adapters):
-            times, cases = profile(results, family, adapter, tolerance)
-            if not cases:
-                continue
+        found = performance(results, family, adapters, tolerance)
+        ends = [factor for factors, _ in found.values() for factor in factors]
+        end = 1.5 * max(ends, default=10.0)
+        for adapter in reversed([name for name in adapters if name in found]):
+            factors, cases = found[adapter]
             seen = method_style(adapter)
-            shares = [100.0 * (place + 1) / cases for place in range(len(times))]
-            x = [MS * time for time in times]
-            (drawn[adapter],) = panel.step(
-                [start, *x, end], [0.0, *shares, shares[-1] if shares else 0.0], where="post",
-                color=seen.color, linewidth=1.9 if seen.principal else 0.9, zorder=3 if seen.principal else 2,
-            )  # fmt: skip
+            x = [1.0, *factors, end]
+            counts = [*range(len(factors) + 1), len(factors)]
+            shares = [100.0 * count / cases for count in counts]
+            bands = np.array([wilson(count, cases) for count in counts]) * 100.0
+            (drawn[adapter],) = panel.step(x, shares, where="post", color=seen.color, linewidth=1.6, zorder=3)
+            panel.fill_between(x, *bands.T, step="post", color=seen.color, alpha=0.12, linewidth=0.0, zorder=2)
         panel.axhline(98.0, color=GREY, linewidth=0.9, linestyle="--", zorder=1)
         plot_style.plain_log(panel)
-        panel.set(xlim=(start, end), ylim=(0.0, 103.0))
+        panel.set(xlim=(1.0, end), ylim=(0.0, 103.0))
         panel.set_title(f"solved to {tolerance:g} m and rad", loc="left", fontsize=10)
-        panel.set(
-            xlabel=f"time of {'a frame' if results.moving(family) else 'a solve'} [ms]",
-            ylabel="cases solved within the time [%]",
-        )
+        panel.set(xlabel="time over that of the fastest method", ylabel="cases solved within that factor [%]")
     chart.suptitle(title, x=0.01, ha="left", fontsize=13)
-    _legend(chart, results, drawn)
+    _legend(chart, adapters, drawn)
     return plot_style.save(chart, path)
 
 
-def _legend(chart: Any, results: Results, drawn: dict[str, Any]) -> None:
-    names = [adapter for adapter in results.adapters if adapter in drawn]
+def performance(
+    results: Results, family: str, adapters: Sequence[str], tolerance: float
+) -> dict[str, tuple[list[float], int]]:
+    """Factors over the fastest of the cases that a method solved, sorted, and how many cases there are.
+
+    The cases are those that every method which took any of the set was given and took; on others somebody is missing.
+    """
+    taken = {
+        adapter: {record.number: record for record in results.taken(family, adapter)}
+        for adapter in adapters
+        if results.taken(family, adapter)
+    }
+    common = set.intersection(*(set(mine) for mine in taken.values())) if taken else set()
+    fastest = {
+        number: min((mine[number].seconds for mine in taken.values() if mine[number].success(tolerance)), default=inf)
+        for number in common
+    }
+    return {
+        adapter: (
+            sorted(
+                mine[number].seconds / max(fastest[number], 1e-9)
+                for number in common
+                if mine[number].success(tolerance)
+            ),
+            len(common),
+        )
+        for adapter, mine in taken.items()
+        if common
+    }
+
+
+def overview(
+    rows: Sequence[Summary], titles: Mapping[str, str], adapters: Sequence[str], path: Path
+) -> tuple[Path, Path]:
+    """One row a set: share solved and mean time of each method, with their intervals of 95 %."""
+    chart, axes = plot_style.figure(1, 2, (11.0, 0.9 + 0.85 * len(titles)))
+    drawn: dict[str, Any] = {}
+    left, right = axes[0]
+    for place, family in enumerate(titles):
+        mine = {row.method: row for row in rows if row.set == family and row.refused < row.cases}
+        if place % 2:
+            for panel in (left, right):
+                panel.axhspan(place - 0.5, place + 0.5, color="#f3f5f7", zorder=0)
+        for number, name in enumerate(adapters):
+            if name not in mine:
+                continue
+            row, seen = mine[name], method_style(name)
+            y = place + 0.75 * ((number + 0.5) / len(adapters) - 0.5)
+            spans = (
+                (left, 100.0 * row.success, 100.0 * row.success_low, 100.0 * row.success_high),
+                (right, row.mean_ms, row.mean_low_ms, row.mean_high_ms),
+            )
+            for panel, value, low, high in spans:
+                panel.plot([low, high], [y, y], color=seen.color, linewidth=5.0, alpha=0.3, solid_capstyle="butt")
+                (drawn[name],) = panel.plot([value], [y], color=seen.color, marker=seen.marker, linestyle="")
+    for panel in (left, right):
+        panel.set_yticks(range(len(titles)), list(titles.values()) if panel is left else [""] * len(titles))
+        panel.set_ylim(len(titles) - 0.5, -0.5)
+        panel.grid(axis="y", visible=False)
+    left.set(xlabel="solved [%]", xlim=(-2.0, 102.0))
+    plot_style.plain_log(right)
+    right.set(xlabel="mean time of a solve, failures as the longest [ms]")
+    chart.suptitle("Every set: solved, and how fast; bands are intervals of 95 %", x=0.01, ha="left", fontsize=13)
+    _legend(chart, adapters, drawn)
+    return plot_style.save(chart, path)
+
+
+MOST = 6  # methods in a chart
+
+
+def groups(adapters: Sequence[str]) -> list[tuple[str, ...]]:
+    """Methods as they stand together in charts: at most `MOST`, first one of each algorithm, then the others.
+
+    Our default stands in every group, to compare with.
+    """
+    kinds: dict[str, str] = {}
+    for name in adapters:
+        kinds.setdefault(re.split(r"[/,+ ]", name)[0], name)
+    order = [*kinds.values(), *(name for name in adapters if name not in kinds.values())]
+    if len(order) <= MOST:
+        return [tuple(order)] if order else []
+    base = [OURS] if OURS in order else []
+    others = [name for name in order if name not in base]
+    size = MOST - len(base)
+    return [tuple(base + others[first : first + size]) for first in range(0, len(others), size)]
+
+
+def _legend(chart: Any, adapters: Sequence[str], drawn: dict[str, Any]) -> None:
+    names = [adapter for adapter in adapters if adapter in drawn]
     if names:
         chart.legend(
             [drawn[name] for name in names], names, loc="outside lower center", ncols=min(len(names), 6),
@@ -137,13 +231,24 @@ def _legend(chart: Any, results: Results, drawn: dict[str, Any]) -> None:
     chart.set_layout_engine("none")  # laid out once, not for each of the files
 
 
-def draw_all(results: Results, titles: Iterable[tuple[str, str]], folder: Path) -> dict[str, tuple[Path, Path]]:
-    """All charts of a comparison, by name; `titles` are name and title of every set."""
+def draw_all(
+    results: Results, rows: Sequence[Summary], titles: Iterable[tuple[str, str]], folder: Path
+) -> dict[str, tuple[Path, Path]]:
+    """All charts of a comparison, by name; `titles` are name and title of every set.
+
+    The charts of the second and further groups of methods are called as those of the first, with a number behind.
+    """
     drawn = {}
-    for family, title in titles:
-        name = family.replace("_", "-")
-        drawn[f"compare-{name}"] = speed_accuracy(results, family, title, folder / f"compare-{name}")
-        drawn[f"compare-{name}-profile"] = profiles(results, family, title, folder / f"compare-{name}-profile")
+    known = dict(titles)
+    for number, adapters in enumerate(groups(results.adapters), start=1):
+        more = "" if number == 1 else f"-{number}"
+        name = f"compare-overview{more}"
+        drawn[name] = overview(rows, known, adapters, folder / name)
+        for family, title in known.items():
+            name = f"compare-{family.replace('_', '-')}"
+            profile_name, scatter_name = f"{name}-profile{more}", f"{name}{more}"
+            drawn[profile_name] = profiles(results, family, title, adapters, folder / profile_name)
+            drawn[scatter_name] = speed_accuracy(results, family, title, adapters, folder / scatter_name)
     return drawn
 
 
@@ -179,9 +284,3 @@ def curve(results: Results, family: str, adapter: str, quantity: Quantity) -> li
         quartiles = [middle(values, share) for share in (0.5, 0.25, 0.75)]
         points.append(Point(level, len(cases), middle(spent), middle(spent, 0.95), *quartiles))
     return points
-
-
-def profile(results: Results, family: str, adapter: str, tolerance: float) -> tuple[list[float], int]:
-    """Times of the cases that a method solved at its default budget, sorted, and how many it took."""
-    mine = results.taken(family, adapter)
-    return sorted(record.seconds for record in mine if record.success(tolerance)), len(mine)

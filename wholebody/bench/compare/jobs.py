@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from wholebody.batches import own_child
 from wholebody.bench.adapters.base import FIRST_FIT, Adapter, Budget
 from wholebody.bench.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Record
+from wholebody.bench.compare.reference_kernel import kernel_seconds
 from wholebody.bench.compare.solving import BUILDING, Which, built, solved, warmed
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.problem_sets.case import ProblemSet
@@ -50,9 +51,12 @@ def work(task: Task) -> Chunk:
     if fault:
         return Chunk(task.family.name, task.number, (), building=building, fault=fault)
     records: list[Record] = []
-    spent, swept = {}, {}
+    spent, swept, cold = {}, {}, {}
+    kernel = child.call(kernel_seconds, seconds=BUILDING)
     for adapter, ladder in task.solves:
-        _warm_up(child, which, adapter, task.cap)  # seconds of compiling, which say nothing of what its solves cost
+        first_time = _warm_up(child, which, adapter, task.cap)  # compiling, which says nothing of what its solves cost
+        if first_time > 0.0:
+            cold[adapter.name] = first_time
         began = time.perf_counter()
         first, ended = _solve(child, adapter, DEFAULT, task)
         records.append(first)
@@ -61,7 +65,7 @@ def work(task: Task) -> Chunk:
         if ladder and spent[adapter.name] * len(ladder) <= task.most:
             records += _sweep(child, adapter, ladder, task, first, ended)
             swept[adapter.name] = time.perf_counter() - between
-    return Chunk(task.family.name, task.number, tuple(records), spent, swept, building)
+    return Chunk(task.family.name, task.number, tuple(records), spent, swept, building, cold, kernel)
 
 
 def _sweep(
@@ -99,14 +103,19 @@ def _solve(child: Child, adapter: Adapter, level: Budget, task: Task) -> tuple[R
     return record, False
 
 
-def _warm_up(child: Child, which: Which, adapter: Adapter, cap: float) -> None:
-    """Let a method import and compile what it needs. What goes wrong over it will do so again in its solve."""
+def _warm_up(child: Child, which: Which, adapter: Adapter, cap: float) -> float:
+    """Let a method import and compile what it needs. What goes wrong over it will do so again in its solve.
+
+    Returns:
+        Seconds of its first solve in the process; 0 where it has run there before, or never came back.
+    """
     if adapter.name in _hopeless():
-        return
+        return 0.0
     try:
-        child.call(warmed, which, adapter, cap, seconds=BUILDING)
+        return float(child.call(warmed, which, adapter, cap, seconds=BUILDING))
     except EndedError:
         _hopeless().add(adapter.name)
+        return 0.0
 
 
 def _hopeless() -> set[str]:

@@ -6,56 +6,28 @@ Medians over different problems say nothing of two methods, and a ratio whose in
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import exp, inf, isfinite, log, sqrt
-from typing import NamedTuple
-
-import numpy as np
+from math import inf, isfinite
 
 from wholebody.bench.compare.front import FAMILY
 from wholebody.bench.compare.record import COARSE, FLOOR
 from wholebody.bench.compare.results import QUANTITIES, Results, effort_excess, middle
+from wholebody.bench.compare.statistics import LEAST, ratio
 
-LEAST = 5  # problems in common below which two methods are not compared
-SHARE = 0.975  # of Student's t: an interval of 95 %
 WORST = QUANTITIES[0]
 
 Figures = Mapping[tuple[str, int], float]
 """One positive figure a problem, by the name of its set and its number."""
 
 
-class Ratio(NamedTuple):
-    """Geometric mean of a ratio over problems, with its interval of 95 %.
-
-    Attributes:
-        value, low, high: NaN and an interval without ends where there are too few problems.
-        cases: problems in common.
-    """
-
-    value: float
-    low: float
-    high: float
-    cases: int
-
-
-def ratio(one: Figures, other: Figures) -> Ratio:
-    """Return the figures of one method over those of another, on the problems that both have."""
-    from scipy.stats import t
-
-    logs = np.array([log(one[key] / other[key]) for key in one if key in other])
-    count = len(logs)
-    if count < LEAST:
-        return Ratio(float("nan"), 0.0, inf, count)
-    middle_log, spread = float(logs.mean()), float(logs.std(ddof=1)) / sqrt(count)
-    reach = float(t.ppf(SHARE, count - 1)) * spread
-    return Ratio(exp(middle_log), exp(middle_log - reach), exp(middle_log + reach), count)
-
-
 def best(found: Mapping[str, Figures]) -> tuple[str, ...]:
     """Return the methods with the least figure, as many as cannot be told apart; the least of all first.
 
-    A method that has too few problems in common with the least is left out.
+    A method that has too few problems in common with the least is left out. Where the least itself has too few problems
+    to compare with anybody, nobody is told apart.
     """
     order = sorted((name for name in found if found[name]), key=lambda name: middle(list(found[name].values())))
+    if order and len(found[order[0]]) < LEAST:
+        return tuple(order)
     for first in order:
         others = {name: ratio(found[name], found[first]) for name in order if name != first}
         if not any(each.high < 1.0 for each in others.values()):

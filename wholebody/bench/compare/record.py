@@ -27,6 +27,8 @@ class Record:
         status: what the method claims; empty without an answer.
         said: its message, its refusal or the exception.
         seconds, cpu_seconds: of the call without the judgement in it; of a frame, median, where goals move.
+        tool_seconds: of `seconds`, within calls of the tool behind an adapter; 0 for methods of our own, and where
+            goals move.
         setup_seconds: to build a model of its own from the problem; 0 for one that needs none.
         iterations: as the method counts them; of a frame, mean, where goals move.
         programs: what closed its quadratic programs, and how many; empty for methods without, and where goals move.
@@ -51,6 +53,7 @@ class Record:
     seconds: float = inf
     cpu_seconds: float = inf
     setup_seconds: float = 0.0
+    tool_seconds: float = 0.0
     iterations: float = 0.0
     programs: str = ""
     goal_error: float = inf

@@ -9,47 +9,30 @@ import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 
 from wholebody.bench.compare.advice import advice, choices, effort, error, reference, slowness, standings
-from wholebody.bench.compare.charts import draw_all
+from wholebody.bench.compare.charts import draw_all, groups
 from wholebody.bench.compare.front import MOST, OURS, Rival, fronts
+from wholebody.bench.compare.lock import NAME as LOCK
+from wholebody.bench.compare.lock import locked, write_lock
+from wholebody.bench.compare.pages import Material, drawn_within, write_pages
 from wholebody.bench.compare.paired import algorithms
+from wholebody.bench.compare.rankings import in_words, rankings, seeds_in_words, sensitivity
 from wholebody.bench.compare.record import COARSE, DEFAULT
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.scenes import OPENING, Scene, chosen, draw
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk, Store
-from wholebody.bench.compare.summary import GOOD, Summary, exclusions, summaries
+from wholebody.bench.compare.summary import GOOD, exclusions, kernel_of, summaries
 from wholebody.bench.report import formatted, render
 from wholebody.bench.tables import replace_section, write_rows, write_text
 
 PAGE = "report.html"
 FEW = 10  # problems below which a share is no share
 LONG = 35  # letters of a table's cell that is a text and no figure
+KERNEL = "60 products of matrices of 64 rows and 1,000 distances between boxes and capsules by coal"
 PICTURE = re.compile(r'<p><img src="[^"]*?([^"/]+)\.svg" alt="([^"]*)" ?/?></p>')
-
-
-@dataclass(frozen=True)
-class Material:
-    """All that a report is written from.
-
-    Attributes:
-        settings: what was asked for.
-        chunks: what was done.
-        results: the records of them.
-        rows: the figures at the default budget.
-        facts: of the machine and the run.
-        missing: methods that are not installed, and the command that installs them.
-    """
-
-    settings: Settings
-    chunks: Sequence[Chunk]
-    results: Results
-    rows: Sequence[Summary]
-    facts: Mapping[str, str]
-    missing: Mapping[str, str]
 
 
 def material(
@@ -60,7 +43,7 @@ def material(
     results = Results(
         records, [family.name for family in settings.sets], [adapter.name for adapter in settings.adapters]
     )
-    return Material(settings, chunks, results, summaries(results), facts, missing)
+    return Material(settings, chunks, results, summaries(results, chunks, settings.cap), facts, missing)
 
 
 def publish(
@@ -82,6 +65,7 @@ def publish(
     given = material(settings, store.chunks, facts, missing)
     write_rows(folder / "solves.csv", facts, store.records)
     write_rows(folder / "summary.csv", facts, given.rows)
+    write_lock(folder / LOCK, locked(given))
     front = fronts(given.results)
     if front:
         write_rows(folder / "front.csv", facts, front)
@@ -91,19 +75,21 @@ def publish(
     with ThreadPoolExecutor(1) as pool:  # scenes are drawn in a process of their own, charts in this one
         drawn = pool.submit(draw, chosen(given.results), families, methods, settings.seed, settings.cap)
         titles = [(family.name, family.title) for family in settings.sets]
-        charts = draw_all(given.results, titles, folder / "charts")
+        charts = draw_all(given.results, given.rows, titles, folder / "charts")
         scenes = drawn.result()
     say("report")
     subtitle = f"{len(settings.sets)} problem sets, {len(settings.adapters)} methods, {len(store.records)} solves. " + (
         f"Measured {facts.get('date', '')} with wholebody {facts.get('wholebody', '')} on {facts.get('processor', '')}."
     )
+    write_pages(given, charts, folder)
     write_text(folder / PAGE, as_page(given, charts, scenes, subtitle) + "\n")
     short = as_markdown(given, False, "assets/bench")
     write_text(folder / "compare.md", short + "\n")
     if docs is not None:
         replace_section(docs / "results.md", "compare", short)
+        write_lock(docs / "assets" / "bench" / f"compare-{LOCK}", locked(given))
         (docs / "assets" / "bench").mkdir(parents=True, exist_ok=True)
-        for svg, _ in charts.values():
+        for svg, _ in (found for name, found in charts.items() if f"/{name}.svg" in short):
             shutil.copyfile(svg, docs / "assets" / "bench" / svg.name)
     return given
 
@@ -114,6 +100,8 @@ def as_markdown(given: Material, whole: bool, charts: str) -> str:
     wall, processor, dependable = fronts(results), fronts(results.by_processor()), fronts(results, share=MOST)
     by_cpu, by_most = ({(rival.set, rival.quantity): rival for rival in rivals} for rivals in (processor, dependable))
     counts = [row.cases for row in given.rows]
+    together = groups(results.adapters)
+    numbers = ["" if number == 0 else f"-{number + 1}" for number in range(len(together))]
     return render(
         "compare.md",
         given=given, whole=whole, charts=charts, advice=advice(results, given.rows),
@@ -126,6 +114,10 @@ def as_markdown(given: Material, whole: bool, charts: str) -> str:
         by_cpu=by_cpu, by_most=by_most, ours=OURS,
         differences={adapter.name: adapter.differences for adapter in settings.adapters},
         left_out=exclusions(settings, given.chunks, given.rows),
+        ranking=rankings(results), ranking_words=in_words,
+        seeds=seeds_in_words(sensitivity(results), {family.name: family.title for family in settings.sets}),
+        kernel=kernel_of(given.chunks), kernel_about=KERNEL, groups=together, numbers=numbers,
+        overviews=[f"compare-overview{more}" for more in numbers],
         good=GOOD, coarse=COARSE, tolerance=DEFAULT[0],
     )  # fmt: skip
 
@@ -140,7 +132,7 @@ def as_page(given: Material, charts: Mapping[str, tuple[Path, Path]], scenes: Se
     text = MarkdownIt("commonmark", {"html": False}).enable("table").render(as_markdown(given, True, "charts"))
     text = text.replace("<ul>", '<ul class="advice">', 1)
     text = re.sub(rf"<td[^>]*>([^<]{{{LONG},}})</td>", r'<td class="text">\1</td>', text)
-    text = PICTURE.sub(lambda found: _drawn(charts[found[1]][0], found[1], found[2]), text)
+    text = PICTURE.sub(lambda found: drawn_within(charts[found[1]][0], found[1], found[2]), text)
     titles = re.findall(r"<h2>(.*?)</h2>", text)
     text = re.sub(
         r"<h([23])>(.*?)</h\1>", lambda found: f'<h{found[1]} id="{_anchor(found[2])}">{found[2]}</h{found[1]}>', text
@@ -171,10 +163,3 @@ def _rival(rival: Rival | None) -> str:
 
 def _anchor(title: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
-
-
-def _drawn(svg: Path, name: str, caption: str) -> str:
-    """A chart within the page. Names in it are of one file, and there are many files in the page."""
-    drawn = svg.read_text(encoding="utf-8")
-    drawn = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", drawn[drawn.index("<svg") :])
-    return f"<figure>{drawn}<figcaption>{caption}</figcaption></figure>"

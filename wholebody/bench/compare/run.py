@@ -11,7 +11,7 @@ from wholebody.batches import spread
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.jobs import Task, work
 from wholebody.bench.compare.plan import Plan
-from wholebody.bench.compare.settings import Settings
+from wholebody.bench.compare.settings import Settings, seed_of
 from wholebody.bench.compare.store import Chunk, Store
 from wholebody.errors import WholebodyError
 
@@ -82,7 +82,7 @@ def _tasks(settings: Settings, plan: Plan, done: set[tuple[str, int]], end: floa
             )
             if solves:
                 most = SPARE * plan.share
-                yield Task(family, number, settings.seed, solves, settings.cap, most)
+                yield Task(family, number, seed_of(settings.seed, number), solves, settings.cap, most)
 
 
 def turned(adapters: tuple[Adapter, ...], number: int) -> tuple[Adapter, ...]:

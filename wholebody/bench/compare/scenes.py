@@ -11,6 +11,7 @@ from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.front import OURS
 from wholebody.bench.compare.record import COARSE, DEFAULT, Record
 from wholebody.bench.compare.results import Results
+from wholebody.bench.compare.settings import seed_of
 from wholebody.bench.compare.solving import BUILDING, Ready, Which, case_of
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.files import Scratch
@@ -42,7 +43,8 @@ def draw(
     try:
         for case in shown:
             try:
-                which, pair = Which(families[case.set], case.number, seed), (adapters[case.good], adapters[case.bad])
+                which = Which(families[case.set], case.number, seed_of(seed, case.number))
+                pair = adapters[case.good], adapters[case.bad]
                 page = child.call(drawn, which, *pair, cap, seconds=BUILDING)
             except EndedError:
                 continue

@@ -12,6 +12,7 @@ from wholebody.errors import InputError
 from wholebody.version import __version__
 
 MOVING_LEVELS = 3  # budgets of a set whose goals move: a case is hundreds of solves
+SEEDS = 3  # from which the cases of a set are made in turn
 MOVING = 10  # cases of other sets for one whose goals move
 
 
@@ -24,7 +25,7 @@ class Settings:
         cases: of every set at the default budget.
         sweep: of these, the first so many at every budget.
         levels: most budgets beside the default one.
-        seed: of all problems.
+        seed: the first of `SEEDS` from which the problems are made in turn.
         cap: seconds after which a solve is ended.
         minutes: of all solving; methods that are too slow for it get fewer cases.
     """
@@ -59,7 +60,7 @@ class Settings:
             "cases": self.cases,
             "sweep": self.sweep,
             "levels": {adapter.name: [list(level) for level in self.ladder(adapter)] for adapter in self.adapters},
-            "seed": self.seed,
+            "seeds": [seed_of(self.seed, number) for number in range(SEEDS)],
             "cap": self.cap,
             "minutes": self.minutes,
         }
@@ -79,6 +80,11 @@ class Settings:
         if most == 1:
             return listed[:1]
         return [listed[round(place * (len(listed) - 1) / (most - 1))] for place in range(most)]
+
+
+def seed_of(seed: int, number: int) -> int:
+    """Seed of a case: every set is made from `SEEDS` seeds in turn, so that what depends on one of them shows."""
+    return seed + number % SEEDS
 
 
 QUICK: dict[str, Any] = {"cases": 20, "sweep": 6, "levels": 5, "cap": 5.0, "minutes": 2.0}

@@ -23,6 +23,7 @@ from wholebody.bench.tables import programs_text
 from wholebody.compiled import compile_all
 from wholebody.errors import WholebodyError
 from wholebody.methods.base import SolvedStep, Tracker
+from wholebody.methods.differential import TOOL
 from wholebody.motion_assessment import third_differences
 from wholebody.problem import Problem
 from wholebody.runner import allow
@@ -74,14 +75,21 @@ def built(which: Which) -> str | None:
     return None
 
 
-def warmed(which: Which, adapter: Adapter, cap: float) -> None:
-    """Let a method import and compile what it needs, before it is timed for the first time in this process."""
+def warmed(which: Which, adapter: Adapter, cap: float) -> float:
+    """Let a method import and compile what it needs, before it is timed for the first time in this process.
+
+    Returns:
+        Seconds of that first time, the building of a model of its own included; 0 where it has run before.
+    """
     made = case_of(which)
     key = (adapter.name, bool(made.case.frames))
-    if key not in _warm:
-        _warm.add(key)
-        allow(cap)
-        solve(adapter, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:GLIMPSE])))
+    if key in _warm:
+        return 0.0
+    _warm.add(key)
+    allow(cap)
+    began = time.perf_counter()
+    solve(adapter, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:GLIMPSE])))
+    return time.perf_counter() - began
 
 
 def solved(which: Which, adapter: Adapter, level: Budget, cap: float) -> Record:
@@ -147,7 +155,7 @@ def sentence(error: BaseException) -> str:
 
 
 def _once(method: Any, problem: Problem, empty: Record) -> Record:
-    worked, began = time.process_time(), time.perf_counter()
+    of_tool, worked, began = TOOL.seconds, time.process_time(), time.perf_counter()
     solution = method.solve(problem)
     spent = time.perf_counter() - began - solution.assessment.seconds
     worked = time.process_time() - worked
@@ -164,6 +172,7 @@ def _once(method: Any, problem: Problem, empty: Record) -> Record:
         said=" ".join(solution.message.split())[:300],
         seconds=max(spent, 0.0),
         cpu_seconds=max(worked, 0.0),
+        tool_seconds=TOOL.seconds - of_tool,
         iterations=float(solution.iterations),
         programs=programs_text(solution.programs),
     )

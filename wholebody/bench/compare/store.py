@@ -29,6 +29,9 @@ class Chunk:
         spent: seconds that each method took at the default budget, all that it brought about included.
         swept: the same at all its other budgets.
         building: seconds to build the case.
+        cold: seconds of the first solve of each method in its process, what it imports and compiles included; of the
+            methods for which the process was new.
+        kernel: seconds of the reference kernel in the process, before the case was solved.
         fault: why the case could not be built; empty where it was.
     """
 
@@ -38,6 +41,8 @@ class Chunk:
     spent: Mapping[str, float] = field(default_factory=dict)
     swept: Mapping[str, float] = field(default_factory=dict)
     building: float = 0.0
+    cold: Mapping[str, float] = field(default_factory=dict)
+    kernel: float = 0.0
     fault: str = ""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, nan
 from typing import NamedTuple
@@ -10,10 +10,12 @@ from typing import NamedTuple
 from wholebody.bench.compare.record import COARSE, FAILED, FINE, OVERTIME, REFUSED
 from wholebody.bench.compare.results import Results, effort_excess, middle
 from wholebody.bench.compare.settings import Settings
+from wholebody.bench.compare.statistics import Interval, median, share, shifted_geometric_mean
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.report import words
 from wholebody.bench.tables import summed_programs
 
+CAP = 20.0  # s: as a comparison ends a solve
 SHOWN = 110  # characters of a message
 GOOD = 0.98  # share of the cases that a method has to solve to be called dependable
 
@@ -27,8 +29,15 @@ class Summary:
         refused, failed, overtime: cases without an answer: said so, broke, or took too long.
         said: the first refusal or exception.
         success, success_fine: share of the cases not refused that are solved to 1e-3 and to 1e-4, as judged.
+        success_low, success_high: Wilson's interval of the first.
         false_claims: answers called solved that are off by more than 1 mm.
         median_ms, p95_ms, cpu_median_ms: of a call (of a frame where goals move), over all answers.
+        median_low_ms, median_high_ms: bootstrap interval of the median.
+        mean_ms, mean_low_ms, mean_high_ms: shifted geometric mean over all cases not refused, with its interval; one
+            that is not solved counts as long as a solve may take.
+        kernels: the median in units of the reference kernel; NaN where that was not timed.
+        cold_ms: median of the first solve in a process; NaN where no process was new.
+        tool: share of the time within calls of the tool behind an adapter, median; 0 for methods of our own.
         setup_ms, iterations: medians; the first to build a model of its own.
         programs: what closed its quadratic programs, of all problems together.
         worst_median: median of the worst error [m or rad].
@@ -46,11 +55,21 @@ class Summary:
     overtime: int
     said: str
     success: float
+    success_low: float
+    success_high: float
     success_fine: float
     false_claims: int
     median_ms: float
+    median_low_ms: float
+    median_high_ms: float
+    mean_ms: float
+    mean_low_ms: float
+    mean_high_ms: float
+    kernels: float
+    cold_ms: float
     p95_ms: float
     cpu_median_ms: float
+    tool: float
     setup_ms: float
     iterations: float
     programs: str
@@ -68,24 +87,39 @@ class Summary:
         return not self.refused and self.success >= GOOD
 
 
-def summaries(results: Results) -> list[Summary]:
-    """All rows, of methods that were given a case."""
+def summaries(results: Results, chunks: Sequence[Chunk] = (), cap: float = CAP) -> list[Summary]:
+    """All rows, of methods that were given a case.
+
+    Args:
+        results: the records.
+        chunks: what was timed beside them: the reference kernel, and first solves.
+        cap: seconds after which a solve was ended.
+    """
+    kernel = kernel_of(chunks).value
     return [
-        _summary(results, family, adapter)
+        _summary(results, family, adapter, [chunk.cold for chunk in chunks if chunk.set == family], kernel, cap)
         for family in results.sets
         for adapter in results.adapters
         if results.default(family, adapter)
     ]
 
 
-def _summary(results: Results, family: str, adapter: str) -> Summary:
+def kernel_of(chunks: Sequence[Chunk]) -> Interval:
+    """Median seconds of the reference kernel over a run, with its interval; NaN where it was not timed."""
+    return median([chunk.kernel for chunk in chunks if chunk.kernel > 0.0])
+
+
+def _summary(
+    results: Results, family: str, adapter: str, cold: Sequence[Mapping[str, float]], kernel: float, cap: float
+) -> Summary:
     mine, taken = results.default(family, adapter), results.taken(family, adapter)
     answered = [record for record in mine if record.answered]
     efforts = [value for record in answered if (value := effort_excess(record, results.best(record))) < inf]
     silent = [record for record in mine if not record.answered]
 
-    def share(tolerance: float) -> float:
-        return sum(record.success(tolerance) for record in taken) / len(taken) if taken else nan
+    solved, fine = (share([record.success(tolerance) for record in taken]) for tolerance in (COARSE, FINE))
+    usual = median([record.seconds for record in answered])
+    mean = shifted_geometric_mean([record.seconds if record.success(COARSE) else cap for record in taken])
 
     def count(outcome: str) -> int:
         return sum(record.outcome == outcome for record in mine)
@@ -99,12 +133,22 @@ def _summary(results: Results, family: str, adapter: str) -> Summary:
         failed=count(FAILED),
         overtime=count(OVERTIME),
         said=silent[0].said if silent else "",
-        success=share(COARSE),
-        success_fine=share(FINE),
+        success=solved.value,
+        success_low=solved.low,
+        success_high=solved.high,
+        success_fine=fine.value,
         false_claims=sum(record.false_claim for record in mine),
-        median_ms=1e3 * middle([record.seconds for record in answered]),
+        median_ms=1e3 * usual.value,
+        median_low_ms=1e3 * usual.low,
+        median_high_ms=1e3 * usual.high,
+        mean_ms=1e3 * mean.value,
+        mean_low_ms=1e3 * mean.low,
+        mean_high_ms=1e3 * mean.high,
+        kernels=usual.value / kernel,
+        cold_ms=1e3 * middle([seconds[adapter] for seconds in cold if adapter in seconds]),
         p95_ms=1e3 * middle([record.seconds for record in answered], 0.95),
         cpu_median_ms=1e3 * middle([record.cpu_seconds for record in answered]),
+        tool=middle([record.tool_seconds / max(record.seconds, 1e-9) for record in answered]),
         setup_ms=1e3 * middle([record.setup_seconds for record in answered]),
         iterations=middle([record.iterations for record in answered]),
         programs=summed_programs(record.programs for record in answered),

@@ -114,9 +114,15 @@ def _data(figure: wb.Figure) -> Any:
 def standing_problem(
     scene: wb.Scene, start: Array, goals: Sequence[wb.Goal], *constraints: wb.Constraint
 ) -> wb.Problem:
-    """What is asked of a person: both feet stay where they are at the start (nq,), and all pairs `CLEARANCE` apart."""
+    """What is asked of a person: both feet stay where they are at the start (nq,), and all pairs `CLEARANCE` apart.
+
+    What a person keeps by default is left out: most tools cannot be told of it, and known answers do not keep it.
+    """
     feet = [wb.Hold(foot) for foot in FEET]
-    return wb.Problem(scene, start, goals=goals, constraints=[*constraints, *feet], clearance=CLEARANCE)
+    return wb.Problem(
+        scene, start, goals=goals, constraints=[*constraints, *feet], clearance=CLEARANCE,
+        range_of_motion=False, balance=False,
+    )  # fmt: skip
 
 
 def point(figure: wb.Figure, q: Array, frame: str) -> wb.Point:

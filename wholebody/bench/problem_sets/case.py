@@ -22,6 +22,7 @@ class Case:
         problem: what is asked; methods see this and nothing else of the case.
         witness: (nq,) a posture that meets the goals and keeps everything that must hold.
         frames: goals of each following frame, for a set whose goals move; empty for one that is solved once.
+        path: a posture (nq,) for each frame that proves it possible.
         dt: seconds between frames.
     """
 
@@ -30,10 +31,11 @@ class Case:
     problem: Problem
     witness: Array
     frames: tuple[tuple[Goal, ...], ...] = ()
+    path: tuple[Array, ...] = ()
     dt: float = 1.0 / 60.0
 
 
-Posed = tuple[Problem, Array] | tuple[Problem, Array, tuple[tuple[Goal, ...], ...]]
+Posed = tuple[Problem, Array] | tuple[Problem, Array, tuple[tuple[Goal, ...], ...], tuple[Array, ...]]
 """What a set poses: the first fields of a `Case` after its number."""
 
 

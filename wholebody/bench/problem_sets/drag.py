@@ -17,7 +17,7 @@ from wholebody.bench.problem_sets.bodies import (
     shaken,
     standing_problem,
 )
-from wholebody.bench.problem_sets.case import ProblemSet
+from wholebody.bench.problem_sets.case import Posed, ProblemSet
 from wholebody.bench.problem_sets.things import Occupied, add_things
 from wholebody.errors import InputError
 
@@ -29,14 +29,15 @@ STRIDE = 0.35  # share of the range of every joint between one control posture a
 TRIES, STARTS = 40, 50  # postures tried for a knot, and ways begun anew where none of them would do
 
 
-def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array, tuple[tuple[wb.Goal, ...], ...]]:
+def _posed(number: int, rng: np.random.Generator) -> Posed:
     """The goals are where the fingertip is in each posture of `way`; the first is where it is at the start."""
     figure, tip = human(), TIPS[number % len(TIPS)]
     postures = way(figure, rng)
     scene = floor_scene(figure)
     add_things(scene, THINGS, Occupied(figure, postures), ROOM, rng)
     goals = [point(figure, q, tip) for q in postures]
-    return standing_problem(scene, postures[0], goals[:1]), postures[0], tuple((goal,) for goal in goals[1:])
+    moving = tuple((goal,) for goal in goals[1:])
+    return standing_problem(scene, postures[0], goals[:1]), postures[0], moving, tuple(postures[1:])
 
 
 def way(figure: wb.Figure, rng: np.random.Generator) -> Array:

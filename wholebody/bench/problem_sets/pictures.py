@@ -9,9 +9,6 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
-from wholebody.bench.problem_sets import drag
-from wholebody.bench.problem_sets.bodies import human
-from wholebody.bench.problem_sets.case import generator
 from wholebody.bench.problem_sets.registry import SETS, problem_set
 from wholebody.view import Viewer
 
@@ -59,7 +56,7 @@ def draw(name: str, path: Path) -> Path:
     case = problem_set(name).make(shot.number, SEED)
     posture, ghosts = case.witness, [case.problem.start]
     if case.frames:
-        postures = drag.way(human(), generator(name, shot.number, SEED))
+        postures = case.path
         posture, ghosts = postures[-1], list(postures[:: len(postures) // GHOSTS][:GHOSTS])
         case.problem.retarget(case.frames[-1])
     hidden = [thing for thing in case.problem.scene.objects if thing.startswith(shot.see_through or ("-",))]

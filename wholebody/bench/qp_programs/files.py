@@ -1,4 +1,6 @@
-"""Programs as files that qpsolvers and qpbenchmark read: one .npz each, in the split form with a name for each part.
+"""Programs as files that qpsolvers reads: one .npz each, in the split form with a name for each part.
+
+Beside them stands a test set of qpbenchmark that has them all.
 
     minimise 1/2 z' P z + q' z    subject to    G z <= h,    A z = b,    lb <= z <= ub
 
@@ -13,16 +15,20 @@ import numpy as np
 
 from wholebody.bench.qp_programs.recording import Recorded
 from wholebody.errors import FileFormatError
-from wholebody.files import make_folder
+from wholebody.files import make_folder, read_text, write
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.split_form import split
+
+TEST_SET = "wholebody_postures"
+"""Name of the test set's file, without its suffix; qpbenchmark derives the name of the class from it."""
 
 KEYS = ("P", "q", "G", "h", "A", "b", "lb", "ub")
 
 
 def save(programs: list[Recorded], folder: Path) -> None:
-    """Write every program as NAME.npz, with the keys that `qpsolvers.Problem.load` reads."""
+    """Write every program as NAME.npz, with the keys that `qpsolvers.Problem.load` reads, and the test set."""
     make_folder(folder)
+    write(folder / f"{TEST_SET}.py", read_text(Path(__file__).with_name(f"{TEST_SET}.txt")))
     for one in programs:
         form, m = split(one.program), len(one.program.target)
         np.savez_compressed(

@@ -83,7 +83,7 @@ def _settings(arguments: argparse.Namespace) -> Settings:
     if arguments.cases is not None:
         check_count(arguments.cases, "--cases")
         amounts["cases"] = arguments.cases
-    return Settings(sets, adapters(chosen), seed=arguments.seed, **amounts)
+    return Settings(sets, adapters(chosen, starts=not arguments.quick), seed=arguments.seed, **amounts)
 
 
 def _jobs(arguments: argparse.Namespace) -> int:

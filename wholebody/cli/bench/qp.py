@@ -16,7 +16,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
         "qp",
         help="the quadratic programs of all problem sets by every solver alone",
         description="Record the programs that the QP method poses on the problem sets, keep them as files that "
-        "qpsolvers reads, and give them to every QP solver alone.",
+        "qpsolvers reads and as a test set of qpbenchmark, and give them to every QP solver alone.",
     )
     parser.add_argument("--count", type=int, default=2000, metavar="N", help="programs (default: 2000)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the problem sets (default: 0)")

@@ -57,9 +57,13 @@ class CCD:
     reach cones if the problem has `ReachCones`, clearances by the loop of Schmidl and Lin, which may turn
     other chains too. `Hold` is taken if no moving joint can move its frame; `Freeze` and `StepLimit` are taken.
 
-    Other terms (Balance, Plane, Axis, CenterOfMass, Relative, measures) are refused by name. The method has no
-    objective beside the goals. A problem without measures is taken although its default is `Effort()`: the descent
-    begins at the start and stops at the first posture that meets the goals, which is near the start and not the
+    What a person keeps by default is kept as far as it goes. Two-joint muscles and the neck are, while the descent
+    reaches: what their joints have beyond is given back after each sweep. The twist of upper arms is not, nor balance,
+    nor anything of them by the loop that removes overlap: the assessment tells.
+
+    Other terms (Balance, RangeOfMotion, Plane, Axis, CenterOfMass, Relative, measures) are refused by name. The method
+    has no objective beside the goals. A problem without measures is taken although its default is `Effort()`: the
+    descent begins at the start and stops at the first posture that meets the goals, which is near the start and not the
     nearest; `assessment.measure` gives its effort.
 
     Attributes:

@@ -13,6 +13,7 @@ from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.methods.ccd.cones import guards
 from wholebody.methods.ccd.limbs import Limbs, Placement, compiled_kernel, floats, moved, rotated
+from wholebody.methods.ccd.ranges import range_guards
 from wholebody.methods.ccd.sweep import Aims, sweep
 from wholebody.methods.ccd.terms import GoalPlace, Request
 from wholebody.methods.control import Control
@@ -83,6 +84,7 @@ class Reach:
         self._model, self._request = figure.model, request
         self.limbs = Limbs(figure.model, request.joints)
         self._guards = guards(figure, self.limbs, request.cones)
+        self._ranges = range_guards(figure, self.limbs, request.ranges)
         self._data = figure.model.createData()
 
     def run(self, q: Array, tolerance: float, most: int) -> tuple[Array, Reached]:
@@ -92,6 +94,7 @@ class Reach:
         pin.forwardKinematics(self._model, self._data, q)
         limbs.read(q, self._data)
         limbs.forward()
+        self._keep_ranges()
         for guard in self._guards:
             guard.read(self._data)
             guard.keep()
@@ -108,6 +111,7 @@ class Reach:
                 if rested:
                     break
             change = sweep(limbs, aims, steps)
+            self._keep_ranges()
             limbs.forward()
             for guard in self._guards:
                 guard.keep()
@@ -117,6 +121,11 @@ class Reach:
             rested = change < 1e-9
         limbs.write(q)
         return q, Reached(error, sweeps, rested)
+
+    def _keep_ranges(self) -> None:
+        moved = [guard.keep() for guard in self._ranges]
+        if any(moved):
+            self.limbs.forward()
 
     def disturbed(self, q: Array, size: float, rng: np.random.Generator) -> Array:
         """Copy of a posture q (nq,) with random joints, near their values or anywhere.

@@ -19,6 +19,7 @@ from wholebody.tasks.frame import Frame, Orientation
 from wholebody.tasks.hold import Hold
 from wholebody.tasks.inputs import target_rotation
 from wholebody.tasks.point import Point
+from wholebody.tasks.range_of_motion import RangeOfMotion
 from wholebody.tasks.reach_cones import ReachCones
 
 HELD = 1e-6  # m, rad: a hold that is met to this at the start is kept by joints that do not move
@@ -52,12 +53,14 @@ class Request:
         joints: Pinocchio's indices of the joints that move for the goals.
         fixed: joints that must not move, not even to resolve overlap.
         cones: names of the reach cones to keep.
+        ranges: names of the ranges of motion to keep while reaching, as far as it goes.
     """
 
     goals: tuple[GoalPlace, ...]
     joints: tuple[int, ...]
     fixed: frozenset[int]
     cones: tuple[str, ...]
+    ranges: tuple[str, ...]
 
 
 def read(problem: Problem) -> Request:
@@ -84,7 +87,10 @@ def read(problem: Problem) -> Request:
     moving = _dofs(figure, joints)
     state = State(problem.scene.model).update(problem.start)
     support = joint_support(problem.scene.model)
+    left_out = {id(term) for term in problem.defaults if not isinstance(term, ReachCones)}
     for number, term in enumerate(problem.constraints):
+        if id(term) in left_out:
+            continue
         where = f"constraints[{number}], {type(term).__name__}"
         if isinstance(term, ReachCones):
             cones.update(dict.fromkeys(figure.cones if term.names is None else term.names))
@@ -108,7 +114,8 @@ def read(problem: Problem) -> Request:
     refused += [f"joint {name!r}, which follows another one (mimic)" for name in list(followers_of(figure.model))[:1]]
     if refused:
         raise UnsupportedTermError("ccd", refused)
-    return Request(tuple(goals), tuple(sorted(joints)), frozenset(fixed), tuple(cones))
+    ranges = [name for term in problem.defaults if isinstance(term, RangeOfMotion) for name in term.row_names]
+    return Request(tuple(goals), tuple(sorted(joints)), frozenset(fixed), tuple(cones), tuple(ranges))
 
 
 def reaching(figure: Figure, frame: str) -> tuple[int, ...]:

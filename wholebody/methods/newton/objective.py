@@ -16,10 +16,10 @@ from wholebody.figures.state import State
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.system import System
 from wholebody.problem import Problem
-from wholebody.tasks import Discomfort, Displacement, Effort
+from wholebody.tasks import Discomfort, Displacement, Effort, Rhythm
 from wholebody.tasks.base import Measure
 
-CAN = (Effort, Displacement, Discomfort)  # sums over joints: minimised over the revolute ones alone
+CAN = (Effort, Displacement, Discomfort, Rhythm)  # minimised over the revolute joints alone
 SAMPLES = 3  # postures at which the dependence of a measure on joints is tested
 STIFFNESS = 10.0  # m^2 per unit of effort [rad^2]: weight of effort against motion; larger = nearer to least effort
 LEAST_STIFFNESS = 0.03  # rad^-2: half of the least second derivative of a joint

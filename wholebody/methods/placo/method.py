@@ -10,7 +10,7 @@ from wholebody.arrays import Array
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
-from wholebody.methods.differential import COMFORT, REGULAR, Iteration, Settings, StepError
+from wholebody.methods.differential import COMFORT, REGULAR, TOOL, Iteration, Settings, StepError
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, named_frames, unsupported
@@ -158,7 +158,8 @@ class _Programs:
         self._regular.set_weight(damping)
         self._robot.move(q)
         try:
-            theirs = self._solver.solve(False)
+            with TOOL:
+                theirs = self._solver.solve(False)
         except RuntimeError as error:
             raise StepError(" ".join(str(error).split())) from None
         return self._robot.displacement(theirs)

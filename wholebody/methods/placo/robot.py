@@ -19,6 +19,7 @@ from wholebody.errors import MissingPackageError
 from wholebody.figures.description import Follower
 from wholebody.figures.figure import Figure
 from wholebody.methods.base import UnsupportedTermError
+from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
 
 SWELL = 0.005
@@ -80,7 +81,8 @@ class Robot:
         for place, law in self._followers.items():
             theirs[place] = law.slope * q[law.idx_q] + law.offset
         self.wrapper.state.q = theirs
-        self.wrapper.update_kinematics()
+        with TOOL:
+            self.wrapper.update_kinematics()
 
     def posture(self) -> Array:
         """Our posture (nq,) where it is now."""

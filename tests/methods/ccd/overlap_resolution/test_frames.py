@@ -24,7 +24,7 @@ def _table(figure: wb.Figure) -> tuple[wb.Scene, list[Any]]:
     scene = wb.Scene(figure).add(wb.Box((0.6, 1.6, 0.04)), name="table", at=(0.6, 0.0, 0.95))
     standing = figure.posture("standing")
     above = figure.with_joints(standing, {"right_shoulder_flexion": 1.2, "right_elbow_flexion": 0.9})
-    press = figure.with_joints(above, {"right_shoulder_flexion": 0.8})
+    press = figure.with_joints(above, {"right_shoulder_flexion": 0.75})
     left = figure.with_joints(press, {"right_shoulder_abduction": -0.3})
     return scene, [above, press, left, press, above]
 

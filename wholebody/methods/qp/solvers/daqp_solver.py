@@ -21,7 +21,7 @@ class DAQPSolver(NativeSolver):
 
     name = "daqp"
 
-    def minimise(self, form: SplitForm, n: int, m: int) -> Native:
+    def minimise(self, form: SplitForm, n: int, m: int) -> Native | None:
         """See `NativeSolver.minimise`."""
         hessian = np.diag(form.diagonal)
         upper = np.concatenate([form.box_upper[:n], np.minimum(form.upper, FAR)])
@@ -33,7 +33,10 @@ class DAQPSolver(NativeSolver):
             sense = np.zeros(len(upper), dtype=c_int)
             sense[n : n + m] = EQUALITY
             self._workspace = daqp.Model()
-            self._workspace.setup(hessian, form.linear, form.matrix, upper, lower, sense)
+            flag, _ = self._workspace.setup(hessian, form.linear, form.matrix, upper, lower, sense)
+            if flag < 0:  # it refuses rows whose equalities depend on each other, as those of many frozen joints do
+                self._workspace = None
+                return None
             self._workspace.settings = {"primal_tol": TOLERANCE, "iter_limit": LIMIT}
         z, _, _, info = self._workspace.solve()
         multiplier = np.asarray(info["lam"])

@@ -56,6 +56,8 @@ class NativeSolver(QPSolver):
         iterations, x = 0, np.zeros(n)
         for _ in range(1 if self._workspace is None else 2):
             found = self.minimise(form, n, m)
+            if found is None:
+                break
             iterations += found.iterations
             x = self._own = np.where(np.isfinite(found.z[:n]), found.z[:n], 0.0) / SCALE
             solution = solve_from(program, read_active(found.box, found.push[:k]), CORRECTIONS)
@@ -65,11 +67,14 @@ class NativeSolver(QPSolver):
         return last_resort(program, x, iterations)
 
     @abstractmethod
-    def minimise(self, form: SplitForm, n: int, m: int) -> Native:
+    def minimise(self, form: SplitForm, n: int, m: int) -> Native | None:
         """Ask the solver.
 
         Args:
             form: what to solve; `self._workspace` is None where its size is another than that of the one before.
             n: variables with a box.
             m: soft rows, which come first.
+
+        Returns:
+            Its answer, or None where it refuses the program.
         """

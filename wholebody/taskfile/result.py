@@ -11,13 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array
+from wholebody.checks import instance, posture
+from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, one_line
 from wholebody.figures.state import State
-from wholebody.files import read_text
+from wholebody.files import read_text, write
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
 from wholebody.solution import Solution
-from wholebody.taskfile import Task, read_task
+from wholebody.taskfile.task import Task, read_task
 from wholebody.version import __version__
 
 
@@ -82,6 +84,55 @@ def as_json(description: dict[str, Any]) -> str:
     return json.dumps(_finite(description), indent=2, allow_nan=False) + "\n"
 
 
+class Result(NamedTuple):
+    """A result that was read: a task and the posture that a method found for it.
+
+    Attributes:
+        task: the task; `wb.assess(result.task.problem, result.q)` judges the posture again.
+        q: (nq,) the posture.
+        status: "solved", "unreachable", "infeasible" or "stalled".
+        message: the sentence that explains the status.
+        method: name of the method.
+        joints: joint to its value, radians or metres.
+    """
+
+    task: Task
+    q: Array
+    status: str
+    message: str
+    method: str
+    joints: dict[str, float]
+
+
+def read_result(path: str | os.PathLike[str]) -> Result:
+    """Read a result.json that `wholebody pose` or `write_result` wrote, and its task.
+
+    Raises:
+        FileFormatError: it is not a result, or does not fit the present task.
+        WholebodyError: its task cannot be read.
+    """
+    file = checked_path(path, "read_result: path")
+    data, task, q = _read(file)
+    texts = {name: data.get(name) for name in ("status", "message", "method")}
+    wrong = next((name for name, value in texts.items() if not isinstance(value, str)), None)
+    if wrong is not None:
+        raise FileFormatError(f"{file}, key {wrong}: is no text; give a result.json that `wholebody pose` wrote")
+    return Result(task, q, **texts, joints=task.problem.scene.figure.joint_values(q))  # type: ignore[arg-type]
+
+
+def write_result(task: Task, solution: Solution, path: str | os.PathLike[str]) -> Path:
+    """Write the solution of a task as a result.json, as `wholebody pose` does.
+
+    Raises:
+        InputError: not a task or not a solution of its figure, or the file cannot be written.
+    """
+    file = checked_path(path, "write_result: path")
+    instance(task, Task, "write_result: task", "give one of wb.read_task")
+    instance(solution, Solution, "write_result: solution", "give one of wb.solve")
+    posture(solution.q, task.problem.scene.model.nq, "write_result: the solution's posture")
+    return write(file, as_json(describe(task, solution, file.parent)))
+
+
 def read(path: Path) -> tuple[Task, Array]:
     """Read a result: its task, and its posture (nq,).
 
@@ -89,6 +140,10 @@ def read(path: Path) -> tuple[Task, Array]:
         FileFormatError: it is not a result, or does not fit the present task.
         WholebodyError: its task cannot be read.
     """
+    return _read(path)[1:]
+
+
+def _read(path: Path) -> tuple[dict[str, Any], Task, Array]:
     text = read_text(path, "result")
     try:
         data = json.loads(text)
@@ -98,7 +153,7 @@ def read(path: Path) -> tuple[Task, Array]:
     if not isinstance(data, dict) or not isinstance(data.get("task"), str) or not isinstance(data.get("q"), list):
         raise FileFormatError(f"{path}: has no task and q; give a result.json that `wholebody pose` wrote")
     task = read_task(path.parent / data["task"])
-    return task, _posture(path, data["q"], task.problem)
+    return data, task, _posture(path, data["q"], task.problem)
 
 
 def _posture(path: Path, entries: list[Any], problem: Problem) -> Array:

@@ -1,0 +1,36 @@
+"""Sit down on a chair with the back at its backrest and the soles on the floor: three contacts, one line each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from presenting import OAK, command_line, picture, report
+
+import wholebody as wb
+
+
+def build() -> wb.Problem:
+    """State the problem; tasks/take_a_seat.toml states the same."""
+    scene = wb.Scene(wb.load("human", sex="female", stature=1.65))
+    scene.add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.0, 0.38), color=OAK)
+    scene.add(wb.Box((0.03, 0.48, 0.36)), name="backrest", at=(-0.56, 0.0, 0.80), color=OAK)
+    return wb.Problem(
+        scene,
+        goals=[wb.Sit(on="seat", back="backrest")],
+        constraints=[wb.Stand(on="floor", balance=False)],
+    )
+
+
+def main(out: Path = Path("pictures"), pictures: bool = True) -> wb.Solution:
+    """Solve, report and draw."""
+    problem = build()
+    solution = wb.solve(problem)
+    report("Take a seat", problem, solution)
+    if pictures:
+        picture("take_a_seat", problem, solution, out, eye=(1.6, -2.6, 1.2), target=(-0.2, 0.0, 0.6))
+    return solution
+
+
+if __name__ == "__main__":
+    command_line(main, __doc__)

@@ -1,0 +1,76 @@
+"""A comparison leaves what is needed to do it again, and says what differs when it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from wholebody.bench.compare.lock import Figure, Locked, differences, in_words, read_lock, shares, write_lock
+from wholebody.cli import main
+from wholebody.errors import FileFormatError, InputError, UnknownNameError
+
+AMOUNTS = {"cases": 2, "sweep": 0, "levels": 1, "seed": 5, "cap": 5.0, "minutes": 1.0}
+FIGURES = {
+    ("robot_arm", "qp", "solved"): Figure(0.98, 0.95, 0.99),
+    ("robot_arm", "qp", "mean time"): Figure(3.0, 2.5, 3.5),
+    ("robot_arm", "dls", "solved"): Figure(0.5, 0.4, 0.6),
+}
+PUBLISHED = Locked(("robot_arm",), ("dls",), AMOUNTS, {"wholebody": "0.1", "load": "3"}, FIGURES)
+
+
+def changed(key: tuple[str, str, str], figure: Figure) -> Locked:
+    return replace(PUBLISHED, figures={**FIGURES, key: figure})
+
+
+def test_a_lock_file_comes_back(tmp_path: Path) -> None:
+    write_lock(tmp_path / "lock.json", PUBLISHED)
+    assert read_lock(tmp_path / "lock.json") == PUBLISHED
+    settings = read_lock(tmp_path / "lock.json").settings()
+    assert (settings.cases, settings.seed, [one.name for one in settings.adapters]) == (2, 5, ["dls"])
+
+
+def test_only_what_is_beyond_both_intervals_differs() -> None:
+    key = ("robot_arm", "dls", "solved")
+    assert differences(PUBLISHED, PUBLISHED) == []
+    assert differences(PUBLISHED, changed(key, Figure(0.62, 0.45, 0.75))) == []  # which holds what was published
+    assert differences(PUBLISHED, changed(key, Figure(0.58, 0.55, 0.61))) == []  # within what was published
+    (one,) = differences(PUBLISHED, changed(key, Figure(0.7, 0.65, 0.75)))
+    assert (one.method, one.what) == ("dls", "solved")
+    slower = differences(PUBLISHED, changed(("robot_arm", "qp", "mean time"), Figure(9.0, 8.0, 10.0)))
+    assert len(slower) == 1
+    assert shares(slower) == []
+
+
+def test_what_differs_is_said() -> None:
+    found = replace(changed(("robot_arm", "dls", "solved"), Figure(0.7, 0.65, 0.75)), facts={"wholebody": "0.2"})
+    assert in_words(PUBLISHED, found) == [
+        "3 figures compared; 1 differ by more than their intervals.",
+        "robot arm, dls, solved: 50.0 % [40, 60] published, 70.0 % [65, 75] now.",
+        "Other than published: wholebody 0.1, now 0.2.",
+    ]
+
+
+def test_other_files_and_unknown_methods_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "lock.json"
+    path.write_text("{}")
+    with pytest.raises(FileFormatError, match="no lock file"):
+        read_lock(path)
+    with pytest.raises(UnknownNameError, match="dlss"):
+        replace(PUBLISHED, methods=("dlss",)).settings()
+    with pytest.raises(InputError, match="no figure in common"):
+        differences(PUBLISHED, replace(PUBLISHED, figures={("a", "b", "c"): Figure(1.0, 1.0, 1.0)}))
+
+
+def test_a_comparison_is_done_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_lock(tmp_path / "lock.json", replace(PUBLISHED, figures={("robot_arm", "dls", "solved"): Figure(1, 0.9, 1)}))
+    out = tmp_path / "out"
+    main(["bench", "reproduce", str(tmp_path / "lock.json"), "--out", str(out)])
+    assert "1 figures compared" in capsys.readouterr().out
+    again = read_lock(out / "lock.json")
+    assert again.amounts == AMOUNTS
+    assert 0.0 <= again.figures["robot_arm", "dls", "solved"].value <= 1.0
+    capsys.readouterr()
+    assert main(["bench", "reproduce", str(out / "lock.json"), "--out", str(tmp_path / "second")]) == 0
+    assert "0 differ" in capsys.readouterr().out

@@ -1,0 +1,86 @@
+"""Clients that answer published problems without wholebody: run as scripts, judged by `wholebody bench judge`."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from wholebody.bench.problem_sets.registry import problem_set
+from wholebody.bench.published.answers import read_answers
+from wholebody.bench.published.export import export
+from wholebody.bench.published.judging import Verdict, judge
+
+SETS = ("free_reach", "robot_arm", "balance", "closed_loop", "drag")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return an export of one problem of some sets."""
+    found = tmp_path_factory.mktemp("clients") / "problems"
+    export([problem_set(name) for name in SETS], 1, 0, found)
+    return found
+
+
+def answered(script: Path, folder: Path, tmp_path: Path) -> Verdict:
+    """Run a client where wholebody cannot be imported, and judge what it wrote."""
+    out = tmp_path / "answers.json"
+    code = f"import sys, runpy; sys.modules['wholebody'] = None; sys.argv = {[str(script), str(folder), str(out)]!r}; "
+    done = subprocess.run(
+        [sys.executable, "-c", code + f"runpy.run_path({str(script)!r}, run_name='__main__')"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=200,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return judge(read_answers(out, folder), folder)
+
+
+def outcomes(verdict: Verdict) -> dict[tuple[str, str], Any]:
+    return {(one.set, one.seed): one.solved if one.outcome == "answered" else one.said for one in verdict.judged}
+
+
+def test_plain_pinocchio(root: Path, folder: Path, tmp_path: Path) -> None:
+    verdict = answered(root / "examples" / "clients" / "plain_pinocchio.py", folder, tmp_path)
+    found = outcomes(verdict)
+    assert len(found) == 2 * len(SETS)
+    assert all(found[name, "near"] is True for name in ("free_reach", "robot_arm", "closed_loop"))
+    assert found["drag", "far"] == "goals that move are not followed"
+    assert all(one.seconds > 0.0 for one in verdict.judged if one.outcome == "answered")
+
+
+def test_plain_mujoco(root: Path, folder: Path, tmp_path: Path) -> None:
+    """Another engine reads the same files: what it takes for free of overlap is so for Pinocchio and coal."""
+    pytest.importorskip("mujoco")
+    found = outcomes(answered(root / "examples" / "clients" / "plain_mujoco.py", folder, tmp_path))
+    assert all(found[name, "near"] is True for name in ("free_reach", "robot_arm", "closed_loop"))
+    assert found["balance", "near"] == "balance is not expressed"
+
+
+def test_another_engine_places_every_link_where_pinocchio_does(folder: Path) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    import numpy as np
+    import pinocchio as pin
+
+    body = json.loads((folder / "bodies" / "human.json").read_text())
+    urdf = str(folder / body["urdf"])
+    spec = mujoco.MjSpec.from_file(urdf)
+    spec.compiler.fusestatic = False
+    spec.worldbody.first_body().add_freejoint()
+    other = spec.compile()
+    model = pin.buildModelFromUrdf(urdf, pin.JointModelFreeFlyer())
+    q = np.array(json.loads((folder / "problems" / "free_reach" / "0000.json").read_text())["seeds"]["far"])
+    data, there = model.createData(), mujoco.MjData(other)
+    pin.framesForwardKinematics(model, data, q)
+    there.qpos[:7] = q[[0, 1, 2, 6, 3, 4, 5]]
+    for name, value in zip(body["coordinates"][7:], q[7:], strict=True):
+        there.qpos[other.joint(name).qposadr[0]] = value
+    mujoco.mj_kinematics(other, there)
+    links = [other.body(k).name for k in range(1, other.nbody)]
+    assert {"left_palm", "gaze", "right_index_tip"} <= set(links)
+    for name in links:
+        place = data.oMf[model.getFrameId(name, pin.FrameType.BODY)]
+        assert there.body(name).xpos == pytest.approx(place.translation, abs=1e-9)
+        assert there.body(name).xmat.reshape(3, 3) == pytest.approx(place.rotation, abs=1e-9)

@@ -1,0 +1,113 @@
+"""A problem that is written as a task file and read again is the same problem; results likewise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.figures.state import State
+
+EVERYTHING = Path(__file__).parents[1] / "data" / "tasks" / "everything.toml"
+
+
+def same(first: wb.Problem, second: wb.Problem) -> None:
+    np.testing.assert_allclose(first.start, second.start, atol=1e-12)
+    assert first.scene.piece_names == second.scene.piece_names
+    assert first.touching == second.touching
+    for ours, theirs in zip(first.scene.geometry.geometryObjects, second.scene.geometry.geometryObjects, strict=True):
+        np.testing.assert_allclose(ours.placement.homogeneous, theirs.placement.homogeneous, atol=1e-12)
+        assert ours.geometry == theirs.geometry
+    for name, thing in first.scene.objects.items():
+        assert second.scene.objects[name].color == thing.color
+        assert second.scene.objects[name].body == thing.body
+    np.testing.assert_allclose(first.clearances, second.clearances, atol=1e-9)
+    q = pin.integrate(first.scene.model, first.start, 0.1 * np.sin(np.arange(first.scene.model.nv)))
+    state = State(first.scene.model).update(q)
+    for mine, other in zip((*first.goals, *first.constraints), (*second.goals, *second.constraints), strict=True):
+        assert type(mine) is type(other)
+        values = [np.atleast_1d(t.error(state) if isinstance(t, wb.Goal) else t.value(state)) for t in (mine, other)]
+        np.testing.assert_allclose(*values, atol=1e-9)
+    for low, high in zip(first.bounds, second.bounds, strict=True):
+        np.testing.assert_allclose(low.bounds(state, None), high.bounds(state, None))
+    for ours_, theirs_ in zip(first.measures, second.measures, strict=True):
+        assert ours_.weight * ours_.value(state) == pytest.approx(theirs_.weight * theirs_.value(state))
+
+
+def test_everything_goes_round(tmp_path: Path) -> None:
+    problem = wb.read_task(EVERYTHING).problem
+    path = wb.write_task(problem, tmp_path / "again.toml", title='a "title"')
+    again = wb.read_task(path)
+    assert again.title == 'a "title"'
+    same(problem, again.problem)
+
+
+def test_a_problem_of_a_script_goes_round(tmp_path: Path, root: Path) -> None:
+    """Holds take their placement at the start; a mesh of arrays goes into a file beside the task."""
+    import trimesh
+
+    arm = root / "examples" / "tasks" / "arm.urdf"
+    scene = wb.Scene(wb.load(arm))
+    scene.add(wb.Mesh(trimesh.creation.icosahedron()), name="rock one", at=(0.9, 0.4, 0.2), color="tomato")
+    scene.add(wb.Sphere(0.05), name="ball", at=(1.5, 0, 1), body=wb.Body(mass=0.3, velocity=(1, 0, 0)))
+    q = scene.figure.posture(scene.figure.postures[0]) + 0.1
+    q = scene.figure.clamp(q)
+    tip = scene.figure.segments[-1]
+    problem = wb.Problem(scene, q, goals=[wb.Point(tip, (0.4, 0.1, 0.6))], constraints=[wb.Plane(tip, (0, 1, 0))])
+    path = wb.write_task(problem, tmp_path / "task.toml")
+    same(problem, wb.read_task(path).problem)
+    assert (tmp_path / "task-rock_one.obj").exists()
+
+
+def test_a_scene_alone_and_a_result(tmp_path: Path) -> None:
+    scene = wb.Scene(wb.load("human", sex="female", stature=1.6)).add(wb.HalfSpace(), name="floor")
+    task = wb.read_task(wb.write_task(scene, tmp_path / "scene.toml"))
+    assert (task.problem.goals, task.problem.constraints) == ((), ())
+    solution = wb.solve(task.problem)
+    result = wb.read_result(wb.write_result(task, solution, tmp_path / "result.json"))
+    np.testing.assert_array_equal(result.q, solution.q)
+    assert (result.status, result.message, result.method) == (solution.status, solution.message, solution.method)
+
+
+def test_what_a_task_file_cannot_say_is_named(tmp_path: Path) -> None:
+    figure = wb.load("human")
+    with pytest.raises(wb.InputError, match="reduced"):
+        wb.write_task(wb.Scene(figure.reduced(["right_arm"])), tmp_path / "a.toml")
+    problem = wb.Problem(wb.Scene(figure), constraints=[wb.StepLimit()])
+    with pytest.raises(wb.InputError, match=r"constraints\[0\] is a StepLimit"):
+        wb.write_task(problem, tmp_path / "a.toml")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture
+def told(recwarn: Any) -> Any:
+    return lambda: [str(entry.message) for entry in recwarn if entry.category is UserWarning]
+
+
+def test_a_figure_that_nothing_holds_is_told_of(told: Any) -> None:
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    goal = wb.Point("right_index_tip", (1.5, -0.3, 1.2))
+    assert wb.solve(wb.Problem(scene, goals=[goal])).status == "solved"
+    assert "nothing holds the figure: its root moved" in told()[0]
+
+
+def test_a_figure_that_is_held_is_not(told: Any) -> None:
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    goal = wb.Point("right_index_tip", (0.5, -0.3, 1.2))
+    wb.solve(wb.Problem(scene, goals=[goal], constraints=[wb.Hold("left_foot")]))
+    assert not told()
+
+
+def test_millimetres_are_thought_of(told: Any, tmp_path: Path) -> None:
+    wb.Scene(wb.load("hand")).add(wb.Sphere(0.1), name="ball", at=(800, 0, 0))
+    assert "divide millimetres by 1000" in told()[0]
+    with pytest.raises(wb.InputError, match=r"1\.75 if it is in millimetres"):
+        wb.load("human", stature=1750)
+    file = tmp_path / "t.toml"
+    file.write_text('[figure]\nname = "human"\n[[goal]]\ntype = "point"\nframe = "gaze"\ntarget = [800, 0, 1]\n')
+    with pytest.raises(wb.FileFormatError, match=r"0\.8 if it is in millimetres"):
+        wb.read_task(file)

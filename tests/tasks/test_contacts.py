@@ -1,0 +1,240 @@
+"""Contact terms: distances by formula on both sides of zero, derivatives by finite differences, solved by methods."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.figures.state import State
+
+SEAT = 0.40  # m: top of the seat
+
+
+@pytest.fixture(scope="module")
+def scene() -> wb.Scene:
+    made = wb.Scene(wb.load("human", sex="male", stature=1.75))
+    made.add(wb.HalfSpace(), name="floor")
+    made.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.0, SEAT - 0.02))
+    made.add(wb.Box((0.03, 0.48, 0.36)), name="backrest", at=(-0.57, 0.0, 0.82))
+    made.add(wb.Box((0.30, 0.32, 0.24)), name="box", at=(0.45, 0.0, 0.92))
+    made.add(wb.Sphere(0.2), name="ball", at=(0.1, -0.9, 1.3))
+    made.add(wb.Capsule(0.015, 0.5), name="bar", at=(0.4, -0.3, 1.2, 0.6, 0.0, 0.0, 0.8))
+    return made
+
+
+TERMS = {
+    "touch": wb.Touch("left_hand", "box"),
+    "touch_piece": wb.Touch("left_forearm", "ball"),
+    "touch_point": wb.Touch("right_index_tip", "ball"),
+    "touch_itself": wb.Touch("right_hand", "left_thigh"),
+    "lean": wb.Lean("backrest"),
+    "sit": wb.Sit("seat"),
+    "sit_back": wb.Sit("seat", "backrest"),
+    "stand": wb.Stand("floor"),
+    "palm": wb.Grasp("left", "box"),
+    "palm_side": wb.Grasp("right_hand", "box", side=(0, 0, 1)),
+    "power": wb.Grasp("right", "bar", "power"),
+    "pinch": wb.Grasp("right", "bar", "pinch"),
+}
+HALF = 2e-6  # m, rad: half of a difference; coal's distances are good to 1e-9
+
+
+@pytest.mark.parametrize("name", TERMS)
+@pytest.mark.parametrize("shift", [0.0, -0.3])  # the second puts feet, pelvis and hands into things
+def test_derivative_of_every_contact(scene: wb.Scene, name: str, shift: float) -> None:
+    figure, model = scene.figure, scene.model
+    term = TERMS[name].resolve(scene, figure.posture("standing"))
+    state, rng = State(model), np.random.default_rng(4)
+    for number in range(3):
+        q = pin.integrate(model, figure.posture("sitting" if number else "arms_forward"), 0.1 * rng.normal(size=55))
+        q[2] += shift
+        given = term.jacobian(state.update(q))
+        kinks = 0
+        for dof in range(model.nv):
+            step = np.zeros(model.nv)
+            step[dof] = HALF
+            ahead = term.value(state.update(pin.integrate(model, q, step)))
+            behind = term.value(state.update(pin.integrate(model, q, -step)))
+            slope = (ahead - behind) / (2.0 * HALF)
+            kinks += int(np.abs(slope - given[:, dof]).max() > 3e-3)
+        assert kinks <= 1  # where another piece becomes the nearest one within the difference
+
+
+@pytest.mark.parametrize("depth", [0.3, 0.02, 1e-4, -1e-4, -0.02, -0.1])
+def test_touch_is_the_signed_distance(depth: float) -> None:
+    """A point and a ball: the distance is a formula, and the derivative is the direction."""
+    figure = wb.load("human")
+    q = figure.posture("standing")
+    tip = figure.placement(q, "right_index_tip").translation
+    way = np.array((0.6, -0.64, 0.48))
+    scene = wb.Scene(figure).add(wb.Sphere(0.2), name="ball", at=tip + (0.2 + depth) * way)
+    touch = wb.Touch("right_index_tip", "ball").resolve(scene, q)
+    state = scene.state(q)
+    assert touch.value(state)[0] == pytest.approx(depth, abs=1e-8)
+    point = wb.Point("right_index_tip", (0, 0, 0)).resolve(scene, q)
+    np.testing.assert_allclose(touch.jacobian(state)[0], -way @ state.wrench_jacobian(point.jacobian(state)), atol=1e-5)
+
+
+def test_touch_of_a_segment_is_coals_least_distance(scene: wb.Scene) -> None:
+    q = scene.figure.posture("arms_forward")
+    state = scene.state(q)
+    pieces, owners = scene.geometry.geometryObjects, scene.piece_owner
+    least = min(
+        coal.distance(
+            a.geometry, _at(state, a), b.geometry, _at(state, b), coal.DistanceRequest(), coal.DistanceResult()
+        )
+        for a, mine in zip(pieces, owners, strict=True)
+        for b, other in zip(pieces, owners, strict=True)
+        if (mine, other) == ("left_hand", "box")
+    )
+    assert wb.Touch("left_hand", "box").resolve(scene, q).value(state)[0] == pytest.approx(least, abs=2e-6)
+
+
+def _at(state: State, piece: Any) -> Any:
+    place = state.data.oMi[piece.parentJoint] * piece.placement
+    return coal.Transform3s(place.rotation, place.translation)
+
+
+def test_a_thing_that_is_moved_is_touched_where_it_is(scene: wb.Scene) -> None:
+    own = copy.deepcopy(scene)
+    q = own.figure.posture("standing")
+    touch = wb.Touch("right_index_tip", "ball").resolve(own, q)
+    before = touch.value(own.state(q))[0]
+    own.move("ball", at=np.array((0.1, -0.9, 1.3)) + (0.0, -1.0, 0.0))
+    assert touch.value(own.state(q))[0] > before + 0.5
+    assert pickle.loads(pickle.dumps(touch)).value(own.state(q))[0] == pytest.approx(touch.value(own.state(q))[0])
+
+
+@pytest.mark.parametrize("method", ["qp", "newton"])
+def test_sits_with_the_back_at_the_backrest(scene: wb.Scene, method: str) -> None:
+    problem = wb.Problem(
+        scene, goals=[wb.Sit("seat", "backrest")], constraints=[wb.Stand("floor", balance=False)], clearance=0.003
+    )
+    solution = wb.solve(problem, method)
+    assert solution.status == "solved"
+    touching = _touching(scene, solution.q)
+    assert touching & {("pelvis", "seat"), ("left_thigh", "seat"), ("right_thigh", "seat")}
+    assert any(other == "backrest" for _, other in touching)
+    assert {("left_foot", "floor"), ("right_foot", "floor")} <= touching
+    pelvis = scene.figure.placement(solution.q, "pelvis")
+    assert SEAT + 0.06 < pelvis.translation[2] < SEAT + 0.16
+    assert pelvis.rotation[0, 0] > 0.8  # looks forward
+    assert solution.assessment.penetration < 1e-5
+
+
+def _touching(scene: wb.Scene, q: Any) -> set[tuple[str, str]]:
+    owners = scene.piece_owner
+    return {(owners[a], owners[b]) for a, b in scene.contacts(q, within=2e-5).pair}
+
+
+def test_both_palms_on_a_box_as_constraints(scene: wb.Scene) -> None:
+    """As constraints they hold while a goal is reached for."""
+    palms = [wb.Grasp("left", "box"), wb.Grasp("right", "box")]
+    problem = wb.Problem(
+        scene, goals=[wb.Axis("gaze", (1, 0, 0), toward=(0.45, 0, 0.92))], constraints=[*palms, wb.Stand("floor")]
+    )
+    solution = wb.solve(problem, wb.QP(measures=False))
+    assert solution.status == "solved"
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        palm = scene.figure.placement(solution.q, f"{side}_palm")
+        np.testing.assert_allclose(palm.rotation[:, 2], (0.0, -sign, 0.0), atol=1e-4)
+        assert 0.15 < sign * palm.translation[1] < 0.19  # on the face at 0.16
+        assert abs(palm.translation[0] - 0.45) < 0.15
+        assert abs(palm.translation[2] - 0.92) < 0.12
+    assert {("left_hand", "box"), ("right_hand", "box")} <= _touching(scene, solution.q)
+
+
+def test_a_hand_around_a_bar(scene: wb.Scene) -> None:
+    problem = wb.Problem(scene, goals=[wb.Grasp("right", "bar", "power")], constraints=[wb.Stand("floor")])
+    solution = wb.solve(problem)
+    assert solution.status == "solved"
+    palm, bar = scene.figure.placement(solution.q, "right_palm"), scene.objects["bar"].placement
+    assert abs(palm.rotation[:, 1] @ bar.rotation[:, 2]) == pytest.approx(1.0, abs=1e-6)
+    assert abs(bar.actInv(palm.translation)[2]) < 0.25
+
+
+def test_who_stands_keeps_the_balance_where_the_feet_are() -> None:
+    """The feet slide: the centre of mass is over the soles at the end, not over those of the start."""
+    figure = wb.load("human")
+    scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+    problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (1.5, -0.2, 0.9))], constraints=[wb.Stand("floor")])
+    solution = wb.solve(problem)
+    assert solution.status == "solved"
+    heel = figure.placement(solution.q, "right_heel").translation
+    tip = figure.placement(solution.q, "right_toe_tip").translation
+    center = pin.centerOfMass(figure.model, figure.model.createData(), solution.q)
+    assert heel[0] > 0.1
+    assert min(heel[0], tip[0]) - 0.05 < center[0] < max(heel[0], tip[0]) + 0.05
+    for side in ("left", "right"):
+        sole = figure.placement(solution.q, f"{side}_sole")
+        assert sole.rotation[2, 2] > 1.0 - 1e-8
+        assert abs(sole.translation[2]) < 1e-5
+
+
+def test_the_rest_of_the_problem_may_be_simplified(scene: wb.Scene) -> None:
+    problem = wb.Problem(
+        scene, goals=[wb.Touch("right_hand", "ball")], constraints=[wb.Grasp("left", "box"), wb.Stand("floor")]
+    )
+    for lock in (True, False):
+        smaller = wb.simplify(problem, lock=lock)
+        assert len(smaller.problem.constraints) == 2
+        whole = smaller.posture(wb.solve(smaller.problem).q)
+        assert wb.assess(problem, whole).met(1e-4)
+        assert wb.assess(problem, whole).holds(1e-4)
+
+
+@pytest.mark.parametrize("method", ["ccd", "placo"])
+def test_other_methods_refuse_by_name(scene: wb.Scene, method: str) -> None:
+    problem = wb.Problem(scene, goals=[wb.Touch("right_hand", "ball")])
+    with pytest.raises(wb.InputError, match="Touch"):
+        wb.solve(problem, method)
+
+
+@pytest.mark.parametrize(
+    ("term", "sentence"),
+    [
+        (lambda: wb.Touch("left_hnd", "box"), "left_hand"),
+        (lambda: wb.Touch("left_hand", "boks"), "box"),
+        (lambda: wb.Touch("left_hand", "left_palm"), "cannot move relative"),
+        (lambda: wb.Sit("seat", "left_palm"), "has no face"),
+        (lambda: wb.Sit("chair"), "seat|chair"),
+        (lambda: wb.Stand("floor", feet=["left_sole"]), "no pieces"),
+        (lambda: wb.Stand("floor", feet=[]), "feet is empty"),
+        (lambda: wb.Grasp("middle", "box"), "'left' or 'right'"),
+        (lambda: wb.Grasp("left", "floor", "power"), "no end"),
+        (lambda: wb.Grasp("left", "box", "claw"), "palm"),
+        (lambda: wb.Lean("backrest", side=(0, 0, 0)), "no direction"),
+    ],
+)
+def test_mistakes_are_named(scene: wb.Scene, term: Any, sentence: str) -> None:
+    with pytest.raises(wb.WholebodyError, match=sentence):
+        term().resolve(scene, scene.figure.posture("standing"))
+
+
+@pytest.mark.parametrize("height", [0.6, 0.02, 0.0, -0.05])
+def test_grounded_puts_the_soles_on_the_floor(height: float) -> None:
+    figure = wb.load("human")
+    scene = wb.Scene(figure).add(wb.HalfSpace(offset=0.25), name="floor").add(wb.Box((0.1, 0.1, 2.0)), name="post",
+                                                                             at=(0.4, 0.0, 1.0))  # fmt: skip
+    q = figure.posture("standing")
+    q[2] += 0.25 + height
+    down = figure.grounded(q, scene)
+    np.testing.assert_allclose(np.delete(down, 2), np.delete(q, 2))
+    assert down[2] - q[2] == pytest.approx(-height, abs=1e-5)
+    assert scene.contacts(down, 0.01).distance.min() == pytest.approx(0.0, abs=1e-5)
+
+
+def test_grounded_says_what_is_missing() -> None:
+    figure = wb.load("human")
+    q = figure.posture("standing")
+    with pytest.raises(wb.InputError, match="nothing to stand on"):
+        figure.grounded(q, wb.Scene(figure))
+    with pytest.raises(wb.InputError, match="scene of this figure"):
+        figure.grounded(q, wb.Scene(wb.load("hand")))

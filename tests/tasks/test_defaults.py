@@ -1,0 +1,78 @@
+"""What a problem of a person keeps without being told."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import wholebody as wb
+
+LEFT, RIGHT = wb.Hold("left_foot"), wb.Hold("right_foot")
+
+
+@pytest.fixture(scope="module")
+def scene() -> wb.Scene:
+    return wb.Scene(wb.load("human"))
+
+
+def kinds(problem: wb.Problem) -> set[str]:
+    return {type(term).__name__ for term in problem.defaults}
+
+
+@pytest.mark.parametrize(
+    ("constraints", "stands"),
+    [
+        ([LEFT, RIGHT], True),
+        ([wb.Hold("left_sole", orientation=False), wb.Hold("right_heel")], True),
+        ([LEFT], False),
+        ([], False),
+        ([LEFT, RIGHT, wb.Hold("left_palm")], False),
+        ([LEFT, RIGHT, wb.Hold("pelvis")], False),
+        ([LEFT, RIGHT, wb.Freeze("root")], False),
+        ([LEFT, RIGHT, wb.Freeze("left_arm")], True),
+        ([LEFT, RIGHT, wb.Hold("left_palm", relative_to="right_palm")], True),
+        ([LEFT, wb.Hold("right_foot", (0.2, -0.1, 0.3))], False),
+        ([LEFT, RIGHT, wb.Balance(margin=0.02)], False),
+    ],
+)
+def test_who_holds_both_feet_and_nothing_else_stands(scene: wb.Scene, constraints: list[Any], stands: bool) -> None:
+    problem = wb.Problem(scene, constraints=constraints)
+    assert kinds(problem) == {"RangeOfMotion", "ReachCones"} | ({"Balance"} if stands else set())
+    assert [type(term) for term in problem.stated] == [
+        type(term) for term in constraints if not isinstance(term, wb.Freeze)
+    ]
+
+
+def test_defaults_are_switched_off_and_on(scene: wb.Scene) -> None:
+    feet = [LEFT, RIGHT]
+    assert kinds(wb.Problem(scene, constraints=feet, balance=False)) == {"RangeOfMotion", "ReachCones"}
+    assert kinds(wb.Problem(scene, constraints=feet, range_of_motion=False)) == {"Balance"}
+    assert kinds(wb.Problem(scene, balance=True, range_of_motion=False)) == {"Balance"}
+
+
+def test_what_is_stated_takes_the_place_of_a_default(scene: wb.Scene) -> None:
+    stated = [wb.RangeOfMotion(["neck"]), wb.ReachCones(["left_shoulder"])]
+    assert kinds(wb.Problem(scene, constraints=stated)) == set()
+
+
+@pytest.mark.parametrize("name", ["avatar", "hand"])
+def test_only_a_person_has_them(name: str) -> None:
+    assert kinds(wb.Problem(wb.Scene(wb.load(name)))) == set()
+
+
+@pytest.mark.parametrize("method", [wb.CCD(), wb.DampedLeastSquares()], ids=["ccd", "dls"])
+def test_methods_that_cannot_take_one_leave_it_to_the_judge(scene: wb.Scene, method: Any) -> None:
+    problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.4, -0.2, 1.2))], constraints=[LEFT, RIGHT])
+    assert method.accepts(problem) is None
+    assert "Balance" in method.accepts(wb.Problem(scene, constraints=[wb.Balance()]))
+
+
+def test_a_reach_that_would_fall_over_is_unreachable(scene: wb.Scene) -> None:
+    goal = wb.Point("right_index_tip", (1.45, -0.2, 0.9))
+    kept, fallen = (
+        wb.solve(wb.Problem(scene, goals=[goal], constraints=[LEFT, RIGHT], balance=balance))
+        for balance in (None, False)
+    )
+    assert (kept.status, fallen.status) == ("unreachable", "solved")
+    assert kept.assessment.constraint_violation < 1e-5

@@ -1,0 +1,87 @@
+"""The rhythm of shoulder girdle and lumbar spine against the numbers of its sources."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.errors import InputError
+from wholebody.figures.state import State
+from wholebody.tasks.base import filled
+
+
+@pytest.fixture(scope="module")
+def scene() -> wb.Scene:
+    return wb.Scene(wb.load("human"))
+
+
+def value(scene: wb.Scene, degrees: dict[str, float], tilt: float = 0.0) -> float:
+    """The measure where joints have these angles and the pelvis tips by `tilt` degrees, from a neutral start."""
+    figure = scene.figure
+    straight = pin.neutral(figure.model)
+    q = figure.with_joints(straight, {joint: math.radians(angle) for joint, angle in degrees.items()})
+    q[4], q[6] = math.sin(math.radians(tilt) / 2.0), math.cos(math.radians(tilt) / 2.0)
+    return float(wb.Rhythm().resolve(scene, straight).value(State(figure.model).update(q)))
+
+
+@pytest.mark.parametrize("joint", ["shoulder_flexion", "shoulder_abduction"])
+@pytest.mark.parametrize("elevation", [30.0, 60.0, 90.0, 120.0, 150.0])
+def test_clavicle_follows_its_arm(scene: wb.Scene, joint: str, elevation: float) -> None:
+    """0.2 (elevation - 30 degrees), to 3 degrees, in whatever plane the arm is raised."""
+    angles = np.arange(0.0, 40.0, 0.5)
+    raised = {f"left_{joint}": elevation}
+    found = [value(scene, {**raised, "left_clavicle_elevation": angle}) for angle in angles]
+    assert angles[int(np.argmin(found))] == pytest.approx(0.2 * (elevation - 30.0), abs=3.0)
+    assert min(found) < 100.0 * math.radians(0.5) ** 2
+
+
+@pytest.mark.parametrize(("pelvis", "lumbar"), [(10.3, 19.7), (26.1, 33.9), (47.5, 42.5)])
+def test_lumbar_spine_and_pelvis_share_bending(scene: wb.Scene, pelvis: float, lumbar: float) -> None:
+    """Lumbar to hip motion of 1.9, 0.9 and 0.4 in the thirds of 90 degrees: that is where the sums above come from."""
+    angles = np.arange(0.0, 60.0, 0.5)
+    found = [value(scene, {f"spine{k}_flexion": angle / 3.0 for k in (1, 2, 3)}, pelvis) for angle in angles]
+    assert angles[int(np.argmin(found))] == pytest.approx(lumbar, abs=3.5)
+    ratios = np.array([1.9, 0.9, 0.4])
+    assert np.cumsum(30.0 * ratios / (1.0 + ratios))[-1] == pytest.approx(42.4, abs=0.1)
+
+
+def test_a_start_that_bends_is_what_counts(scene: wb.Scene) -> None:
+    figure = scene.figure
+    for name in ("prone", "sitting", "squatting"):
+        q = figure.posture(name)
+        term = wb.Rhythm().resolve(scene, q)
+        assert term.lumbar is not None
+        turned = pin.SE3(pin.utils.rotate("z", 1.0), np.zeros(3)) * pin.XYZQUATToSE3(q[:7])
+        q[:7] = pin.SE3ToXYZQUAT(turned)  # which way it faces does not count
+        clavicles = filled(term, lumbar=None)
+        state = State(figure.model).update(q)
+        assert term.value(state) == pytest.approx(clavicles.value(state), abs=1e-9)
+
+
+def test_figures_without_clavicles_are_told(scene: wb.Scene) -> None:
+    with pytest.raises(InputError, match="no clavicles and no lumbar spine"):
+        wb.Rhythm().resolve(wb.Scene(wb.load("hand")), wb.load("hand").neutral)
+    assert [type(term) for term in wb.Problem(wb.Scene(wb.load("avatar"))).measures] == [wb.Effort]
+
+
+def test_curvature_bounds_the_second_derivative(scene: wb.Scene) -> None:
+    """The diagonal less the Hessian of the squares has no negative eigenvalue where the rhythm is kept."""
+    figure = scene.figure
+    term = wb.Rhythm().resolve(scene, figure.neutral)
+    q = figure.neutral
+    state = State(figure.model)
+    size = 1e-5
+    steps = size * np.eye(figure.model.nv)
+    hessian = np.array(
+        [
+            (term.gradient(state.update(pin.integrate(figure.model, q, step))).copy()
+             - term.gradient(state.update(pin.integrate(figure.model, q, -step)))) / (2.0 * size)
+            for step in steps
+        ]
+    )  # fmt: skip
+    left = np.diag(term.curvature(state.update(q))) - 0.5 * (hessian + hessian.T)
+    assert np.linalg.eigvalsh(left).min() > -3.0  # the bend of the rise itself, 100 * 2 * 13 deg * what is missed

@@ -1,0 +1,198 @@
+"""What a comparison found, with all that is needed to do it again; and what differs, when it is done again.
+
+A figure differs where the published value is outside of the new interval, and the new one outside of the published.
+Times are compared in units of the reference kernel, so that another machine does not differ for its speed alone.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from wholebody.bench.adapters import adapters
+from wholebody.bench.compare.pages import Material
+from wholebody.bench.compare.settings import Settings
+from wholebody.bench.compare.statistics import LEAST
+from wholebody.bench.compare.summary import kernel_of
+from wholebody.bench.problem_sets.registry import problem_set
+from wholebody.bench.report import words
+from wholebody.bench.tables import write_text
+from wholebody.errors import FileFormatError, InputError
+from wholebody.files import read_text
+
+NAME = "lock.json"
+FORMAT = "wholebody comparison"
+VERSION = "1.0"
+AMOUNTS = ("cases", "sweep", "levels", "seed", "cap", "minutes")
+
+
+class Figure(NamedTuple):
+    """A figure with its interval; NaN and an open interval where there is none."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Locked:
+    """A comparison as it was published.
+
+    Attributes:
+        sets, methods: names.
+        amounts: the numbers of its settings.
+        facts: of the machine and the versions.
+        figures: by set, method and name: "solved", as a share, and "mean time", in kernels.
+    """
+
+    sets: tuple[str, ...]
+    methods: tuple[str, ...]
+    amounts: Mapping[str, float]
+    facts: Mapping[str, str]
+    figures: Mapping[tuple[str, str, str], Figure]
+
+    def settings(self) -> Settings:
+        """The settings to do it again.
+
+        Raises:
+            UnknownNameError: a set or a method is not known, or not installed.
+        """
+        given = self.amounts
+        return Settings(
+            tuple(problem_set(name) for name in self.sets),
+            adapters(self.methods),
+            cases=int(given["cases"]),
+            sweep=int(given["sweep"]),
+            levels=int(given["levels"]),
+            seed=int(given["seed"]),
+            cap=given["cap"],
+            minutes=given["minutes"],
+        )
+
+
+def locked(given: Material) -> Locked:
+    """What a comparison found."""
+    kernel = 1e3 * kernel_of(given.chunks).value
+    figures: dict[tuple[str, str, str], Figure] = {}
+    for row in given.rows:
+        if row.refused < row.cases:
+            figures[row.set, row.method, "solved"] = Figure(row.success, row.success_low, row.success_high)
+            mean = (row.mean_ms / kernel, row.mean_low_ms / kernel, row.mean_high_ms / kernel)
+            if row.cases - row.refused >= LEAST and all(isfinite(value) for value in mean):
+                figures[row.set, row.method, "mean time"] = Figure(*mean)
+    asked = given.settings
+    return Locked(
+        tuple(family.name for family in asked.sets),
+        tuple(adapter.name for adapter in asked.adapters),
+        {name: getattr(asked, name) for name in AMOUNTS},
+        given.facts,
+        figures,
+    )
+
+
+def write_lock(path: Path, found: Locked) -> None:
+    """Write a lock file."""
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "sets": list(found.sets),
+        "methods": list(found.methods),
+        "amounts": dict(found.amounts),
+        "facts": dict(found.facts),
+        "figures": [[*key, *figure] for key, figure in found.figures.items()],
+    }
+    write_text(path, json.dumps(content, indent=1) + "\n")
+
+
+def read_lock(path: Path) -> Locked:
+    """Read a lock file.
+
+    Raises:
+        FileFormatError: it is none.
+    """
+    text = read_text(path, "lock file")
+    try:
+        content: Any = json.loads(text)
+        if content["format"] != FORMAT or content["version"] != VERSION:
+            raise ValueError(f"its format is not {FORMAT!r} {VERSION}")
+        return Locked(
+            tuple(map(str, content["sets"])),
+            tuple(map(str, content["methods"])),
+            {name: float(content["amounts"][name]) for name in AMOUNTS},
+            {str(name): str(value) for name, value in content["facts"].items()},
+            {(str(a), str(b), str(c)): Figure(float(x), float(y), float(z)) for a, b, c, x, y, z in content["figures"]},
+        )
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise FileFormatError(
+            f"{path}: no lock file of `wholebody bench compare` ({error}); give the {NAME} of a run"
+        ) from None
+
+
+class Difference(NamedTuple):
+    """One figure that is not what was published."""
+
+    set: str
+    method: str
+    what: str
+    published: Figure
+    found: Figure
+
+
+def differences(published: Locked, found: Locked) -> list[Difference]:
+    """Figures that differ beyond their intervals, in the order of the lock file.
+
+    Raises:
+        InputError: the two have no figure in common.
+    """
+    common = [key for key in published.figures if key in found.figures]
+    if not common:
+        raise InputError(
+            "the two comparisons have no figure in common; give the lock file of the same sets and methods"
+        )
+    return [
+        Difference(*key, published.figures[key], found.figures[key])
+        for key in common
+        if _apart(published.figures[key], found.figures[key])
+    ]
+
+
+def _apart(one: Figure, other: Figure) -> bool:
+    return not (one.low <= other.value <= one.high or other.low <= one.value <= other.high)
+
+
+def in_words(published: Locked, found: Locked) -> list[str]:
+    """What differs, a sentence each: figures first, then what of the machine and the versions."""
+    common = sum(key in found.figures for key in published.figures)
+    differing = differences(published, found)
+    said = [f"{common} figures compared; {len(differing)} differ by more than their intervals."]
+    said += [
+        f"{words(one.set)}, {one.method}, {one.what}: {_shown(one.what, one.published)} published, "
+        f"{_shown(one.what, one.found)} now."
+        for one in differing
+    ]
+    missing = [key for key in published.figures if key not in found.figures]
+    if missing:
+        said.append(f"{len(missing)} published figures were not found again, {', '.join(missing[0])} first.")
+    changed = [
+        f"{name} {value}, now {found.facts.get(name, 'absent')}"
+        for name, value in published.facts.items()
+        if found.facts.get(name) != value and name not in ("load", "date")
+    ]
+    if changed:
+        said.append(f"Other than published: {'; '.join(changed)}.")
+    return said
+
+
+def _shown(what: str, figure: Figure) -> str:
+    if what == "solved":
+        return f"{100 * figure.value:.1f} % [{100 * figure.low:.0f}, {100 * figure.high:.0f}]"
+    return f"{figure.value:.3g} kernels [{figure.low:.3g}, {figure.high:.3g}]"
+
+
+def shares(found: Sequence[Difference]) -> list[Difference]:
+    """Those that are of what is solved: they do not depend on the machine."""
+    return [one for one in found if one.what == "solved"]

@@ -1,0 +1,102 @@
+"""A page for every set and for every method: what the report says of it alone, with a link to the others."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from wholebody.bench.compare.advice import choices, effort, error, slowness, standings
+from wholebody.bench.compare.charts import groups
+from wholebody.bench.compare.paired import named
+from wholebody.bench.compare.rankings import in_words, rankings
+from wholebody.bench.compare.results import Results
+from wholebody.bench.compare.settings import Settings
+from wholebody.bench.compare.store import Chunk
+from wholebody.bench.compare.summary import GOOD, Summary
+from wholebody.bench.report import render
+from wholebody.bench.tables import write_text
+
+FOLDER = "pages"
+
+
+@dataclass(frozen=True)
+class Material:
+    """All that a report is written from.
+
+    Attributes:
+        settings: what was asked for.
+        chunks: what was done.
+        results: the records of them.
+        rows: the figures at the default budget.
+        facts: of the machine and the run.
+        missing: methods that are not installed, and the command that installs them.
+    """
+
+    settings: Settings
+    chunks: Sequence[Chunk]
+    results: Results
+    rows: Sequence[Summary]
+    facts: Mapping[str, str]
+    missing: Mapping[str, str]
+
+
+def write_pages(given: Material, charts: Mapping[str, tuple[Path, Path]], folder: Path) -> list[Path]:
+    """Write `pages/set-NAME.html` and `pages/method-NAME.html`; return them."""
+    results, rows = given.results, given.rows
+    ranked = {one.set: one for one in rankings(results)}
+    picked = {one.set: one for one in choices(results, rows)}
+    standing = {one.method: one for one in standings(results, rows)}
+    links = {
+        **{family.title: page_name("set", family.name) for family in given.settings.sets},
+        **{adapter.name: page_name("method", adapter.name) for adapter in given.settings.adapters},
+    }
+    made = []
+    together = groups(results.adapters)
+    for family in given.settings.sets:
+        stem = f"compare-{family.name.replace('_', '-')}"
+        shown = [
+            f"{stem}{kind}{'' if number == 0 else f'-{number + 1}'}"
+            for number in range(len(together))
+            for kind in ("-profile", "")
+        ]
+        text = render(
+            "compare_set.md", family=family, rows=[row for row in rows if row.set == family.name],
+            moving=results.moving(family.name), choice=picked[family.name], ranking=ranked[family.name].ranking,
+            in_words=in_words, named=named, error=error, effort=effort, good=GOOD, facts=given.facts,
+        )  # fmt: skip
+        made.append(_page(folder, page_name("set", family.name), family.title, text, links, [charts[k] for k in shown]))
+    for adapter in given.settings.adapters:
+        text = render(
+            "compare_method.md", adapter=adapter, rows=[row for row in rows if row.method == adapter.name],
+            titles={family.name: family.title for family in given.settings.sets}, standing=standing.get(adapter.name),
+            slowness=slowness, good=GOOD, sets=len(given.settings.sets), facts=given.facts,
+        )  # fmt: skip
+        made.append(_page(folder, page_name("method", adapter.name), adapter.name, text, links, []))
+    return made
+
+
+def page_name(kind: str, name: str) -> str:
+    """File of a page: names of methods have signs that files must not have."""
+    return f"{kind}-{re.sub(r'[^A-Za-z0-9]+', '-', name).strip('-')}.html"
+
+
+def _page(
+    folder: Path, name: str, title: str, text: str, links: Mapping[str, str], charts: Sequence[tuple[Path, Path]]
+) -> Path:
+    from markdown_it import MarkdownIt
+
+    body = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
+    drawn = [drawn_within(svg, svg.stem, "") for svg, _ in charts]
+    path = folder / FOLDER / name
+    others = [(other, file) for other, file in links.items() if file != name]
+    write_text(path, render("page.html", title=title, body=body, drawn=drawn, links=others) + "\n")
+    return path
+
+
+def drawn_within(svg: Path, name: str, caption: str) -> str:
+    """A chart within the page. Names in it are of one file, and there are many files in the page."""
+    drawn = svg.read_text(encoding="utf-8")
+    drawn = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", drawn[drawn.index("<svg") :])
+    return f"<figure>{drawn}<figcaption>{caption}</figcaption></figure>"

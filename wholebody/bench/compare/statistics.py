@@ -1,0 +1,195 @@
+"""Intervals and tests that a comparison rests on. Every interval is of 95 %.
+
+Shares have Wilson's interval (1927, "Probable inference, the law of succession, and statistical inference"); medians
+and ratios the bootstrap's percentiles (Efron 1979), problems drawn with replacement, and ratios paired by problem.
+Rankings are Friedman's (1937), with Nemenyi's critical difference (Demsar 2006, "Statistical comparisons of
+classifiers over multiple data sets").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import exp, inf, log, nan, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.arrays import Array
+
+RESAMPLES = 2000  # of a bootstrap: the ends of its intervals then vary by about 3 % of their width
+LEVEL = 0.95
+SEED = 0  # of the bootstrap: the same figures have the same interval
+SHIFT = 1e-3  # s: added to times before their geometric mean, so that the shortest do not rule it
+LEAST = 5  # problems below which nothing is said of a ratio
+
+
+class Interval(NamedTuple):
+    """A figure with its interval of 95 %.
+
+    Attributes:
+        value, low, high: NaN, minus infinity and infinity where there is nothing to compute it from.
+        cases: how many problems it rests on.
+    """
+
+    value: float
+    low: float
+    high: float
+    cases: int
+
+    def apart_from(self, value: float) -> bool:
+        """Whether the interval excludes a value."""
+        return self.low > value or self.high < value
+
+
+NOTHING = Interval(nan, -inf, inf, 0)
+
+
+def wilson(count: int, of: int) -> tuple[float, float]:
+    """Interval of a share `count / of`; from 0 to 1 where there is nothing."""
+    from scipy.stats import norm
+
+    if of == 0:
+        return 0.0, 1.0
+    z = float(norm.ppf(0.5 + 0.5 * LEVEL))
+    share = count / of
+    middle = (share + z * z / (2 * of)) / (1 + z * z / of)
+    reach = z / (1 + z * z / of) * sqrt(share * (1 - share) / of + z * z / (4 * of * of))
+    low = 0.0 if count == 0 else max(0.0, middle - reach)
+    return low, 1.0 if count == of else min(1.0, middle + reach)
+
+
+def share(flags: Sequence[bool]) -> Interval:
+    """Share of what is true, with its interval."""
+    if not len(flags):
+        return NOTHING
+    count = sum(bool(flag) for flag in flags)
+    return Interval(count / len(flags), *wilson(count, len(flags)), len(flags))
+
+
+def median(values: Sequence[float]) -> Interval:
+    """Median of values, infinite ones too, with its interval."""
+    known = np.asarray(values, dtype=float)
+    if not len(known):
+        return NOTHING
+    drawn = _quantile(known[_draws(len(known))], 0.5)
+    return Interval(float(_quantile(known[None], 0.5)[0]), *_ends(drawn), len(known))
+
+
+def shifted_geometric_mean(values: Sequence[float], shift: float = SHIFT) -> Interval:
+    """`exp(mean(log(values + shift))) - shift` of times in seconds, with its interval.
+
+    Failures belong among the values, with the time after which a solve is ended.
+    """
+    known = np.asarray(values, dtype=float)
+    if not len(known):
+        return NOTHING
+    logs = np.log(known + shift)
+    drawn = np.exp(logs[_draws(len(known))].mean(axis=1)) - shift
+    return Interval(exp(float(logs.mean())) - shift, *_ends(drawn), len(known))
+
+
+def ratio(one: Mapping[tuple[str, int], float], other: Mapping[tuple[str, int], float]) -> Interval:
+    """Geometric mean of positive figures of one method over those of another, on the problems that both have."""
+    logs = np.array([log(one[key] / other[key]) for key in one if key in other])
+    if len(logs) < LEAST:
+        return NOTHING._replace(low=0.0, cases=len(logs))
+    drawn = np.exp(logs[_draws(len(logs))].mean(axis=1))
+    return Interval(exp(float(logs.mean())), *_ends(drawn), len(logs))
+
+
+def _draws(count: int) -> NDArray[np.int64]:
+    return np.random.default_rng(SEED).integers(0, count, (RESAMPLES, count))
+
+
+def _quantile(values: Array, part: float) -> Array:
+    """A quantile (n,) of each row of values (n, m), which is one of them: infinite ones are not averaged."""
+    return np.asarray(np.quantile(values, part, axis=1, method="inverted_cdf"))
+
+
+def _ends(drawn: Array) -> tuple[float, float]:
+    low, high = np.quantile(drawn, (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), method="inverted_cdf")
+    return float(low), float(high)
+
+
+class Ranking(NamedTuple):
+    """Methods ranked over the problems that all of them were given, the best first.
+
+    Attributes:
+        methods: names, by mean rank.
+        ranks: mean rank of each; 1 is best.
+        p_value: of Friedman's test that all are alike.
+        critical_difference: Nemenyi's: mean ranks that differ by less are not told apart; 0 where the test finds no
+            difference at all, so that nobody is.
+        cases: problems.
+        alike: runs of neighbours in `methods` that are not told apart, as (first, last).
+    """
+
+    methods: tuple[str, ...]
+    ranks: tuple[float, ...]
+    p_value: float
+    critical_difference: float
+    cases: int
+    alike: tuple[tuple[int, int], ...]
+
+
+def ranking(found: Mapping[str, Sequence[float]]) -> Ranking | None:
+    """Rank methods by a cost for each problem, smaller being better; None below three methods or `LEAST` problems.
+
+    Args:
+        found: for each method its costs, in the same order of problems; infinite for a failure. Equal costs share the
+            mean of their ranks.
+    """
+    from scipy.stats import chi2, rankdata, studentized_range
+
+    names = list(found)
+    costs = np.array([found[name] for name in names], dtype=float).T
+    count, methods = costs.shape if costs.ndim == 2 else (0, 0)
+    if methods < 3 or count < LEAST:
+        return None
+    ranks = np.apply_along_axis(rankdata, 1, costs)
+    means = ranks.mean(axis=0)
+    spread = float(((ranks - 0.5 * (methods + 1)) ** 2).sum()) / (count * (methods - 1))
+    statistic = count * float(((means - 0.5 * (methods + 1)) ** 2).sum()) / spread if spread > 0.0 else 0.0
+    p_value = float(chi2.sf(statistic, methods - 1))  # with ties: Conover 1999, eq. 5.8
+    width = float(studentized_range.ppf(LEVEL, methods, 1e6)) / sqrt(2.0)
+    difference = width * sqrt(methods * (methods + 1) / (6.0 * count))
+    order = np.argsort(means, kind="stable")
+    sorted_means = means[order]
+    different = p_value < 1.0 - LEVEL
+    alike = _runs(sorted_means, difference) if different else [(0, methods - 1)]
+    return Ranking(
+        tuple(names[k] for k in order), tuple(float(mean) for mean in sorted_means), p_value, difference, count,
+        tuple(alike),
+    )  # fmt: skip
+
+
+def _runs(means: Array, difference: float) -> list[tuple[int, int]]:
+    """Longest runs of neighbours that differ by less than a difference, those within others left out."""
+    runs: list[tuple[int, int]] = []
+    for first in range(len(means)):
+        last = int(np.flatnonzero(means - means[first] < difference)[-1])
+        if last > first and not (runs and runs[-1][1] >= last):
+            runs.append((first, last))
+    return runs
+
+
+def same_share(counts: Sequence[tuple[int, int]]) -> float:
+    """p-value that some groups (successes, tries) have one share: Fisher's exact test by Monte Carlo of the margin.
+
+    One where all succeed, all fail, or there is one group.
+    """
+    done = np.array([count for count, _ in counts], dtype=float)
+    tries = np.array([of for _, of in counts])
+    known = tries > 0
+    done, tries = done[known], tries[known]
+    total, wins = int(tries.sum()), round(float(done.sum()))
+    if len(tries) < 2 or wins in (0, total):
+        return 1.0
+    expected = tries * wins / total
+
+    def statistic(found: Array) -> Array:
+        return np.asarray(((found - expected) ** 2 / (expected * (1.0 - wins / total))).sum(axis=-1))
+
+    drawn = np.random.default_rng(SEED).multivariate_hypergeometric(tries, wins, RESAMPLES).astype(float)
+    return float((1 + np.count_nonzero(statistic(drawn) >= statistic(done.astype(float)) - 1e-9)) / (RESAMPLES + 1))

@@ -1,0 +1,241 @@
+"""Many files of answers beside each other: every figure with its interval, and no winner inside the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf, isfinite
+from pathlib import Path
+from typing import Any
+
+from wholebody.bench import plot_style
+from wholebody.bench.compare.pages import drawn_within
+from wholebody.bench.compare.rankings import in_words
+from wholebody.bench.compare.statistics import Interval, Ranking, ranking, ratio
+from wholebody.bench.plot_style import method_style
+from wholebody.bench.published.answers import read_answers
+from wholebody.bench.published.judging import ANSWERED, Judged, SetScore, Verdict, judge, set_score
+from wholebody.bench.published.reading import read_index
+from wholebody.bench.published.rebuilt import EXACT
+from wholebody.bench.published.words import cells, left_out
+from wholebody.bench.report import render, words
+from wholebody.bench.tables import write_text
+from wholebody.errors import InputError
+from wholebody.files import is_folder
+
+PAGE = "leaderboard.html"
+MOST = 6  # methods in a chart
+LEAST_TIME = 1e-6  # s: times below are not told apart
+
+
+@dataclass(frozen=True)
+class Board:
+    """One set from one seed.
+
+    Attributes:
+        set, seed: which.
+        rows: the methods that take part, those that solve most first.
+        leading: methods whose share is not below the greatest by more than chance, the greatest first.
+        ranking: by time, of those that told their times and took every problem.
+    """
+
+    set: str
+    seed: str
+    rows: tuple[tuple[str, SetScore], ...]
+    leading: tuple[str, ...]
+    ranking: Ranking | None
+
+
+def judge_folder(folder: Path, problems: Path) -> list[Verdict]:
+    """Judge every file of answers in a folder; the best effort known is the least of all exact answers.
+
+    Raises:
+        InputError: there is no such folder, it has no answers, or two files have one method.
+        FileFormatError: a file is malformed.
+    """
+    if not is_folder(folder):
+        raise InputError(f"{folder}: there is no such folder; give one with files of answers")
+    paths = [path for path in sorted(folder.glob("*.json")) if not path.name.endswith(".verdict.json")]
+    if not paths:
+        raise InputError(f"{folder}: has no files of answers; put some there, each NAME.json")
+    verdicts = [judge(read_answers(path, problems), problems) for path in paths]
+    names: dict[str, Path] = {}
+    for path, verdict in zip(paths, verdicts, strict=True):
+        name = verdict.answers.method
+        if name in names:
+            raise InputError(f"{path} and {names[name]} both have the method {name!r}; name one of them otherwise")
+        names[name] = path
+    return _with_common_best(verdicts)
+
+
+def _with_common_best(verdicts: Sequence[Verdict]) -> list[Verdict]:
+    """Efforts above the least of all: an answer may be better than what was known when the problems were exported."""
+    least: dict[str, float] = {}
+    for one in (one for verdict in verdicts for one in verdict.judged):
+        if one.score.worst <= EXACT and isfinite(one.effort_above):
+            least[one.problem] = min(least.get(one.problem, 0.0), one.effort_above)
+
+    def shifted(one: Judged) -> Judged:
+        best = 1.0 + least.get(one.problem, 0.0)
+        return replace(one, effort_above=(1.0 + one.effort_above) / best - 1.0) if best > 0.0 else one
+
+    found = []
+    for verdict in verdicts:
+        judged = tuple(shifted(one) for one in verdict.judged)
+        rows = tuple(
+            set_score(row.set, row.seed, [one for one in judged if (one.set, one.seed) == (row.set, row.seed)])
+            for row in verdict.sets
+        )
+        found.append(replace(verdict, judged=judged, sets=rows))
+    return found
+
+
+def boards(verdicts: Sequence[Verdict], sets: Sequence[str]) -> list[Board]:
+    """One board for every set and seed that somebody answered."""
+    made = []
+    for name in sets:
+        for seed in ("near", "far"):
+            rows = [(v.answers.method, row) for v in verdicts for row in v.sets if (row.set, row.seed) == (name, seed)]
+            if rows:
+                rows.sort(key=lambda entry: (-_known(entry[1].share.value), entry[1].mean_seconds.value))
+                made.append(Board(name, seed, tuple(rows), _leading(rows), _ranked(verdicts, name, seed)))
+    return made
+
+
+def _leading(rows: Sequence[tuple[str, SetScore]]) -> tuple[str, ...]:
+    """Those whose interval reaches the lower end of the best one's, or higher."""
+    whole = [(name, row) for name, row in rows if not row.refused and row.share.cases]
+    if not whole:
+        return ()
+    low = max(row.share.low for _, row in whole)
+    return tuple(name for name, row in whole if row.share.high >= low)
+
+
+def _ranked(verdicts: Sequence[Verdict], name: str, seed: str) -> Ranking | None:
+    costs = {}
+    for verdict in verdicts:
+        mine = [one for one in verdict.judged if (one.set, one.seed) == (name, seed)]
+        timed = any(isfinite(one.seconds) for one in mine)
+        if mine and timed and all(one.outcome != "refused" for one in mine):
+            costs[verdict.answers.method] = [
+                one.seconds if one.solved and isfinite(one.seconds) else inf for one in mine
+            ]
+    return ranking(costs)
+
+
+def _known(value: float) -> float:
+    return value if isfinite(value) else -1.0
+
+
+def sentences(board: Board, verdicts: Sequence[Verdict]) -> list[str]:
+    """What follows from a board, in plain English."""
+    if not board.leading:
+        return ["Nobody took every problem."]
+    first, *others = board.leading
+    best = dict(board.rows)[first].share
+    said = [f"**{first}** solves {100 * best.value:.0f} % [{100 * best.low:.0f}, {100 * best.high:.0f}]."]
+    if others:
+        said.append(f"{_listed(others)} cannot be told apart from it by what they solve.")
+    below = [name for name, row in board.rows if name not in board.leading and not row.refused]
+    if below:
+        said.append(f"{_listed(below)} {'solves' if len(below) == 1 else 'solve'} fewer.")
+    said += _faster(board, verdicts)
+    if board.ranking:
+        said.append(f"Mean ranks by time, 1 being the fastest: {in_words(board.ranking)}")
+    return said
+
+
+def _faster(board: Board, verdicts: Sequence[Verdict]) -> list[str]:
+    """The time of the others over that of the first, on the problems that both solve."""
+    times = {
+        verdict.answers.method: {
+            (one.problem, 0): max(one.seconds, LEAST_TIME)
+            for one in verdict.judged
+            if (one.set, one.seed) == (board.set, board.seed) and one.solved and isfinite(one.seconds)
+        }
+        for verdict in verdicts
+    }
+    first, said = board.leading[0], []
+    for name in board.leading[1:]:
+        found = ratio(times.get(name, {}), times.get(first, {}))
+        if found.value == found.value:
+            verb = "takes" if found.apart_from(1.0) else "cannot be told apart from it by its time; it takes"
+            said.append(
+                f"{name} {verb} {found.value:.2g} times [{found.low:.2g}, {found.high:.2g}] as long as {first} on the "
+                f"{found.cases} problems that both solve."
+            )
+    return said
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names)
+
+
+def publish(verdicts: Sequence[Verdict], problems: Path, out: Path) -> list[Board]:
+    """Write the page and its charts into a folder; return the boards."""
+    index = read_index(problems)
+    found = boards(verdicts, list(index["sets"]))
+    charts = _charts(verdicts, found, out)
+    text = render(
+        "leaderboard.md", boards=found, verdicts=verdicts, index=index, cells=cells, left_out=left_out,
+        sentences=lambda board: sentences(board, verdicts), words=words,
+        units={verdict.answers.method: _in_kernels(verdict) for verdict in verdicts},
+    )  # fmt: skip
+    from markdown_it import MarkdownIt
+
+    body = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
+    drawn = [drawn_within(svg, svg.stem, "") for svg in charts]
+    write_text(out / "leaderboard.md", text + "\n")
+    write_text(out / PAGE, render("page.html", title="Leaderboard", body=body, drawn=drawn, links=[]) + "\n")
+    return found
+
+
+def _in_kernels(verdict: Verdict) -> float:
+    """Median time in units of the reference kernel of the machine; NaN where either is not told."""
+    seconds = sorted(one.seconds for one in verdict.judged if one.outcome == ANSWERED and isfinite(one.seconds))
+    return seconds[len(seconds) // 2] / verdict.answers.kernel_seconds if seconds else float("nan")
+
+
+def _charts(verdicts: Sequence[Verdict], found: Sequence[Board], out: Path) -> list[Path]:
+    """One row a set and seed: shares and mean times with their intervals; at most six methods a chart."""
+    names = [verdict.answers.method for verdict in verdicts]
+    drawn = []
+    for first in range(0, len(names), MOST):
+        part = names[first : first + MOST]
+        chart, axes = plot_style.figure(1, 2, (11.0, 1.2 + 0.7 * len(found)))
+        handles: dict[str, Any] = {}
+        for place, board in enumerate(found):
+            rows = dict(board.rows)
+            for number, name in enumerate(part):
+                if name in rows:
+                    y = place + 0.7 * ((number + 0.5) / len(part) - 0.5)
+                    spans = ((axes[0][0], rows[name].share, 100.0), (axes[0][1], rows[name].mean_seconds, 1e3))
+                    for panel, span, scale in spans:
+                        handles[name] = _span(panel, y, span, scale, name) or handles.get(name)
+        labels = [f"{words(board.set)}, {board.seed}" for board in found]
+        for panel, texts in zip(axes[0], (labels, [""] * len(labels)), strict=True):
+            panel.set_yticks(range(len(found)), texts)
+            panel.set_ylim(len(found) - 0.5, -0.5)
+        axes[0][0].set(xlabel="solved [%]", xlim=(-2.0, 102.0))
+        plot_style.plain_log(axes[0][1])
+        axes[0][1].set(xlabel="mean time; one that is not solved counts 10 s [ms]")
+        seen = {name: handle for name, handle in handles.items() if handle is not None}
+        if seen:
+            chart.legend(list(seen.values()), list(seen), loc="outside lower center", ncols=3, frameon=False)
+        drawn.append(plot_style.save(chart, out / "charts" / f"leaderboard-{first // MOST + 1}")[0])
+    return drawn
+
+
+def _span(panel: Any, y: float, span: Interval, scale: float, name: str) -> Any:
+    """A figure and its interval as a band; None where there is none."""
+    if not isfinite(span.value):
+        return None
+    style = method_style(name)
+    panel.plot([scale * span.low, scale * span.high], [y, y], color=style.color, linewidth=5.0, alpha=0.3)
+    (line,) = panel.plot([scale * span.value], [y], color=style.color, marker=style.marker, linestyle="")
+    return line
+
+
+def summary(found: Sequence[Board]) -> Mapping[str, str]:
+    """Who leads each set, for the command line."""
+    return {f"{words(board.set)}, {board.seed}": _listed(board.leading) or "nobody" for board in found}

@@ -1,0 +1,58 @@
+"""Figures of verdicts in words: cells of tables, and what was left out."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from wholebody.bench.compare.statistics import Interval
+from wholebody.bench.published.judging import REFUSED, UNANSWERED, SetScore, Verdict
+from wholebody.bench.report import formatted, words
+
+COLUMNS = (
+    "problems", "seed", "asked", "refused", "unanswered", "solved %", "to 1e-4 %", "worst error", "overlap mm",
+    "effort above best %", "median ms", "mean ms",
+)  # fmt: skip
+
+
+def cells(row: SetScore) -> tuple[str, ...]:
+    """A row of a table, each figure with its interval of 95 %."""
+    return (
+        words(row.set),
+        row.seed,
+        str(row.problems),
+        str(row.refused or ""),
+        str(row.unanswered or ""),
+        spanned(row.share, ".0f", 100.0),
+        spanned(row.share_fine, ".0f", 100.0),
+        spanned(row.worst, ".0e"),
+        formatted(1e3 * row.overlap, ".2g"),
+        spanned(row.effort_above, ".2g", 100.0),
+        spanned(row.seconds, ".3g", 1e3),
+        spanned(row.mean_seconds, ".3g", 1e3),
+    )
+
+
+def spanned(found: Interval, spec: str, scale: float = 1.0) -> str:
+    """A figure and its interval, such as "98 [93, 99]"; empty without one."""
+    if found.value != found.value:
+        return ""
+    low, high = (formatted(scale * end, spec, none="none") for end in (found.low, found.high))
+    return f"{formatted(scale * found.value, spec, none='none')} [{low}, {high}]"
+
+
+def left_out(verdict: Verdict) -> list[str]:
+    """Sentences on refusals and on problems without an answer."""
+    said = []
+    reasons: dict[str, list[str]] = {}
+    for one in verdict.judged:
+        if one.outcome == REFUSED:
+            reasons.setdefault(one.said, []).append(one.problem)
+    for reason, problems in reasons.items():
+        said.append(f"Refused {len(problems)}, {problems[0]} first: {reason}")
+    silent = [one.problem for one in verdict.judged if one.outcome == UNANSWERED]
+    if silent:
+        said.append(f"Without an answer, and so not solved: {len(silent)}, {silent[0]} first.")
+    timed = [row for row in verdict.sets if isfinite(row.seconds.value)]
+    if timed:
+        said.append("The mean time is the shifted geometric mean; a problem that is not solved counts 10 s.")
+    return said

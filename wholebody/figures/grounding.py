@@ -1,0 +1,89 @@
+"""A posture moved vertically until the figure's lowest segments stand on what is below them."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.errors import InputError
+from wholebody.geometry.swept_points import swept_points
+
+LOWEST = 0.03  # m: segments that reach as low as this above the lowest point are those that stand
+NEAR = 1e-7  # m: gap that counts as standing
+DEEPEST_FALL = 10.0  # m: farther down nothing is looked for
+STEPS = 2000  # most steps; each goes down by the least distance, so none goes through anything
+
+
+class Among(Protocol):
+    """A scene."""
+
+    @property
+    def geometry(self) -> Any:
+        """The pin.GeometryModel with all pieces."""
+
+    @property
+    def piece_owner(self) -> tuple[str, ...]:
+        """The segment or thing that every piece is part of."""
+
+
+def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Among) -> Array:
+    """Copy (nq,) of a posture whose root is moved vertically until its lowest segments touch the things below.
+
+    Args:
+        model: of the figure, with a free root.
+        segments: its segments.
+        q: (nq,) the posture.
+        scene: the figure among things.
+
+    Raises:
+        InputError: nothing is below, or what the figure is inside of has no top near.
+    """
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    own = set(segments)
+    pieces = list(zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True))
+    placed = [(piece.geometry, data.oMi[piece.parentJoint] * piece.placement, owner) for piece, owner in pieces]
+    body = [(shape, place, _lowest(shape, place)) for shape, place, owner in placed if owner in own]
+    things = [
+        (shape, coal.Transform3s(place.rotation, place.translation))
+        for (shape, place, owner), (piece, _) in zip(placed, pieces, strict=True)
+        if owner not in own and piece.parentJoint == 0
+    ]
+    if not things or not body:
+        raise InputError("grounded: there is nothing to stand on; add wb.HalfSpace() to the scene")
+    bottom = min(low for *_, low in body)
+    soles = [(shape, place) for shape, place, low in body if low <= bottom + LOWEST]
+    shift = 0.0
+    for _ in range(STEPS):
+        gap = _least(soles, things, shift)
+        if abs(gap) <= NEAR:
+            break
+        shift -= gap  # into what it overlaps the figure is no deeper than that, so it comes out after a few steps
+        if abs(shift) > DEEPEST_FALL:
+            raise InputError(f"grounded: nothing is below the figure within {DEEPEST_FALL:g} m; add wb.HalfSpace()")
+    result = np.array(q, dtype=float)
+    result[2] += shift
+    return result
+
+
+def _lowest(shape: Any, place: pin.SE3) -> float:
+    swept = swept_points(shape)
+    if not len(swept.points):
+        return float(place.translation[2] - np.linalg.norm(np.asarray(shape.radii) * place.rotation[2]))
+    return float((swept.points @ place.rotation[2]).min() + place.translation[2] - swept.radius)
+
+
+def _least(soles: list[tuple[Any, pin.SE3]], things: list[tuple[Any, Any]], shift: float) -> float:
+    """Least signed distance of the soles from the things when the figure is higher by `shift`."""
+    up, least = np.array((0.0, 0.0, shift)), np.inf
+    for shape, place in soles:
+        at = coal.Transform3s(place.rotation, place.translation + up)
+        for thing, where in things:
+            least = min(
+                least, float(coal.distance(shape, at, thing, where, coal.DistanceRequest(), coal.DistanceResult()))
+            )
+    return least

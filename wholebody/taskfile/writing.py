@@ -1,0 +1,205 @@
+"""A problem as a task file: the inverse of `read_task`, by the same tables."""
+
+from __future__ import annotations
+
+import json
+import os
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody import files, tasks
+from wholebody.checks import instance, shown
+from wholebody.checks import path as checked_path
+from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
+from wholebody.geometry.shapes import Mesh
+from wholebody.problem import Problem
+from wholebody.scene import Scene
+from wholebody.scene_geometry import SceneObject
+from wholebody.taskfile.terms import CONSTRAINTS, GOALS, MEASURES
+from wholebody.taskfile.things import SHAPES
+
+SAME = 1e-12  # rad, m: a joint nearer than this to its value in the first posture is not written
+
+
+def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: str | None = None) -> Path:
+    """Write a problem, or a scene alone, as a task file that `read_task` and `wholebody pose` read.
+
+    What terms took from the start (where a foot is held) is written as numbers. A mesh that was given as arrays is
+    written as an OBJ file beside the task.
+
+    Args:
+        problem: a problem whose figure came from `wb.load`, or a scene.
+        path: of the file; its folder must exist.
+        title: one line; the name of the file if left out.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: a figure that was not loaded or was reduced, or a term, measure or shape that task files do not
+            have; or the file cannot be written.
+    """
+    target = checked_path(path, "write_task: path")
+    if isinstance(problem, Scene):
+        problem = Problem(problem)
+    instance(problem, Problem, "write_task: problem", "give a problem or a scene")
+    if title is not None and (not isinstance(title, str) or not title.strip()):
+        raise InputError(f"write_task: title is {shown(title)}; give one line of text")
+    scene, beside = problem.scene, dict[Path, str]()
+    top: dict[str, Any] = {"title": title or target.stem}
+    if problem.clearance:
+        top["clearance"] = problem.clearance
+    if problem.touching:
+        top["touching"] = [list(pair) for pair in problem.touching]
+    parts = [_lines(top), _table("[figure]", _figure(scene.figure, target)), _table("[start]", _start(problem))]
+    for thing in scene.objects.values():
+        parts.append(_table("[[object]]" if thing.segment is None else "[[attach]]", _thing(thing, target, beside)))
+    parts += [_table("[[goal]]", _term(term, GOALS, "goals", n)) for n, term in enumerate(problem.goals)]
+    held = (*problem.constraints, *problem.bounds)
+    parts += [_table("[[constraint]]", _term(term, CONSTRAINTS, "constraints", n)) for n, term in enumerate(held)]
+    if problem.measures_given:
+        parts += [
+            _table("[[measure]]", _term(term, MEASURES, "measures", n)) for n, term in enumerate(problem.measures)
+        ]
+    for file, text in beside.items():
+        files.write(file, text)
+    return files.write(target, "\n".join(parts))
+
+
+def _figure(figure: Figure, target: Path) -> dict[str, Any]:
+    if figure.loaded_as is None:
+        raise InputError(
+            f"write_task: {figure.name!r} did not come from wb.load or was reduced, so a task file cannot name it; "
+            "load a figure by name or by path"
+        )
+    spec, options = figure.loaded_as
+    named = {"name": spec} if spec in ("human", "avatar", "hand") else {"path": _beside(spec, target)}
+    if options.get("package_dirs"):
+        options = {**options, "package_dirs": [_beside(str(folder), target) for folder in options["package_dirs"]]}
+    known = {"sex", "stature", "mass", "detail", "side", "root", "package_dirs", "concavity"}
+    for option in options:
+        if option not in known or isinstance(options[option], dict):
+            raise InputError(f"write_task: the figure was loaded with {option}, which a task file cannot say")
+    return {**named, **{name: value for name, value in options.items() if value is not None}}
+
+
+def _start(problem: Problem) -> dict[str, Any]:
+    figure, q = problem.scene.figure, problem.start
+    first = figure.joint_values(figure.posture(figure.postures[0]))
+    joints = {
+        name: value
+        for name, value in figure.joint_values(q).items()
+        if name not in figure.followers and abs(value - first[name]) > SAME
+    }
+    start: dict[str, Any] = {"posture": figure.postures[0]}
+    if joints:
+        start["joints"] = joints
+    if figure.root == "free":
+        start["root"] = q[:7].tolist()
+    return start
+
+
+def _thing(thing: SceneObject, target: Path, beside: dict[Path, str]) -> dict[str, Any]:
+    kind = type(thing.shape).__name__.lower()
+    if kind not in SHAPES:
+        raise InputError(f"write_task: {thing.name!r} is a {type(thing.shape).__name__}, which task files do not have")
+    found: dict[str, Any] = {"name": thing.name, "shape": kind}
+    if thing.segment is not None:
+        found["to"] = thing.segment
+        if thing.rests_on:
+            found["rests_on"] = list(thing.rests_on)
+    found["at"] = _seven(thing.placement)
+    if thing.color is not None:
+        found["color"] = list(thing.color)
+    for key in SHAPES[kind].keys:
+        if key.name != "path":
+            found[key.name] = _plain(getattr(thing.shape, key.name))
+    if isinstance(thing.shape, Mesh):
+        found["path"] = _mesh(thing.shape, thing.name, target, beside, found)
+    if thing.body is not None:
+        given = {"density": thing.body.density, "mass": thing.body.mass, "material": thing.material.name}
+        found |= {name: value for name, value in given.items() if value is not None}
+        if found.get("mass") is not None:
+            found.pop("density", None)
+        if any(thing.body.velocity):
+            found["velocity"] = _plain(thing.body.velocity)
+    return found
+
+
+def _mesh(shape: Mesh, name: str, target: Path, beside: dict[Path, str], found: dict[str, Any]) -> str:
+    if isinstance(shape.source, (str, PathLike)):
+        return _beside(str(shape.source), target)
+    found |= {"scale": 1.0, "up": "z"}  # the vertices are scaled and turned already
+    file = target.with_name(f"{target.stem}-{''.join(c if c.isalnum() else '_' for c in name)}.obj")
+    corners = [f"v {x:.17g} {y:.17g} {z:.17g}" for x, y, z in shape.vertices.tolist()]
+    triangles = [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in shape.faces.tolist()]
+    beside[file] = "\n".join([*corners, *triangles, ""])
+    return file.name
+
+
+def _term(term: Any, forms: dict[str, Any], what: str, number: int) -> dict[str, Any]:
+    kind = next((name for name, form in forms.items() if form.make is type(term)), None)
+    if isinstance(term, tasks.Freeze):
+        kind = "freeze"
+    if kind is None:
+        raise InputError(
+            f"write_task: {what}[{number}] is a {type(term).__name__}, which task files do not have; leave it out"
+        )
+    found: dict[str, Any] = {"type": kind}
+    for key in forms[kind].keys:
+        value = getattr(term, key.name, None)
+        if value is not None:
+            found[key.name] = _plain(value)
+    if isinstance(term, tasks.Hold):
+        found["at"] = _seven(term.kept_at)
+    elif isinstance(term, tasks.Relative):
+        found["placement"] = _seven(term.residual.placement)
+    elif isinstance(term, tasks.Frame):
+        found["target"] = _seven(term.residual.placement)
+    elif isinstance(term, tasks.Orientation):
+        found["target"] = _seven(term.residual.placement)[3:]
+    elif isinstance(term, tasks.Plane):
+        found["point"] = _plain(term.resolved_normal * term.height)
+    elif isinstance(term, tasks.Posture) and not isinstance(term.target, str):
+        raise InputError(f"write_task: {what}[{number}] is a Posture of numbers; a task file names one of the figure's")
+    return found
+
+
+def _seven(placement: Any) -> list[float]:
+    return [float(value) for value in pin.SE3ToXYZQUAT(placement)]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    return [_plain(entry) for entry in value] if isinstance(value, (tuple, list)) else value
+
+
+def _beside(file: str, target: Path) -> str:
+    """Path of a file, relative to the folder of the task file."""
+    return Path(os.path.relpath(Path(file).resolve(), target.parent.resolve())).as_posix()
+
+
+def _table(header: str, values: dict[str, Any]) -> str:
+    return f"{header}\n{_lines(values)}"
+
+
+def _lines(values: dict[str, Any]) -> str:
+    return "".join(f"{name} = {_toml(value)}\n" for name, value in values.items())
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{json.dumps(name)} = {_toml(entry)}" for name, entry in value.items()) + " }"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)

@@ -1,0 +1,219 @@
+"""What contact terms are made of: a gap between two surfaces, an axis against a face, a place over a face.
+
+Each part has a few rows and their exact derivatives. `ContactTerm` stacks the rows of its parts. It is a goal and a
+constraint: the list of a problem in which it stands decides whether it is met if possible or always.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import atan2, hypot
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array, Mask
+from wholebody.figures.state import State
+from wholebody.tasks.axis import NO_ANGLE, STEEPEST
+from wholebody.tasks.base import Constraint, Goal
+from wholebody.tasks.inputs import Place
+from wholebody.tasks.surfaces import Face, Surface, nearest
+
+
+class Part(Protocol):
+    """Some rows of a contact term."""
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """(m,) which of its rows are in radians."""
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """Values (m,) and their derivative (m, nv)."""
+
+
+class Gap(NamedTuple):
+    """The signed distance of two surfaces: one row, zero where they touch [m]."""
+
+    first: Surface
+    second: Surface
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """It is not."""
+        return (False,)
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """The distance, and a force along the normal."""
+        near = nearest(self.first, self.second, state)
+        wrench = through(near.point, near.normal[None])
+        return np.array([near.distance]), _between(state, wrench, near.joint, near.against)
+
+
+class Near(NamedTuple):
+    """Two surfaces not farther apart than a distance: one row, zero within it, and what is beyond it [m]."""
+
+    first: Surface
+    second: Surface
+    most: float
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """It is not."""
+        return (False,)
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """What is beyond, and a force along the normal."""
+        value, row = Gap(self.first, self.second).rows(state)
+        beyond = value - self.most
+        return (beyond, row) if beyond[0] > 0.0 else (np.zeros(1), np.zeros_like(row))
+
+
+class Facing(NamedTuple):
+    """An axis of a frame along a direction that goes with a face: two rows, the angle between them [rad].
+
+    The same azimuthal equidistant rows as those of `Axis`, see there.
+
+    Attributes:
+        place: the frame and its joint.
+        basis: (3, 3) rows in the frame: two directions across the axis, and the axis.
+        face: the face.
+        direction: (3,) in the face's own axes, unit.
+        either: whether the opposite direction will do as well: the nearer one counts.
+    """
+
+    place: Place
+    basis: Array
+    face: Face
+    direction: Array
+    either: bool = False
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """Both rows."""
+        return True, True
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """The angle along the two directions, and moments."""
+        direction = self.direction @ self.face.at(state)[1]
+        axes = self.basis @ state.frame(self.place.frame).rotation.T
+        if self.either and axes[2] @ direction < 0.0:
+            direction = -direction
+        x, y, along = (axes @ direction).tolist()
+        sine = hypot(x, y)
+        angle = atan2(sine, along)
+        small = sine < NO_ANGLE
+        value = np.array((angle, 0.0)) if small else np.array((x, y)) * (angle / sine)
+        gain = min(angle / sine, STEEPEST) if not small else (1.0 if along > 0.0 else STEEPEST)
+        ux, uy = (1.0, 0.0) if small else (x / sine, y / sine)
+        fall = along - gain
+        change = np.array(((gain + fall * ux * ux, fall * ux * uy, -x), (fall * ux * uy, gain + fall * uy * uy, -y)))
+        wrench = np.zeros((2, 6))
+        wrench[:, 3:] = (change @ axes) @ pin.skew(direction)
+        return value, _between(state, wrench, self.place.joint, self.face.joint)
+
+
+class Level(NamedTuple):
+    """An axis of a frame in the plane of a face: one row, the sine of its angle to that plane [rad]."""
+
+    place: Place
+    axis: Array
+    face: Face
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """The row."""
+        return (True,)
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """The sine, and a moment."""
+        normal = self.face.at(state)[1][2]
+        axis = state.frame(self.place.frame).rotation @ self.axis
+        wrench = np.array([[0.0, 0.0, 0.0, *(pin.skew(axis) @ normal)]])
+        return np.array([axis @ normal]), _between(state, wrench, self.place.joint, self.face.joint)
+
+
+class Over(NamedTuple):
+    """The origin of a frame within a box that stands on a face: rows are zero within, and its distances outside [m].
+
+    Attributes:
+        place: the frame and its joint.
+        face: the face.
+        low, high: (k,) ends along the face's first k axes: across it and, with three, along its normal.
+    """
+
+    place: Place
+    face: Face
+    low: Array
+    high: Array
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """None is."""
+        return (False,) * len(self.low)
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """How far out it is along each axis."""
+        center, axes = self.face.at(state)
+        axes = axes[: len(self.low)]
+        point = state.frame(self.place.frame).translation
+        along = axes @ (point - center)
+        value = along - np.clip(along, self.low, self.high)
+        moves = np.where(((value != 0.0) | (self.low == self.high))[:, None], axes, 0.0)
+        wrench = through(point, moves)
+        return value, _between(state, wrench, self.place.joint, self.face.joint)
+
+
+def through(point: Array, forces: Array) -> Array:
+    """Wrenches (k, 6) of forces (k, 3) through a point (3,)."""
+    return np.hstack([forces, forces @ pin.skew(point).T])
+
+
+def _between(state: State, wrench: Array, joint: int, against: int) -> Array:
+    count = len(wrench)
+    return state.rows(wrench, np.full(count, joint, dtype=np.intp), np.full(count, against, dtype=np.intp))
+
+
+class ContactTerm(Goal, Constraint):
+    """A term made of parts; all of its rows are zero where the contact is made."""
+
+    parts: Sequence[Part]
+    touches: tuple[tuple[str, str], ...]
+
+    @property
+    def touching(self) -> tuple[tuple[str, str], ...]:
+        """Owners that are to touch: their clearance is zero."""
+        return self.touches
+
+    @property
+    def lower(self) -> Array:
+        """Zero, for every row."""
+        return np.zeros(())
+
+    @property
+    def upper(self) -> Array:
+        """Zero, for every row."""
+        return np.zeros(())
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) which rows are in radians."""
+        return np.array([flag for part in self.parts for flag in part.in_radians], dtype=bool)
+
+    def value(self, state: State) -> Array:
+        """(m,) what is left of the contact [m, rad]."""
+        return np.concatenate([part.rows(state)[0] for part in self.parts])
+
+    def error(self, state: State) -> Array:
+        """(m,) the same: a goal is met where it is zero."""
+        return self.value(state)
+
+    def jacobian(self, state: State) -> Array:
+        """(m, nv) the derivative."""
+        return np.vstack([part.rows(state)[1] for part in self.parts])
+
+
+def owner_pairs(first: Iterable[str], second: Iterable[str]) -> tuple[tuple[str, str], ...]:
+    """Every pair of an owner of the first surface with one of the second."""
+    others = tuple(second)
+    return tuple((a, b) for a in first for b in others)

@@ -1,0 +1,100 @@
+"""What a problem of a person has without being told: ranges of motion, balance, and its measures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.figures.state import State
+from wholebody.tasks.balance import Balance
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
+from wholebody.tasks.bounds import Freeze
+from wholebody.tasks.effort import Effort
+from wholebody.tasks.hold import Hold
+from wholebody.tasks.range_of_motion import RangeOfMotion
+from wholebody.tasks.reach_cones import ReachCones
+from wholebody.tasks.rhythm import Rhythm, girdles_of
+from wholebody.tasks.sit import Sit
+from wholebody.tasks.stand import Stand
+from wholebody.tasks.touch import Lean
+
+FEET = ("left_foot", "right_foot")
+AS_AT_START = 1e-3
+"""m, rad: a foot held this near to its place at the start stands where the support polygon is computed."""
+
+
+def default_measures(scene: Surroundings) -> list[Measure]:
+    """`Effort`, and for a person `Rhythm` beside it.
+
+    Args:
+        scene: with the figure.
+    """
+    person = bool(scene.figure.ranges) and bool(girdles_of(scene.figure))
+    return [Effort(), Rhythm()] if person else [Effort()]
+
+
+def default_constraints(
+    scene: Surroundings,
+    start: Array,
+    stated: Sequence[Constraint],
+    bounds: Sequence[Bound],
+    goals: Sequence[Goal],
+    *,
+    ranges: bool,
+    balance: bool | None,
+) -> list[Constraint]:
+    """What is added to the constraints that were stated; a stated term takes the place of the default of its class.
+
+    Args:
+        scene: with the figure; only one with ranges of motion, a person, has defaults.
+        start: (nq,) the start.
+        stated: resolved constraints.
+        bounds: resolved bounds.
+        goals: resolved goals.
+        ranges: whether ranges of motion and reach cones are kept.
+        balance: whether to keep balance; None if the person stands.
+    """
+    figure = scene.figure
+    known = {type(term) for term in stated}
+    found: list[Constraint] = []
+    if ranges and figure.ranges and RangeOfMotion not in known:
+        found.append(RangeOfMotion())
+    if ranges and figure.ranges and figure.cones and ReachCones not in known:
+        found.append(ReachCones())
+    asked = stands(scene, start, stated, bounds, goals) if balance is None else balance
+    if asked and not known & {Balance, Stand}:
+        found.append(Balance())
+    return found
+
+
+def stands(
+    scene: Surroundings, start: Array, stated: Sequence[Constraint], bounds: Sequence[Bound], goals: Sequence[Goal]
+) -> bool:
+    """Whether a person stands: both feet are held where they are at the start, and nothing else carries it.
+
+    Args:
+        scene: with the figure.
+        start: (nq,) the start.
+        stated: resolved constraints.
+        bounds: resolved bounds.
+        goals: resolved goals.
+    """
+    figure = scene.figure
+    if figure.root != "free" or not figure.ranges or not set(FEET) <= set(figure.segments):
+        return False
+    if any(isinstance(bound, Freeze) and "root" in figure.joint_names(bound.joints) for bound in bounds):
+        return False
+    if any(isinstance(term, (Sit, Lean)) for term in (*stated, *goals)):
+        return False
+    feet = {int(scene.model.frames[figure.frame_id(foot)].parentJoint) for foot in FEET}
+    held, state = set(), State(scene.model).update(start)
+    for term in stated:
+        if not isinstance(term, Hold) or term.residual.base.frame:
+            continue
+        joint = term.residual.place.joint
+        if joint not in feet or np.abs(term.value(state)).max() > AS_AT_START:
+            return False
+        held.add(joint)
+    return held == feet

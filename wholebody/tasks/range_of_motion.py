@@ -1,0 +1,205 @@
+"""Constraint: ranges of motion that more than one joint angle decides."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from wholebody.arrays import Array, Mask
+from wholebody.checks import known, listed
+from wholebody.errors import InputError
+from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange, TwistRange
+from wholebody.figures.state import State
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Constraint, Surroundings, filled
+
+OPPOSITE = 1e-9
+"""Least square of 1 + cosine of the swing: nearer to the opposite of its central direction a limb has no twist."""
+
+
+class Coordinate(NamedTuple):
+    """A joint angle's places in the posture and in the tangent, and its factor."""
+
+    idx_q: int
+    idx_v: int
+    factor: float
+
+
+class CoupledRow(NamedTuple):
+    """``bound - sum_i c_i q_i``; see `CoupledRange`."""
+
+    coordinates: tuple[Coordinate, ...]
+    bound: float
+
+    def value(self, state: State) -> float:
+        """Radians, positive inside."""
+        return self.bound - sum(factor * float(state.q[q]) for q, _, factor in self.coordinates)
+
+    def write(self, state: State, row: Array) -> None:
+        """Write the derivative into a row (nv,) of zeros."""
+        for _, v, factor in self.coordinates:
+            row[v] -= factor
+
+
+class EllipticRow(NamedTuple):
+    """``(1 - sum_k (a_k / l_k)^2) size / 2``, about the distance from the ellipsoid near it; see `EllipticRange`.
+
+    Attributes:
+        axes: the coordinates that each angle a is the sum of.
+        offset: (k,) radians added to each.
+        limits: (2, k) lower and upper limits l.
+        size: radians.
+    """
+
+    axes: tuple[tuple[Coordinate, ...], ...]
+    offset: Array
+    limits: Array
+    size: float
+
+    def value(self, state: State) -> float:
+        """Radians, positive inside."""
+        shares = [angle / limit for angle, limit in self._angles(state)]
+        return 0.5 * self.size * (1.0 - sum(share * share for share in shares))
+
+    def write(self, state: State, row: Array) -> None:
+        """Write the derivative into a row (nv,) of zeros."""
+        for axis, (angle, limit) in zip(self.axes, self._angles(state), strict=True):
+            for _, v, factor in axis:
+                row[v] -= self.size * factor * angle / (limit * limit)
+
+    def _angles(self, state: State) -> list[tuple[float, float]]:
+        found = []
+        for k, axis in enumerate(self.axes):
+            angle = float(self.offset[k]) + sum(factor * float(state.q[q]) for q, _, factor in axis)
+            found.append((angle, float(self.limits[int(angle > 0.0), k])))
+        return found
+
+
+class TwistRow(NamedTuple):
+    """``bound + slope . z - sign twist``; see `TwistRange`.
+
+    Attributes:
+        reference: the frame that carries the range.
+        limb: the frame that turns.
+        part: center, sign, bound and slope.
+    """
+
+    reference: inputs.Place
+    limb: inputs.Place
+    part: TwistRange
+
+    def value(self, state: State) -> float:
+        """Radians, positive inside."""
+        _, seen = self._rotations(state)
+        twist = math.atan2(seen[1, 0] - seen[0, 1], seen[0, 0] + seen[1, 1])
+        slope = self.part.slope @ self.part.center
+        return float(self.part.bound + slope @ seen[:, 2] - self.part.sign * twist)
+
+    def write(self, state: State, row: Array) -> None:
+        """Write the derivative into a row (nv,) of zeros."""
+        base, seen = self._rotations(state)
+        sine, cosine = seen[1, 0] - seen[0, 1], seen[0, 0] + seen[1, 1]
+        square = max(sine * sine + cosine * cosine, OPPOSITE)
+        x, y, _ = seen[2]
+        # The limb turns by w in the world and by w' in the axes of the central rotation.
+        turn = np.array([(sine * y - cosine * x) / square, (-cosine * y - sine * x) / square, 1.0])
+        along = np.cross(seen[:, 2], self.part.slope @ self.part.center)
+        wrench = np.zeros((1, 6))
+        wrench[0, 3:] = base @ (along - self.part.sign * turn)
+        row += state.rows(wrench, np.array([self.limb.joint]), np.array([self.reference.joint]))[0]
+
+    def _rotations(self, state: State) -> tuple[Array, Array]:
+        """The central rotation in the world, and the limb's seen from it."""
+        base = state.frame(self.reference.frame).rotation @ self.part.center
+        return base, base.T @ state.frame(self.limb.frame).rotation
+
+
+Row: TypeAlias = CoupledRow | EllipticRow | TwistRow
+
+
+@dataclass(frozen=True, eq=False)
+class RangeOfMotion(Constraint):
+    """Keep joints within the ranges of motion that more than one joint angle decides.
+
+    Muscles over two joints (hamstrings, gastrocnemius, rectus femoris), the inward rotation of the raised upper arm,
+    and the neck, which does not flex, bend and turn by all of its range at once: the figure's `ranges`. There is a row
+    for each: the angle to its end, positive inside [rad].
+
+    A problem of a person has this constraint by default; see `Problem`.
+
+    Attributes:
+        names: names of the figure's ranges; None for all of them.
+        rows: each range with its frames and joints, once resolved.
+        row_names: its name, once resolved.
+    """
+
+    names: Sequence[str] | None = None
+    rows: tuple[Row, ...] = field(init=False, repr=False)
+    row_names: tuple[str, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if self.names is not None:
+            object.__setattr__(self, "names", tuple(listed(self.names, "RangeOfMotion: names", "['neck']")))
+
+    def resolve(self, scene: Surroundings, start: Array) -> RangeOfMotion:
+        """Find the ranges, their frames and joints.
+
+        Raises:
+            UnknownNameError: a name is unknown.
+            InputError: the figure has no ranges.
+        """
+        ranges = scene.figure.ranges
+        if not ranges:
+            raise InputError("RangeOfMotion: this figure has no ranges of motion; leave the constraint out")
+        names = tuple(ranges) if self.names is None else tuple(self.names)
+        rows = [_row(ranges[known(name, ranges, "range of motion", "RangeOfMotion")], scene) for name in names]
+        return filled(self, rows=tuple(rows), row_names=names)
+
+    @property
+    def lower(self) -> Array:
+        """(m,) zeros."""
+        return np.zeros(len(self.rows))
+
+    @property
+    def upper(self) -> Array:
+        """(m,) inf."""
+        return np.full(len(self.rows), np.inf)
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) all rows are in radians."""
+        return np.ones(len(self.rows), dtype=bool)
+
+    def value(self, state: State) -> Array:
+        """(m,) angle to the end of each range, positive inside [rad]."""
+        return np.array([row.value(state) for row in self.rows])
+
+    def jacobian(self, state: State) -> Array:
+        """(m, nv)."""
+        result = np.zeros((len(self.rows), state.model.nv))
+        for row, into in zip(self.rows, result, strict=True):
+            row.write(state, into)
+        return result
+
+
+def _row(part: MotionRange, scene: Surroundings) -> Row:
+    if isinstance(part, CoupledRange):
+        return CoupledRow(tuple(_coordinate(scene, joint, factor) for joint, factor in part.joints.items()), part.bound)
+    if isinstance(part, EllipticRange):
+        axes = tuple(tuple(_coordinate(scene, joint, 1.0) for joint in axis.joints) for axis in part.axes)
+        limits = np.array([[axis.lower for axis in part.axes], [axis.upper for axis in part.axes]])
+        return EllipticRow(axes, np.array([axis.offset for axis in part.axes]), limits, part.size)
+    places = [inputs.find_place(scene, name, "RangeOfMotion") for name in (part.reference, part.limb)]
+    return TwistRow(places[0], places[1], part)
+
+
+def _coordinate(scene: Surroundings, name: str, factor: float) -> Coordinate:
+    joint: Any = scene.model.joints[scene.figure.joint_id(name)]
+    if joint.nq != 1:
+        raise InputError(f"RangeOfMotion: joint {name!r} has no single angle; name joints of one degree of freedom")
+    return Coordinate(int(joint.idx_q), int(joint.idx_v), factor)

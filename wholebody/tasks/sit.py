@@ -1,0 +1,171 @@
+"""Contact: a figure that sits on a seat, with its back at a backrest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass, field
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.checks import shown
+from wholebody.errors import InputError
+from wholebody.figures.state import State
+from wholebody.tasks import inputs
+from wholebody.tasks.axis import across
+from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Near, Over, Part, owner_pairs
+from wholebody.tasks.surfaces import Surface, face, joined, surface
+from wholebody.tasks.touch import named
+
+UP = np.array((0.0, 0.0, 1.0))
+MARGIN = 0.08  # m: by which the middle of the pelvis is within the edges of the seat; half the seat if that is less
+AT_BACK = 0.06  # m: how far the pelvis may be from the back; more, and the figure slouches
+DEEP = 0.01  # m: how much higher than on the deepest point of the pelvis and thighs the pelvis may sit
+
+
+@dataclass(frozen=True, eq=False)
+class Sit(ContactTerm):
+    """Sit on a thing, upright to either side, and with the back at another thing if there is one.
+
+    Pelvis or thighs touch the seat, the middle of the pelvis is over the seat's upper face, and its left side is level.
+    With a back, the trunk touches it, the pelvis is near it, and the figure looks away from it. Use it as a goal or as
+    a constraint. Hold the feet, or add `Stand(on=..., balance=False)`.
+
+    Attributes:
+        on: the seat: a thing, or a piece of one such as "chair:2".
+        back: what the back is at; None for a stool.
+        pelvis: the segment that sits.
+        trunk: the last of the segments above the pelvis that may touch the back.
+        weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
+        parts: the rows, once resolved.
+
+    Raises:
+        InputError: a name is not a string, or the weight is not positive.
+    """
+
+    on: str
+    back: str | None = None
+    _: KW_ONLY
+    pelvis: str = "pelvis"
+    trunk: str = "thorax"
+    weight: float = 1.0
+    parts: Sequence[Part] = field(init=False, repr=False)
+    touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        where = f"Sit({shown(self.on)})"
+        for name in (self.on, self.pelvis, self.trunk, *(() if self.back is None else (self.back,))):
+            named(name, where)
+        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
+
+    @property
+    def frame(self) -> str:
+        """What sits."""
+        return self.pelvis
+
+    def resolve(self, scene: Surroundings, start: Array) -> Sit:
+        """Find the surfaces and the seat's face.
+
+        Raises:
+            UnknownNameError: there is nothing of that name.
+            InputError: the seat or the back is a frame, or the pelvis has no pieces.
+        """
+        where = f"Sit({shown(self.on)})"
+        place, trunk = inputs.find_place(scene, self.pelvis, where), inputs.find_place(scene, self.trunk, where)
+        state = State(scene.model).update(start)
+        seat = face(scene, self.on, UP, state, where)
+        bottom = joined(scene, self.pelvis, [self.pelvis, *_thighs(scene, place, trunk)])
+        if not bottom.pieces:
+            raise InputError(f"{where}: {shown(self.pelvis)} has no pieces to sit on; name a segment with geometry")
+        thing = surface(scene, self.on, where)
+        edge = np.maximum(seat.half - np.minimum(MARGIN, 0.5 * seat.half), 0.0)
+        deep = _depth(scene, self.pelvis, place) + DEEP
+        over = Over(place, seat, np.append(-edge, -np.inf), np.append(edge, deep))
+        left = _rest(scene, place).T @ np.array((0.0, 1.0, 0.0))
+        parts: list[Part] = [Gap(bottom, thing), over]
+        touches = owner_pairs(bottom.owners, thing.owners)
+        if self.back is None:
+            parts.append(Level(place, left, seat))
+        else:
+            at_back = surface(scene, self.back, where)
+            upper = joined(scene, self.trunk, _trunk(scene, place, trunk))
+            middle = seat.at(state)[0]
+            rest = face(scene, self.back, _level(middle - _middle(at_back, state, middle, where), where), state, where)
+            to_left = _level(np.cross(UP, rest.at(state)[1][2]), where)
+            lower = joined(scene, self.pelvis, [self.pelvis])
+            parts += [Gap(upper, at_back), Near(lower, at_back, AT_BACK)]
+            parts += [Facing(place, across(left), rest, rest.at(state)[1] @ to_left)]
+            touches += owner_pairs([*upper.owners, *lower.owners], at_back.owners)
+        return filled(self, parts=tuple(parts), touches=touches)
+
+
+def _rest(scene: Surroundings, place: inputs.Place) -> Array:
+    """Rotation (3, 3) of a frame in the figure's first posture, in which the figure looks along x."""
+    figure = scene.figure
+    return np.asarray(State(scene.model).update(figure.posture(figure.postures[0])).frame(place.frame).rotation)
+
+
+def _trunk(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> list[str]:
+    """Segments between the pelvis and the last of the trunk, which is among them."""
+    chain = [joint for joint in scene.model.supports[trunk.joint] if joint > pelvis.joint]
+    owners = zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
+    segments = set(scene.figure.segments)
+    return [owner for owner, piece in owners if piece.parentJoint in chain and owner in segments]
+
+
+def _thighs(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> list[str]:
+    """The first segments with pieces of each limb at the pelvis, without the trunk."""
+    model, found = scene.model, []
+    segments = set(scene.figure.segments)
+    above = set(scene.model.supports[trunk.joint])
+    carried = {
+        int(piece.parentJoint): owner
+        for owner, piece in zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
+        if owner in segments
+    }
+    for joint, owner in carried.items():
+        chain = list(model.supports[joint])
+        if pelvis.joint not in chain or joint == pelvis.joint or joint in above:
+            continue
+        between = chain[chain.index(pelvis.joint) + 1 : -1]
+        if not any(other in carried for other in between) and not above.intersection(between):
+            found.append(owner)
+    return found
+
+
+def _depth(scene: Surroundings, name: str, place: inputs.Place) -> float:
+    """How far the pelvis reaches below its origin when it is upright, metres."""
+    from wholebody.tasks.support import low_points
+
+    figure = scene.figure
+    state = State(scene.model).update(figure.posture(figure.postures[0]))
+    shape = joined(scene, name, [name])
+    lows = [low_points(piece, shape.placed(k, state))[:, 2].min() for k, piece in enumerate(shape.shapes)]
+    return float(state.frame(place.frame).translation[2] - min(lows))
+
+
+def _middle(thing: Surface, state: State, other: Array, where: str) -> Array:
+    """Mean (3,) of the origins of a thing's pieces; for a half-space the nearest point of its plane."""
+    import coal
+
+    shape = thing.shapes[0]
+    if isinstance(shape, coal.Halfspace):
+        place = thing.placed(0, state)
+        normal = place.rotation @ np.array(shape.n)
+        return np.asarray(other - normal * (normal @ (other - place.translation) - float(shape.d)))
+    return np.asarray(np.mean([thing.placed(k, state).translation for k in range(len(thing.shapes))], axis=0))
+
+
+def _level(direction: Array, where: str) -> Array:
+    """The horizontal part of a direction, as a unit vector.
+
+    Raises:
+        InputError: it is vertical.
+    """
+    flat = np.array((direction[0], direction[1], 0.0))
+    length = float(np.linalg.norm(flat))
+    if length < 1e-6:
+        raise InputError(f"{where}: the back is right above the seat; give a back that stands behind it")
+    return flat / length

@@ -1,0 +1,206 @@
+"""Contact: a figure that stands with flat soles on something, and does not fall."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass, field
+from math import hypot
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.checks import flag, listed, number, shown
+from wholebody.errors import InputError
+from wholebody.figures.state import State
+from wholebody.tasks import inputs
+from wholebody.tasks.axis import across
+from wholebody.tasks.base import Constraint, Surroundings, filled
+from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, owner_pairs
+from wholebody.tasks.sit import UP
+from wholebody.tasks.support import STANDING_HEIGHT, low_points
+from wholebody.tasks.surfaces import face, surface
+from wholebody.tasks.touch import named
+
+FAR_INSIDE = 1.0  # m: value of a row whose corner is no corner of the polygon
+
+
+@dataclass(frozen=True, eq=False)
+class Stand(Constraint):
+    """Stand with flat soles on a thing; the feet may slide, and the centre of mass stays over them.
+
+    Each sole touches the thing, lies flat on its upper face and has its middle over it. The support polygon is that of
+    the corners of the soles where they are, so it goes with the feet; `Balance` keeps to the feet of the start.
+
+    Attributes:
+        on: what it stands on.
+        feet: segments whose soles stand.
+        balance: whether the centre of mass stays over the soles; False for who also sits, leans or holds on.
+        margin: distance of the centre of mass from the edges of the polygon [m].
+        parts: equality rows: of each foot the distance, two angles, and two rows over the face; once resolved.
+        polygon: inequality rows of the balance; None without it.
+
+    Raises:
+        InputError: no feet are named, a name is not a string, or the margin is negative.
+    """
+
+    on: str
+    _: KW_ONLY
+    feet: Sequence[str] = ("left_foot", "right_foot")
+    balance: bool = True
+    margin: float = 0.0
+    parts: Sequence[Part] = field(init=False, repr=False)
+    polygon: SolePolygon | None = field(init=False, repr=False)
+    touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        where = f"Stand({shown(self.on)})"
+        named(self.on, where)
+        feet = tuple(listed(self.feet, f"{where}: feet", "['left_foot', 'right_foot']"))
+        if not feet:
+            raise InputError(f"{where}: feet is empty; give a list of names, such as ['left_foot', 'right_foot']")
+        object.__setattr__(self, "feet", feet)
+        flag(self.balance, f"{where}: balance")
+        object.__setattr__(self, "margin", number(self.margin, f"{where}: margin", 0.0, 1.0, "m"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Stand:
+        """Find the soles and the face that they stand on.
+
+        Raises:
+            UnknownNameError: there is no such thing or foot.
+            InputError: a foot has no pieces, the thing is a frame, or nothing of the figure has mass.
+        """
+        where = f"Stand({shown(self.on)})"
+        state = State(scene.model).update(start)
+        ground, thing = face(scene, self.on, UP, state, where), surface(scene, self.on, where)
+        parts: list[Part] = []
+        touches: tuple[tuple[str, str], ...] = ()
+        corners, joints = [], []
+        rest = State(scene.model).update(scene.figure.posture(scene.figure.postures[0]))
+        for foot in self.feet:
+            place, sole = inputs.find_place(scene, foot, where), surface(scene, foot, where)
+            if not sole.owners or place.joint == 0:
+                raise InputError(f"{where}: {foot!r} has no pieces to stand on; name segments with geometry as feet")
+            up = rest.frame(place.frame).rotation.T @ UP
+            parts += [
+                Gap(sole, thing),
+                Facing(place, across(up), ground, UP),
+                Over(place, ground, -ground.half, ground.half),
+            ]
+            toes = [owner for owner in _beyond(scene, place.joint) if owner != foot]
+            touches += owner_pairs([*sole.owners, *toes], thing.owners)
+            lows = np.vstack([low_points(shape, sole.placed(k, rest)) for k, shape in enumerate(sole.shapes)])
+            lows = lows[lows[:, 2] <= lows[:, 2].min() + STANDING_HEIGHT]
+            inside = rest.data.oMi[place.joint].inverse()
+            corners += [np.asarray(inside.act(point)) for point in lows]
+            joints += [place.joint] * len(lows)
+        polygon = None
+        if self.balance:
+            inputs.check_mass(scene, where)
+            polygon = SolePolygon(np.array(corners), np.array(joints, dtype=np.intp))
+            if not (polygon.rows(state)[0] < FAR_INSIDE).any():
+                raise InputError(f"{where}: the soles are a line, not an area; name more feet, or leave balance out")
+        return filled(self, parts=tuple(parts), polygon=polygon, touches=touches)
+
+    @property
+    def touching(self) -> tuple[tuple[str, str], ...]:
+        """Owners that are to touch: their clearance is zero."""
+        return self.touches
+
+    def _counts(self) -> tuple[int, int]:
+        equal = sum(len(part.in_radians) for part in self.parts)
+        return equal, 0 if self.polygon is None else len(self.polygon.joints)
+
+    @property
+    def lower(self) -> Array:
+        """(m,) zeros, and the margin for the rows of the balance."""
+        equal, unequal = self._counts()
+        return np.concatenate([np.zeros(equal), np.full(unequal, self.margin)])
+
+    @property
+    def upper(self) -> Array:
+        """(m,) zeros, and inf for the rows of the balance."""
+        equal, unequal = self._counts()
+        return np.concatenate([np.zeros(equal), np.full(unequal, np.inf)])
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) which rows are in radians."""
+        flags = [turned for part in self.parts for turned in part.in_radians]
+        return np.array(flags + [False] * self._counts()[1], dtype=bool)
+
+    def value(self, state: State) -> Array:
+        """(m,) what is left of the contacts [m, rad], then distances of the centre of mass inside the edges [m]."""
+        rows = [part.rows(state)[0] for part in self.parts]
+        return np.concatenate(rows if self.polygon is None else [*rows, self.polygon.rows(state)[0]])
+
+    def jacobian(self, state: State) -> Array:
+        """(m, nv)."""
+        rows = [part.rows(state)[1] for part in self.parts]
+        return np.vstack(rows if self.polygon is None else [*rows, self.polygon.rows(state)[1]])
+
+
+class SolePolygon(NamedTuple):
+    """The convex hull of points of the feet, seen from above; row i is for the edge that begins at point i.
+
+    With e = b - a the edge from a to b, anticlockwise, n its inward normal and s = (e . (c - a)) / |e|^2, the distance
+    d = n . (c - a) of the centre of mass c changes by n . (dc - (1 - s) da - s db): n turns with the edge.
+
+    Attributes:
+        points: (m, 3) in the axes of their joints [m].
+        joints: (m,) joint that carries each.
+    """
+
+    points: Array
+    joints: Indices
+
+    def rows(self, state: State) -> tuple[Array, Array]:
+        """Distances (m,) inside the edges and their derivative (m, nv); `FAR_INSIDE` and zero for no corner."""
+        placed = [state.data.oMi[joint] for joint in self.joints.tolist()]
+        points = np.array([place.act(point) for place, point in zip(placed, self.points, strict=True)])
+        center, moves = state.center_of_mass(), state.center_of_mass_jacobian()
+        values, rows = np.full(len(points), FAR_INSIDE), np.zeros((len(points), state.model.nv))
+        begin = np.array(_hull(points[:, :2]), dtype=np.intp)
+        if not len(begin):
+            return values, rows
+        end = np.roll(begin, -1)
+        edge, arm = (points[end] - points[begin])[:, :2], center[:2] - points[begin, :2]
+        length = np.hypot(edge[:, 0], edge[:, 1])
+        normals = np.column_stack([-edge[:, 1], edge[:, 0], np.zeros(len(edge))]) / length[:, None]
+        share = np.einsum("ij,ij->i", edge, arm) / length**2
+        values[begin] = np.einsum("ij,ij->i", normals[:, :2], arm)
+        rows[begin] = normals @ moves
+        for corner, part in ((begin, 1.0 - share), (end, share)):
+            wrench = np.hstack([normals, np.cross(points[corner], normals)])
+            rows[begin] -= part[:, None] * state.rows(wrench, self.joints[corner], np.zeros_like(corner))
+        return values, rows
+
+
+def _hull(points: Array) -> list[int]:
+    """Indices of the corners of the convex hull of points (n, 2), anticlockwise, by Andrew's monotone chain."""
+    order = sorted(range(len(points)), key=lambda k: (round(float(points[k, 0]), 6), round(float(points[k, 1]), 6)))
+
+    def half(indices: list[int]) -> list[int]:
+        chain: list[int] = []
+        for k in indices:
+            while len(chain) > 1:
+                (ax, ay), (bx, by), (x, y) = points[chain[-2]], points[chain[-1]], points[k]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 1e-6 * hypot(x - ax, y - ay):
+                    break
+                chain.pop()
+            if not chain or hypot(*(points[k] - points[chain[-1]])) > 1e-5:
+                chain.append(k)
+        return chain
+
+    lower, upper = half(order), half(order[::-1])
+    corners = list(dict.fromkeys(lower[:-1] + upper[:-1]))
+    return corners if len(corners) > 2 else []
+
+
+def _beyond(scene: Surroundings, joint: int) -> list[str]:
+    """Segments on a joint and beyond it, such as the toes of a foot."""
+    segments = set(scene.figure.segments)
+    owners = zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
+    beyond = [owner for owner, piece in owners if joint in scene.model.supports[piece.parentJoint]]
+    return [owner for owner in dict.fromkeys(beyond) if owner in segments]

@@ -1,0 +1,250 @@
+"""Surfaces of segments and things: the distance between two of them, and the flat face of a thing towards a direction.
+
+A surface is a union of convex pieces, or one point. Its pieces are read from the scene's geometry model whenever they
+are asked for, so a thing that is moved after a term was resolved is found where it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.checks import shown
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures.state import State
+from wholebody.geometry.swept_points import swept_points
+from wholebody.tasks.base import Surroundings
+
+POINT = 1e-9  # m: radius of the ball that stands for a point
+ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal is noise
+TOP = 2e-3  # m: how far below the highest point of a thing its face reaches; more joins faces, less loses corners
+
+
+class Surface(NamedTuple):
+    """Convex pieces that count as one surface.
+
+    Attributes:
+        name: of the segment, thing, piece or frame.
+        owners: segments and things that the pieces are part of; none for a point.
+        geometry: the geometry model that has the pieces' placements; None for a point.
+        pieces: (k,) indices of the pieces in it.
+        joints: (k,) joint that carries each.
+        shapes: (k,) coal's shapes.
+        reach: (k,) radius of each about its origin, metres.
+        fixed: placement of a point in its joint; None for pieces.
+    """
+
+    name: str
+    owners: tuple[str, ...]
+    geometry: Any
+    pieces: tuple[int, ...]
+    joints: tuple[int, ...]
+    shapes: tuple[Any, ...]
+    reach: tuple[float, ...]
+    fixed: Any = None
+
+    def placed(self, number: int, state: State) -> Any:
+        """Placement (pin.SE3) of a piece in the world."""
+        local = self.fixed if self.fixed is not None else self.geometry.geometryObjects[self.pieces[number]].placement
+        return state.data.oMi[self.joints[number]] * local
+
+
+class Nearest(NamedTuple):
+    """The nearest points of two surfaces.
+
+    Attributes:
+        distance: signed, metres; negative in an overlap.
+        normal: (3,) unit vector from the first surface to the second.
+        point: (3,) a point on the line of both nearest points [m].
+        joint: joint that carries the piece of the second surface.
+        against: joint that carries the piece of the first.
+    """
+
+    distance: float
+    normal: Array
+    point: Array
+    joint: int
+    against: int
+
+
+def surface(scene: Surroundings, name: str, where: str) -> Surface:
+    """The surface of a thing, a segment or a piece; of a frame, the point at its origin.
+
+    Raises:
+        UnknownNameError: there is nothing of that name.
+        InputError: the name is not a string.
+    """
+    if not isinstance(name, str):
+        raise InputError(f"{where} takes the name of a segment, thing, piece or frame, not {shown(name)}")
+    owned = [index for index, owner in enumerate(scene.piece_owner) if owner == name]
+    if not owned:
+        owned = [index for index, piece in enumerate(scene.geometry.geometryObjects) if piece.name == name]
+    if owned:
+        return _of_pieces(scene, name, owned)
+    try:
+        frame = scene.model.frames[scene.figure.frame_id(name)]
+    except UnknownNameError as error:
+        known = [*error.known, *dict.fromkeys(scene.piece_owner)]
+        raise UnknownNameError("segment, thing, piece or frame", name, known, where) from None
+    joint = int(frame.parentJoint)
+    return Surface(name, (), None, (), (joint,), (coal.Sphere(POINT),), (POINT,), frame.placement)
+
+
+def joined(scene: Surroundings, name: str, owners: Iterable[str]) -> Surface:
+    """The surface of several segments or things that count as one."""
+    wanted = set(owners)
+    return _of_pieces(scene, name, [index for index, owner in enumerate(scene.piece_owner) if owner in wanted])
+
+
+def carried_by(scene: Surroundings, name: str, joint: int) -> Surface:
+    """The surface of the figure's own pieces that a joint carries."""
+    segments = set(scene.figure.segments)
+    pieces = scene.geometry.geometryObjects
+    owned = [k for k, owner in enumerate(scene.piece_owner) if owner in segments and pieces[k].parentJoint == joint]
+    return _of_pieces(scene, name, owned)
+
+
+def _of_pieces(scene: Surroundings, name: str, indices: list[int]) -> Surface:
+    pieces = [scene.geometry.geometryObjects[index] for index in indices]
+    owners = tuple(dict.fromkeys(scene.piece_owner[index] for index in indices))
+    return Surface(
+        name,
+        owners,
+        scene.geometry,
+        tuple(indices),
+        tuple(int(piece.parentJoint) for piece in pieces),
+        tuple(piece.geometry for piece in pieces),
+        tuple(float(swept_points(piece.geometry).reach) for piece in pieces),
+    )
+
+
+def nearest(first: Surface, second: Surface, state: State) -> Nearest:
+    """The nearest points of two surfaces, by coal; of several pairs of pieces, those of the nearest pair."""
+    ours = [first.placed(k, state) for k in range(len(first.shapes))]
+    theirs = [second.placed(k, state) for k in range(len(second.shapes))]
+    least = [
+        (float(np.linalg.norm(a.translation - b.translation)) - first.reach[i] - second.reach[j], i, j)
+        for i, a in enumerate(ours)
+        for j, b in enumerate(theirs)
+    ]
+    request = coal.DistanceRequest()
+    request.gjk_tolerance = request.epa_tolerance = ACCURACY
+    best: tuple[float, Any, int, int] | None = None
+    for bound, i, j in sorted(least):
+        if best is not None and bound > best[0]:
+            break
+        result = coal.DistanceResult()
+        a, b = ours[i], theirs[j]
+        distance = coal.distance(
+            first.shapes[i],
+            coal.Transform3s(a.rotation, a.translation),
+            second.shapes[j],
+            coal.Transform3s(b.rotation, b.translation),
+            request,
+            result,
+        )
+        if best is None or distance < best[0]:
+            best = float(distance), result, i, j
+    assert best is not None
+    distance, result, i, j = best
+    normal = np.array(result.normal)
+    if not np.linalg.norm(normal) > 0.5:
+        normal = _between(ours[i].translation, theirs[j].translation)
+    middle = 0.5 * (np.array(result.getNearestPoint1()) + np.array(result.getNearestPoint2()))
+    return Nearest(distance, normal, middle, second.joints[j], first.joints[i])
+
+
+def _between(first: Array, second: Array) -> Array:
+    """Direction between two centres; up where they coincide."""
+    way = second - first
+    length = float(np.linalg.norm(way))
+    return way / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
+
+
+class Face(NamedTuple):
+    """A flat face of a thing, in the axes of one of its pieces, so that it goes where the thing goes.
+
+    Attributes:
+        surface: of the thing.
+        center: (3,) middle of the face [m].
+        axes: (3, 3) rows: two directions in the face, and its outward normal.
+        half: (2,) half its size along the two directions; inf for a half-space [m].
+    """
+
+    surface: Surface
+    center: Array
+    axes: Array
+    half: Array
+
+    @property
+    def joint(self) -> int:
+        """Joint that carries the thing; 0 is the world."""
+        return self.surface.joints[0]
+
+    def at(self, state: State) -> tuple[Array, Array]:
+        """Middle (3,) and axes (3, 3) in the world."""
+        place = self.surface.placed(0, state)
+        return place.act(self.center), self.axes @ place.rotation.T
+
+
+def face(scene: Surroundings, name: str, direction: Array, state: State, where: str) -> Face:
+    """The face of a thing that looks towards a direction: of a box the nearest one, else where it reaches farthest.
+
+    Args:
+        scene: has the thing.
+        name: of the thing, or of one of its pieces.
+        direction: (3,) in the world.
+        state: at the start.
+        where: the calling term, for messages.
+
+    Raises:
+        UnknownNameError: there is no such thing.
+        InputError: it is a frame, which has no face.
+    """
+    found = surface(scene, name, where)
+    if found.fixed is not None:
+        raise InputError(f"{where}: {shown(name)} is a frame and has no face; name a thing or a segment")
+    place = found.placed(0, state)
+    if len(found.shapes) == 1 and isinstance(found.shapes[0], coal.Halfspace):
+        normal = np.array(found.shapes[0].n)
+        return Face(found, normal * float(found.shapes[0].d), _axes(normal), np.full(2, np.inf))
+    if len(found.shapes) == 1 and isinstance(found.shapes[0], coal.Box):
+        half = np.array(found.shapes[0].halfSide)
+        along = place.rotation.T @ direction
+        axis = int(np.argmax(np.abs(along)))
+        normal = np.eye(3)[axis] * (1.0 if along[axis] >= 0.0 else -1.0)
+        others = [k for k in range(3) if k != axis]
+        return Face(found, normal * half[axis], np.array([*np.eye(3)[others], normal]), half[others])
+    points = []
+    for number, shape in enumerate(found.shapes):
+        points.append(outermost(shape, found.placed(number, state), direction))
+    everything = np.vstack(points)
+    height = everything @ direction
+    top = everything[height >= height.max() - TOP]
+    axes = _axes(direction)
+    flat = top @ axes[:2].T
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    center = axes[:2].T @ (0.5 * (low + high)) + direction * height.max()
+    return Face(found, place.actInv(center), axes @ place.rotation, 0.5 * (high - low))
+
+
+def outermost(shape: Any, placement: pin.SE3, direction: Array) -> Array:
+    """Candidates (n, 3) for the points of a piece farthest along a unit direction (3,), in the world."""
+    swept = swept_points(shape)
+    if len(swept.points) == 0:  # an ellipsoid: the image of the ball's point whose normal is the direction
+        radii = np.asarray(shape.radii)
+        pull = radii * (placement.rotation.T @ direction)
+        return np.array([placement.translation + placement.rotation @ (radii * pull) / np.linalg.norm(pull)])
+    return np.asarray(swept.points @ placement.rotation.T + placement.translation + swept.radius * direction)
+
+
+def _axes(normal: Array) -> Array:
+    """Rows: two directions across a unit vector, and it."""
+    first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+    first /= np.linalg.norm(first)
+    return np.array((first, np.cross(normal, first), normal))

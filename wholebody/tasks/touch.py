@@ -1,0 +1,147 @@
+"""Contact: a surface of the figure brought to a surface of a thing, where it may slide; and leaning on something."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from wholebody.arrays import Array
+from wholebody.checks import shown
+from wholebody.errors import InputError
+from wholebody.figures.state import State
+from wholebody.tasks import inputs
+from wholebody.tasks.axis import across
+from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Part, owner_pairs
+from wholebody.tasks.surfaces import Surface, face, surface
+
+
+@dataclass(frozen=True, eq=False)
+class Touch(ContactTerm):
+    """Bring a surface to another one: their distance is zero, and they may slide along each other.
+
+    The value is the signed distance of the two surfaces [m]: positive apart, negative in an overlap. Its derivative is
+    that of the nearest points along the normal. Use it as a goal or as a constraint. The clearance of what is to touch
+    is zero. A thing that is moved is touched where it is.
+
+    Attributes:
+        part: name of a segment, of a piece such as "left_hand:0", or of a frame, whose origin then touches.
+        thing: name of a thing or of one of its pieces, such as "chair:2", or of another segment.
+        weight: factor on the squared distance, as a goal [1/m^2].
+        parts: the rows, once resolved.
+
+    Raises:
+        InputError: a name is not a string, or the weight is not positive.
+    """
+
+    part: str
+    thing: str
+    _: KW_ONLY
+    weight: float = 1.0
+    parts: Sequence[Part] = field(init=False, repr=False)
+    touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        where = f"Touch({shown(self.part)}, {shown(self.thing)})"
+        for name in (self.part, self.thing):
+            named(name, where)
+        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
+
+    @property
+    def frame(self) -> str:
+        """What touches."""
+        return self.part
+
+    def resolve(self, scene: Surroundings, start: Array) -> Touch:
+        """Find the two surfaces.
+
+        Raises:
+            UnknownNameError: there is nothing of that name.
+            InputError: no joint is between the two.
+        """
+        where = f"Touch({shown(self.part)}, {shown(self.thing)})"
+        first, second = surface(scene, self.part, where), surface(scene, self.thing, where)
+        check_apart(first, second, where)
+        return filled(self, parts=(Gap(first, second),), touches=owner_pairs(first.owners, second.owners))
+
+
+@dataclass(frozen=True, eq=False)
+class Lean(ContactTerm):
+    """Lean a part of the figure on a thing: they touch, and a side of the part faces the thing.
+
+    Attributes:
+        on: the thing that is leaned on: a wall, a backrest, a table's edge.
+        part: the segment that leans on it.
+        side: (3,) direction in the part's axes that looks at the thing; backwards if left out.
+        weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
+        parts: the rows, once resolved: the distance, then two angles.
+
+    Raises:
+        InputError: a name is not a string, the side has no direction, or the weight is not positive.
+    """
+
+    on: str
+    _: KW_ONLY
+    part: str = "thorax"
+    side: ArrayLike = (-1.0, 0.0, 0.0)
+    weight: float = 1.0
+    resolved_side: Array = field(init=False, repr=False)
+    parts: Sequence[Part] = field(init=False, repr=False)
+    touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        where = f"Lean({shown(self.on)})"
+        for name in (self.on, self.part):
+            named(name, where)
+        object.__setattr__(self, "resolved_side", inputs.direction(self.side, f"{where}: side"))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
+
+    @property
+    def frame(self) -> str:
+        """What leans."""
+        return self.part
+
+    def resolve(self, scene: Surroundings, start: Array) -> Lean:
+        """Find the surfaces, and the face of the thing that looks at the part.
+
+        Raises:
+            UnknownNameError: there is nothing of that name.
+            InputError: no joint is between the two, or the thing is a frame.
+        """
+        where = f"Lean({shown(self.on)})"
+        place = inputs.find_place(scene, self.part, where)
+        first, second = surface(scene, self.part, where), surface(scene, self.on, where)
+        check_apart(first, second, where)
+        state = State(scene.model).update(start)
+        toward = state.frame(place.frame).rotation @ self.resolved_side
+        leaned_on = face(scene, self.on, -toward, state, where)
+        facing = Facing(place, across(self.resolved_side), leaned_on, np.array((0.0, 0.0, -1.0)))
+        return filled(self, parts=(Gap(first, second), facing), touches=owner_pairs(first.owners, second.owners))
+
+
+def named(name: object, where: str) -> str:
+    """The name of something.
+
+    Raises:
+        InputError: it is not a string, or empty.
+    """
+    if not isinstance(name, str) or not name:
+        raise InputError(f"{where} takes the names of segments and things, not {shown(name)}")
+    return name
+
+
+def check_apart(first: Surface, second: Surface, where: str) -> None:
+    """Refuse two surfaces that cannot move relative to each other.
+
+    Raises:
+        InputError: one joint carries both.
+    """
+    if set(first.joints) == set(second.joints) and len(set(first.joints)) == 1:
+        raise InputError(
+            f"{where}: {first.name!r} cannot move relative to {second.name!r}; name two with a joint between them"
+        )
