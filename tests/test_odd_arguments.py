@@ -655,6 +655,14 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     grid = {"problem": ask, "frame": "link4", "low": (0.1, 0.1, 1.0), "high": (0.2, 0.1, 1.0), "step": 0.1}
     grid |= {"offset": (0.0, 0.0, 0.1), "jobs": 1, "progress": lambda *told: True}
     yield "reach_map", Call(wb.reach_map, grid, repr)
+    mapped = wb.reach_map(**grid)
+    for write, ending in ((mapped.save, "npz"), (mapped.to_vtk, "vtk"), (mapped.picture, "png"), (mapped.html, "html")):
+        yield f"ReachMap.{write.__name__}", Call(write, {"path": path / f"reach.{ending}"})
+    yield "ReachMap.counts", Call(mapped.counts, {})
+    kept = wb.Records([wb.SolveRecord("a")])
+    yield "Records.counts", Call(kept.counts, {})
+    yield "Records.rows", Call(kept.rows, {})
+    yield "Records.to_csv", Call(kept.to_csv, {"path": path / "records.csv"})
     yield "people", Call(wb.people, {"count": 2, "sexes": ["male"]})
     counted = {"task": path / "task.toml", "sees": (1.0, 0.0, 1.0), "count": 1, "sexes": ["male"]}
     yield "accommodation", Call(partial(wb.accommodation, jobs=1, progress=lambda told: True), counted)
@@ -668,6 +676,14 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "static_torques",
         Call(wb.static_torques, {"figure": person.figure, "q": upright, "load": 5.0, "seated": True}),
     )
+    scored = wb.ergonomics_of(person.figure, upright)
+    yield "BodyAngles.side", Call(scored.angles.side, {"name": "left"})
+    yield "StaticTorques.of_side", Call(scored.torques.of_side, {"side": "left"})
+    yield "Ergonomics.rows", Call(scored.rows, {})
+    yield "Ergonomics.summary", Call(scored.summary, {})
+    yield "Ergonomics.colors", Call(scored.colors, {"figure": person.figure})
+    yield "Work.sits", Call(work.sits, {"angles": scored.angles})
+    yield "FieldOfView.off", Call(wb.FieldOfView().off, {"direction": (1.0, 0.0, 0.0)})
     lifted = {"figure": person.figure, "origin": upright, "destination": upright, "floor": 0.1}
     yield "lift_between", Call(wb.lift_between, lifted)
     lift = {"horizontal": 0.3, "vertical": 0.7, "travel": 0.3, "asymmetry": 0.1, "frequency": 1.0, "duration": 1.0}
@@ -772,6 +788,8 @@ ANSWERS = (
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
     "Scene.of_parts", "ClipCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
     "Torques", "SphereFilling", "AssemblySolution", "AssemblyStep",
+    "SolveRecord", "SolveRecord.of", "SolveRecord.row", "SolveRecord.as_json", "SolveRecord.from_json", "SolveProgress",
+    "Records.to_parquet", "ReachMap", "Accommodation", "Ergonomics", "BodyAngles", "Rula", "Reba", "StaticTorques", "Sight",
     "Scene.of_parts", "ClipCheck", "DerivativeCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding",
     "Deviation",
     "Torques", "SphereFilling",

@@ -7,7 +7,7 @@ from math import degrees
 from typing import Any
 
 from wholebody.arrays import Array
-from wholebody.ergonomics.angles import SIDES, BodyAngles, body_angles
+from wholebody.ergonomics.angles import SIDES, BodyAngles, body_angles, check_person
 from wholebody.ergonomics.owas import Owas, owas_code
 from wholebody.ergonomics.reba import Reba, reba_parts
 from wholebody.ergonomics.rula import Rula, rula_parts
@@ -80,9 +80,13 @@ class Ergonomics:
         }
 
     def colors(self, figure: Figure) -> dict[str, Color]:
-        """Segment -> colour by its part's score in RULA: green is the least, red the greatest."""
+        """Segment -> colour by its part's score in RULA: green is the least, red the greatest.
+
+        Raises:
+            InputError: the figure is no person.
+        """
         found: dict[str, Color] = {}
-        for name in figure.segments:
+        for name in check_person(figure, "colors: figure").segments:
             side, _, part = name.partition("_")
             if side in SIDES:
                 mine = self.rula.left if side == "left" else self.rula.right

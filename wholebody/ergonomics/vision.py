@@ -51,9 +51,13 @@ class FieldOfView:
         checks.number(self.declination, "FieldOfView: declination", -pi / 2, pi / 2, "rad")
 
     def off(self, direction: Array) -> float:
-        """How far a direction (3,) in the eyes' axes is off the line of sight: 1 at the border of the cone."""
+        """How far a direction (3,) in the eyes' axes is off the line of sight: 1 at the border of the cone.
+
+        Raises:
+            InputError: it is no direction.
+        """
         sine, cosine = np.sin(self.declination), np.cos(self.declination)
-        x, y, z = direction
+        x, y, z = checks.numbers(direction, (3,), "off: direction").tolist()
         ahead, above = cosine * x - sine * z, sine * x + cosine * z
         side, height = np.arctan2(y, ahead), np.arctan2(above, np.hypot(ahead, y))
         return float(np.hypot(side / self.horizontal, height / (self.up if height > 0.0 else self.down)))

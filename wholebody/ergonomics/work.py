@@ -64,7 +64,12 @@ class Work:
             raise InputError("Work: a person who walks is not seated; leave one of them out")
 
     def sits(self, angles: BodyAngles) -> bool:
-        """Whether the person is seated."""
+        """Whether the person is seated.
+
+        Raises:
+            InputError: no angles of a body.
+        """
+        checks.instance(angles, BodyAngles, "sits: angles", "give those of wb.body_angles(figure, q)")
         if self.seated is not None:
             return self.seated
         lies = all(
