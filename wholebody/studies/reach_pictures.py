@@ -6,15 +6,13 @@ import base64
 import html
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.files import write
-
-if TYPE_CHECKING:
-    from wholebody.studies.reach_result import ReachMap
+from wholebody.studies.reach_verdicts import INSIDE
 
 MOST_SLICES = 24  # heights in one picture; of more, some are left out evenly
 COLUMNS = 6
@@ -39,7 +37,7 @@ slider.addEventListener("input",show);show();
 """
 
 
-def draw_slices(found: ReachMap, path: Path) -> Path:
+def draw_slices(found: Any, path: Path) -> Path:
     """Draw the heights of a reach map beside each other, seen from above; returns the path."""
     shown = np.unique(np.linspace(0, len(found.z) - 1, min(len(found.z), MOST_SLICES)).round().astype(int)).tolist()
     columns = min(COLUMNS, len(shown))
@@ -57,7 +55,7 @@ def draw_slices(found: ReachMap, path: Path) -> Path:
     return write(path, _png(chart))
 
 
-def write_page(found: ReachMap, path: Path) -> Path:
+def write_page(found: Any, path: Path) -> Path:
     """Write a page with one picture a height and a slider; returns the path."""
     values, images = heat(found), []
     for k in range(len(found.z)):
@@ -78,7 +76,7 @@ def write_page(found: ReachMap, path: Path) -> Path:
     return write(path, text)
 
 
-def heat(found: ReachMap) -> Array:
+def heat(found: Any) -> Array:
     """(nx, ny, nz) what is drawn: minus the distance that is left, metres; where reached, 0 to 1 by the measure.
 
     1 is the least measure of all reached places, 0 the greatest.
@@ -92,7 +90,7 @@ def heat(found: ReachMap) -> Array:
     return values
 
 
-def _slice(axis: Any, found: ReachMap, values: Array, k: int) -> Any:
+def _slice(axis: Any, found: Any, values: Array, k: int) -> Any:
     """Draw one height: reached places green, the others by what is left, places inside of things gray."""
     from matplotlib.colors import LinearSegmentedColormap
 
@@ -104,8 +102,6 @@ def _slice(axis: Any, found: ReachMap, values: Array, k: int) -> Any:
     image = axis.imshow(
         values[:, :, k], origin="lower", extent=extent, cmap=colors, vmin=-1.0, vmax=1.0, interpolation="nearest"
     )
-    from wholebody.studies.reach_result import INSIDE
-
     gray = np.zeros((*values.shape[:2], 4))
     gray[found.verdict[:, :, k] == INSIDE] = INSIDE_GRAY
     axis.imshow(gray, origin="lower", extent=extent, interpolation="nearest")
