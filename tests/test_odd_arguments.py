@@ -544,6 +544,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Viewer.play", Call(viewer.play, motion)
     yield "Viewer.ghosts", Call(viewer.ghosts, {"postures": [q], "color": (1.0, 0.0, 0.0, 1.0)})
     yield "Viewer.frames", Call(viewer.frames, {"names": ["link1"], "length": 0.1}, lambda _: viewer.show(q))
+    yield "Viewer.color", Call(viewer.color, {"segments": {"link1": (1.0, 0.0, 0.0)}}, lambda _: viewer.show(q))
     yield "Viewer.look", Call(viewer.look, {"eye": at, "target": (0.0, 0.0, 0.0)}, lambda _: viewer.show(q))
     yield "Viewer.save", Call(viewer.save, {"path": path / "x.html"})
     yield "Parts", Call(Parts, {"parts": {"one": [Part(wb.Sphere(0.1))]}}, Viewer)
@@ -651,6 +652,55 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "study", Call(wb.study, varied)
     anything = partial(wb.study, lambda *given: ask, progress=lambda told: True)
     yield "study(function)", Call(anything, {"people": [arm], "targets": [places[0]], "layouts": [None]})
+    grid = {"problem": ask, "frame": "link4", "low": (0.1, 0.1, 1.0), "high": (0.2, 0.1, 1.0), "step": 0.1}
+    grid |= {"offset": (0.0, 0.0, 0.1), "jobs": 1, "progress": lambda *told: True}
+    yield "reach_map", Call(wb.reach_map, grid, repr)
+    mapped = wb.reach_map(**grid)
+    for write, ending in ((mapped.save, "npz"), (mapped.to_vtk, "vtk"), (mapped.picture, "png"), (mapped.html, "html")):
+        yield f"ReachMap.{write.__name__}", Call(write, {"path": path / f"reach.{ending}"})
+    yield "ReachMap.counts", Call(mapped.counts, {})
+    kept = wb.Records([wb.SolveRecord("a")])
+    yield "Records.counts", Call(kept.counts, {})
+    yield "Records.rows", Call(kept.rows, {})
+    yield "Records.to_csv", Call(kept.to_csv, {"path": path / "records.csv"})
+    yield "people", Call(wb.people, {"count": 2, "sexes": ["male"]})
+    counted = {"task": path / "task.toml", "sees": (1.0, 0.0, 1.0), "count": 1, "sexes": ["male"]}
+    yield "accommodation", Call(partial(wb.accommodation, jobs=1, progress=lambda told: True), counted)
+    upright, work = person.figure.neutral, wb.Work(load=5.0)
+    posed = {"figure": person.figure, "q": upright, "work": work}
+    for judge in (wb.rula, wb.reba, wb.owas):
+        yield judge.__name__, Call(judge, posed)
+    yield "ergonomics_of", Call(wb.ergonomics_of, {**posed, "strength": wb.Strength()})
+    yield "body_angles", Call(wb.body_angles, {"figure": person.figure, "q": upright}, lambda made: made.side("left"))
+    yield (
+        "static_torques",
+        Call(wb.static_torques, {"figure": person.figure, "q": upright, "load": 5.0, "seated": True}),
+    )
+    scored = wb.ergonomics_of(person.figure, upright)
+    yield "BodyAngles.side", Call(scored.angles.side, {"name": "left"})
+    yield "StaticTorques.of_side", Call(scored.torques.of_side, {"side": "left"})
+    yield "Ergonomics.rows", Call(scored.rows, {})
+    yield "Ergonomics.summary", Call(scored.summary, {})
+    yield "Ergonomics.colors", Call(scored.colors, {"figure": person.figure})
+    yield "Work.sits", Call(work.sits, {"angles": scored.angles})
+    yield "FieldOfView.off", Call(wb.FieldOfView().off, {"direction": (1.0, 0.0, 0.0)})
+    lifted = {"figure": person.figure, "origin": upright, "destination": upright, "floor": 0.1}
+    yield "lift_between", Call(wb.lift_between, lifted)
+    lift = {"horizontal": 0.3, "vertical": 0.7, "travel": 0.3, "asymmetry": 0.1, "frequency": 1.0, "duration": 1.0}
+    yield "Lift", Call(wb.Lift, {**lift, "coupling": "good", "load": 5.0}, lambda made: (made.limit, made.index))
+    yield "Work", Call(wb.Work, {"load": 5.0, "static": True, "coupling": "good", "seated": None})
+    yield "sight", Call(wb.sight, {"scene": person, "q": upright, "point": (1.0, 0.0, 1.5), "field": wb.FieldOfView()})
+    cone = {"horizontal": 0.5, "up": 0.5, "down": 0.5, "declination": 0.2}
+    yield "FieldOfView", Call(wb.FieldOfView, cone, lambda made: made.off(np.array((1.0, 0.0, 0.0))))
+    yield (
+        "RulaParts",
+        Call(wb.RulaParts, dict.fromkeys(list(wb.RulaParts.__dataclass_fields__), 1), lambda made: made.score),
+    )
+    yield (
+        "RebaParts",
+        Call(wb.RebaParts, dict.fromkeys(list(wb.RebaParts.__dataclass_fields__), 1), lambda made: made.score),
+    )
+    yield "Owas", Call(wb.Owas, {"back": 1, "arms": 1, "legs": 1, "load": 1}, lambda made: made.category)
     record = wb.SolveRecord("a")
     yield "Records", Call(wb.Records, {"records": [record]}, lambda made: (repr(made), made.counts(), made.rows()))
     for method in (wb.Trajectory, wb.PerFrame, wb.Fade, wb.Bisection):
@@ -738,6 +788,9 @@ ANSWERS = (
     "Recording", "Judgement", "Dragged", "DragJudgement", "InteractionScene", "Wrench", "Recording.of",
     "Scene.of_parts", "ClipCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding", "Deviation",
     "Torques", "SphereFilling", "AssemblySolution", "AssemblyStep",
+    "SolveRecord", "SolveRecord.of", "SolveRecord.row", "SolveRecord.as_json", "SolveRecord.from_json", "SolveProgress",
+    "Records.to_parquet", "ReachMap", "Accommodation", "Ergonomics", "BodyAngles", "Rula", "Reba", "StaticTorques",
+    "Sight",
     "Scene.of_parts", "ClipCheck", "DerivativeCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding",
     "Deviation",
     "Torques", "SphereFilling",

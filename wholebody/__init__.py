@@ -29,6 +29,15 @@ if TYPE_CHECKING:
     from wholebody.derivatives import DerivativeCheck, check_derivatives
     from wholebody.dynamics.coupling import Spring
     from wholebody.dynamics.world import World
+    from wholebody.ergonomics.angles import BodyAngles, body_angles
+    from wholebody.ergonomics.assessment import Ergonomics, ergonomics_of
+    from wholebody.ergonomics.lifting import Lift, lift_between
+    from wholebody.ergonomics.owas import Owas, owas
+    from wholebody.ergonomics.reba import Reba, RebaParts, reba
+    from wholebody.ergonomics.rula import Rula, RulaParts, rula
+    from wholebody.ergonomics.static_torques import StaticTorques, static_torques
+    from wholebody.ergonomics.vision import FieldOfView, Sight, sight
+    from wholebody.ergonomics.work import Work
     from wholebody.figures import Figure, load
     from wholebody.geometry.shapes import (
         Box,
@@ -75,6 +84,7 @@ if TYPE_CHECKING:
     from wholebody.scene import Scene
     from wholebody.simplification.simplify import simplify
     from wholebody.solution import Solution
+    from wholebody.studies.accommodation import Accommodation, accommodation, people
     from wholebody.studies.many import SolveProgress, solve_many
     from wholebody.studies.reach_map import reach_map
     from wholebody.studies.reach_result import ReachMap
@@ -118,6 +128,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CCD",
     "QP",
+    "Accommodation",
     "Assembly",
     "AssemblyConstraint",
     "AssemblySolution",
@@ -131,6 +142,7 @@ __all__ = [
     "BatchProgress",
     "Bisection",
     "Body",
+    "BodyAngles",
     "Bound",
     "Box",
     "Capsule",
@@ -147,7 +159,9 @@ __all__ = [
     "Effort",
     "Ellipsoid",
     "Equipment",
+    "Ergonomics",
     "Fade",
+    "FieldOfView",
     "Figure",
     "FileFormatError",
     "Frame",
@@ -160,12 +174,14 @@ __all__ = [
     "Hull",
     "InputError",
     "Lean",
+    "Lift",
     "Material",
     "Measure",
     "Mesh",
     "MissingPackageError",
     "Newton",
     "Orientation",
+    "Owas",
     "PerFrame",
     "Placo",
     "Plane",
@@ -176,12 +192,17 @@ __all__ = [
     "RangeOfMotion",
     "ReachCones",
     "ReachMap",
+    "Reba",
+    "RebaParts",
     "Records",
     "Relative",
     "Result",
     "Rhythm",
+    "Rula",
+    "RulaParts",
     "Scene",
     "Shape",
+    "Sight",
     "Sit",
     "SkeletonMotion",
     "Solution",
@@ -191,6 +212,7 @@ __all__ = [
     "Spring",
     "StanceFeet",
     "Stand",
+    "StaticTorques",
     "StepLimit",
     "Strength",
     "Task",
@@ -201,26 +223,37 @@ __all__ = [
     "UnknownNameError",
     "Viewer",
     "WholebodyError",
+    "Work",
     "World",
     "__version__",
+    "accommodation",
     "assess",
     "avoid",
     "avoid_many",
+    "body_angles",
     "check",
     "check_derivatives",
     "equipment",
+    "ergonomics_of",
     "follow_path",
+    "lift_between",
     "load",
+    "owas",
+    "people",
     "reach_map",
     "read_clip",
     "read_many",
     "read_result",
     "read_skeleton",
     "read_task",
+    "reba",
     "retarget",
+    "rula",
+    "sight",
     "simplify",
     "solve",
     "solve_many",
+    "static_torques",
     "study",
     "torques",
     "write_result",
@@ -234,6 +267,15 @@ _MODULES = {
     "wholebody.geometry.shapes": "Box Capsule Cylinder Ellipsoid HalfSpace Hull Mesh Shape Sphere Torus",
     "wholebody.dynamics.coupling": "Spring",
     "wholebody.dynamics.world": "World",
+    "wholebody.ergonomics.angles": "BodyAngles body_angles",
+    "wholebody.ergonomics.assessment": "Ergonomics ergonomics_of",
+    "wholebody.ergonomics.lifting": "Lift lift_between",
+    "wholebody.ergonomics.owas": "Owas owas",
+    "wholebody.ergonomics.reba": "Reba RebaParts reba",
+    "wholebody.ergonomics.rula": "Rula RulaParts rula",
+    "wholebody.ergonomics.static_torques": "StaticTorques static_torques",
+    "wholebody.ergonomics.vision": "FieldOfView Sight sight",
+    "wholebody.ergonomics.work": "Work",
     "wholebody.matter.body": "Body",
     "wholebody.matter.joints": "BallJoint Hinge",
     "wholebody.matter.materials": "Material",
@@ -269,6 +311,7 @@ _MODULES = {
     "wholebody.scene": "Scene",
     "wholebody.simplification.simplify": "simplify",
     "wholebody.solution": "Solution",
+    "wholebody.studies.accommodation": "Accommodation accommodation people",
     "wholebody.studies.many": "SolveProgress solve_many",
     "wholebody.studies.records": "Records SolveRecord",
     "wholebody.studies.reach_map": "reach_map",

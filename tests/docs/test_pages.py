@@ -19,6 +19,7 @@ import pytest
         "docs/interaction.md",
         "docs/motion.md",
         "docs/world.md",
+        "docs/studies.md",
         "docs/frames.md",
         "docs/how-to/bolt.md",
         "docs/how-to/drag-and-record.md",

@@ -26,6 +26,7 @@ OTHERS = (
     *("chair", "console_two_people", "hand_on_table", "avatar_two_arms"),
     *("sit_on_chair", "four_bar", "assemble_shelf", "free_a_clip"),
     *("four_bar_among_obstacles", "scissor_lift", "carry_together", "take_a_seat", "lift_a_box"),
+    *("reach_map", "study_of_people"),
 )
 REST_ON = {("pelvis", "pouch"), ("lower_lumbar", "pouch")}  # what the figure wears lies on it
 
@@ -393,3 +394,24 @@ def test_a_clip_with_a_pack_is_free_in_every_frame(
     assert assess_motion(scene, freed.clip.q, freed.clip.dt).depth.max() <= 1e-4
     assert "arms swing" in capsys.readouterr().out
     assert module.chart(freed.clip, freed.clip, "pack", tmp_path / "curves.png").stat().st_size > 10_000
+
+
+def test_a_reach_map_knows_what_is_far_and_what_is_in_the_way(example: Example, tmp_path: Path) -> None:
+    module = example("reach_map")
+    found = module.main(out=tmp_path, pictures=False, step=0.25)
+    assert 0.1 < found.share < 1.0
+    problem = module.build()
+    for place in zip(*np.nonzero(found.reached), strict=True):
+        tip = places(problem, found.q[place])("right_index_tip").translation
+        np.testing.assert_allclose(tip, (found.x[place[0]], found.y[place[1]], found.z[place[2]]), atol=2e-5)
+        least, where = deepest(problem, found.q[place])
+        assert least > -1e-6, where
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_study_finds_that_the_tall_man_reaches_more(example: Example, tmp_path: Path) -> None:
+    records = example("study_of_people").main(out=tmp_path, pictures=False)
+    left = {one.name: one.goal_error for one in records}
+    assert left["small woman, high"] > 0.01
+    assert all(one.solved for one in records if one.factors["person"] == "tall man")
+    assert not list(tmp_path.iterdir())

@@ -14,7 +14,7 @@ from wholebody.version import __version__
 
 COMMANDS = (
     *("pose", "show", "figure", "demo", "interact", "drag", "world", "clip"),
-    *("study", "reach", "bench", "doctor", "completion"),
+    *("study", "reach", "assess", "bench", "doctor", "completion"),
 )
 """Each is a module of this folder."""
 

@@ -6,20 +6,19 @@ import base64
 import html
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.files import write
-
-if TYPE_CHECKING:
-    from wholebody.studies.reach_result import ReachMap
+from wholebody.studies.reach_verdicts import INSIDE
 
 MOST_SLICES = 24  # heights in one picture; of more, some are left out evenly
 COLUMNS = 6
 INCHES = 2.4  # of one height
 DPI = 120
+MEANING = "below 0: metres short; above: reached"
 INSIDE_GRAY = (0.35, 0.35, 0.38, 1.0)
 
 _PAGE = """<!doctype html>
@@ -38,7 +37,7 @@ slider.addEventListener("input",show);show();
 """
 
 
-def draw_slices(found: ReachMap, path: Path) -> Path:
+def draw_slices(found: Any, path: Path) -> Path:
     """Draw the heights of a reach map beside each other, seen from above; returns the path."""
     shown = np.unique(np.linspace(0, len(found.z) - 1, min(len(found.z), MOST_SLICES)).round().astype(int)).tolist()
     columns = min(COLUMNS, len(shown))
@@ -51,18 +50,18 @@ def draw_slices(found: ReachMap, path: Path) -> Path:
     for axis, k in zip(axes.flat, shown, strict=False):
         image = _slice(axis, found, values, k)
     bar = chart.colorbar(image, ax=list(axes.flat), shrink=0.8)
-    bar.set_label(_meaning(found))
+    bar.set_label(MEANING, fontsize="small")
     chart.suptitle(f"{found.frame}: {found.share:.0%} of {found.verdict.size} places reached, seen from above")
     return write(path, _png(chart))
 
 
-def write_page(found: ReachMap, path: Path) -> Path:
+def write_page(found: Any, path: Path) -> Path:
     """Write a page with one picture a height and a slider; returns the path."""
     values, images = heat(found), []
     for k in range(len(found.z)):
         chart, axes = _chart(1, 1, (6.4, 5.2))
         image = _slice(axes[0, 0], found, values, k)
-        chart.colorbar(image, ax=axes[0, 0]).set_label(_meaning(found))
+        chart.colorbar(image, ax=axes[0, 0]).set_label(MEANING, fontsize="small")
         data = base64.b64encode(_png(chart)).decode()
         images.append(f'<img alt="places at {found.z[k]:.2f} m" src="data:image/png;base64,{data}">')
     facts = {**found.counts(), "solves": found.solves, "reach volume": f"{found.volume:.3g}"}
@@ -77,7 +76,7 @@ def write_page(found: ReachMap, path: Path) -> Path:
     return write(path, text)
 
 
-def heat(found: ReachMap) -> Array:
+def heat(found: Any) -> Array:
     """(nx, ny, nz) what is drawn: minus the distance that is left, metres; where reached, 0 to 1 by the measure.
 
     1 is the least measure of all reached places, 0 the greatest.
@@ -91,7 +90,7 @@ def heat(found: ReachMap) -> Array:
     return values
 
 
-def _slice(axis: Any, found: ReachMap, values: Array, k: int) -> Any:
+def _slice(axis: Any, found: Any, values: Array, k: int) -> Any:
     """Draw one height: reached places green, the others by what is left, places inside of things gray."""
     from matplotlib.colors import LinearSegmentedColormap
 
@@ -103,8 +102,6 @@ def _slice(axis: Any, found: ReachMap, values: Array, k: int) -> Any:
     image = axis.imshow(
         values[:, :, k], origin="lower", extent=extent, cmap=colors, vmin=-1.0, vmax=1.0, interpolation="nearest"
     )
-    from wholebody.studies.reach_result import INSIDE
-
     gray = np.zeros((*values.shape[:2], 4))
     gray[found.verdict[:, :, k] == INSIDE] = INSIDE_GRAY
     axis.imshow(gray, origin="lower", extent=extent, interpolation="nearest")
@@ -114,10 +111,6 @@ def _slice(axis: Any, found: ReachMap, values: Array, k: int) -> Any:
     axis.set_ylabel("x, forward [m]", fontsize="x-small")
     axis.tick_params(labelsize="x-small")
     return image
-
-
-def _meaning(found: ReachMap) -> str:
-    return "below 0: metres short; 0 to 1: reached, 1 with the least measure"
 
 
 def _chart(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:

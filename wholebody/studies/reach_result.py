@@ -13,10 +13,7 @@ from wholebody import checks
 from wholebody.arrays import Array, Mask
 from wholebody.files import check_writable, write
 from wholebody.problem import Problem
-
-NOT_TRIED, REACHED, MISSED, EXCLUDED, BEYOND, INSIDE = range(6)
-VERDICTS = ("not tried", "reached", "missed", "excluded", "beyond", "inside")
-"""Words of the codes of a verdict."""
+from wholebody.studies.reach_verdicts import REACHED, VERDICTS
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -104,7 +104,7 @@ def study(
         cases = []
         for aim, target in _or_none(factors[1]):
             named = {key: name for key, name in zip(FACTORS, (who, aim, where), strict=True) if name}
-            variant = _Variant(make, person, target, layout)
+            variant = Variant(make, person, target, layout)
             asked = fingerprint(mark, person, target, layout, running.method, warm_start) if store else ""
             cases.append(Case(SolveRecord(", ".join(named.values()), factors=named), variant, asked))
         runs += runs_of(cases, RUN if warm_start else 1)
@@ -112,7 +112,7 @@ def study(
 
 
 @dataclass(frozen=True)
-class _Variant:
+class Variant:
     """Makes the problem of one case, in the process that solves it."""
 
     make: Any
@@ -121,6 +121,7 @@ class _Variant:
     layout: Any
 
     def __call__(self) -> Problem:
+        """Make the problem."""
         person = self.person
         if isinstance(self.make, TaskFile):
             return self.make(person, self.target, self.layout)

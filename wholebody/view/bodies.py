@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -183,6 +183,13 @@ class Bodies:
             low, high = corners.min(axis=0), corners.max(axis=0)
             tops[f"{style.NAME_NODE}/{node(name)}"] = (name, np.array([*(low + high)[:2] / 2, high[2]]))
         return tops
+
+    def dye(self, keyframe: Keyframe, colors: Mapping[str, Color]) -> None:
+        """Give the pieces of segments their colours (segment -> colour)."""
+        for index, body in enumerate(self.all):
+            owner = self.scene.piece_owner[index] if body.thing is None and colors else ""
+            if owner in colors and body.path in keyframe.colors:
+                keyframe.colors[body.path] = colors[owner]
 
     def _box(self, index: int, data: Any) -> Array:
         """Corners (8, 3) in the world of the box around a piece."""

@@ -48,6 +48,7 @@ class Composition:
         self._goals: Goals | None = None
         self._frames: tuple[str, ...] = ()
         self._axes = style.AXES_LENGTH
+        self.dyed: dict[str, style.Color] = {}
 
     @property
     def figure(self) -> Figure:
@@ -88,6 +89,7 @@ class Composition:
         """The keyframe of a posture, with the goals of a problem if there is one, the blockers, and overlaps."""
         bodies, state, keyframe = self.bodies, self._state.update(q), Keyframe()
         bodies.pose(keyframe, state.data)
+        bodies.dye(keyframe, self.dyed)
         contacts = self._scene.contacts(q, within=self._contact_distance)
         color_contacts(keyframe, bodies, contacts)
         mark_contacts(keyframe, bodies, contacts)

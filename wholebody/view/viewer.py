@@ -7,7 +7,7 @@ import math
 import os
 import sys
 import webbrowser
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -210,6 +210,28 @@ class Viewer:
         if self._shown is not None:
             q, problem = self._shown
             self.show(q, problem=problem, pieces=self._composition.pieces)
+
+    def color(self, segments: Mapping[str, Any]) -> None:
+        """Draw the pieces of segments in colours, at the posture that is shown and at all after this call.
+
+        Args:
+            segments: segment -> red, green, blue and, if given, alpha, each 0 to 1; none takes the colours away.
+
+        Raises:
+            UnknownNameError: there is no such segment.
+            InputError: the scene has no figure, or a value is no colour.
+        """
+        known = self._composition.figure.segments
+        if not isinstance(segments, Mapping):
+            raise InputError(
+                f"color: segments is {checks.shown(segments)}; give colours, such as {{'head': (1, 0, 0)}}"
+            )
+        for name in segments:
+            checks.known(name, known, "segment", "color")
+        self._composition.dyed = {name: checks.color(given, f"color: {name}") for name, given in segments.items()}
+        if self._shown is not None:
+            q, problem = self._shown
+            self.show(q, problem=problem)
 
     def look(self, eye: ArrayLike | None = None, target: ArrayLike | None = None) -> None:
         """Set the camera; without arguments it looks at the figure.

@@ -1,0 +1,186 @@
+"""RULA, REBA and OWAS: examples on the printed tables, and postures whose scores follow from the papers' words."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from math import radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.cli.main import main
+from wholebody.ergonomics import owas as owas_module
+from wholebody.ergonomics import reba as reba_module
+from wholebody.ergonomics import rula as rula_module
+
+
+@pytest.fixture(scope="module")
+def person() -> wb.Figure:
+    return wb.load("human")
+
+
+def bent(person: wb.Figure, **degrees: float) -> np.ndarray:
+    """The upright posture with joints at other angles, degrees."""
+    names = {name: radians(value) for name, value in degrees.items()}
+    return person.with_joints(person.posture("standing"), names)
+
+
+def flat(table: tuple) -> list[int]:
+    return [table] if isinstance(table, int) else [value for row in table for value in flat(row)]
+
+
+def test_every_combination_of_a_table_has_an_entry() -> None:
+    assert len(flat(rula_module.TABLE_A)) == 6 * 3 * 4 * 2
+    assert len(flat(rula_module.TABLE_B)) == 6 * 6 * 2
+    assert len(flat(rula_module.TABLE_C)) == 8 * 7
+    assert len(flat(reba_module.TABLE_A)) == 60  # the 144 combinations of the paper: 60 of group A, 36 of group B
+    assert len(flat(reba_module.TABLE_B)) == 36
+    assert len(flat(reba_module.TABLE_C)) == 144
+    assert [len(row) for back in owas_module.CATEGORIES for row in back] == [21] * 12  # 252 of the paper
+
+
+def test_worse_parts_never_lower_a_score() -> None:
+    """Each table grows along each of its axes."""
+    for table in (
+        rula_module.TABLE_A,
+        rula_module.TABLE_C,
+        reba_module.TABLE_A,
+        reba_module.TABLE_B,
+        reba_module.TABLE_C,
+    ):
+        values = np.array(table)
+        for axis in range(values.ndim):
+            assert (np.diff(values, axis=axis) >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("parts", "a", "b", "score"),
+    [
+        # a worksheet with the tables printed: least and greatest scores of everything
+        ((1, 1, 1, 1, 1, 1, 1, 0, 0), 1, 1, 1),
+        ((6, 3, 4, 2, 6, 6, 2, 1, 3), 9, 9, 7),
+        # read from the printed tables by hand
+        ((2, 2, 3, 1, 2, 3, 1, 1, 0), 3, 4, 5),
+        ((3, 2, 3, 1, 3, 4, 1, 1, 2), 4, 5, 7),
+        ((4, 3, 4, 1, 4, 5, 1, 1, 0), 6, 7, 7),
+    ],
+)
+def test_rula_by_its_printed_tables(parts: tuple[int, ...], a: int, b: int, score: int) -> None:
+    found = wb.RulaParts(*parts)
+    assert (found.arm, found.body, found.score) == (a, b, score)
+
+
+def test_reba_by_the_example_of_a_public_package() -> None:
+    """rs9000/ergonomics prints two poses: neck 2, trunk 2, legs 2, upper arm 1, lower arm 2, wrist 3 and 2."""
+    left, right = wb.RebaParts(2, 2, 2, 1, 2, 3), wb.RebaParts(2, 2, 2, 1, 2, 2)
+    assert (left.body, left.arm, left.score) == (4, 3, 4)
+    assert (right.body, right.arm, right.score) == (4, 2, 4)
+    assert wb.RebaParts(3, 5, 4, 6, 2, 3, 3, 3, 3).score == 15
+    assert wb.RebaParts(1, 1, 1, 1, 1, 1).score == 1
+
+
+def test_owas_by_an_example_of_a_lecture() -> None:
+    """A. Freivalds (Pennsylvania State University): 2151 is a bent back, arms below, knees bent, less than 10 kg."""
+    assert wb.Owas(2, 1, 5, 1).category == 3
+    assert wb.Owas(1, 1, 2, 1).category == 1
+    assert wb.Owas(4, 3, 4, 3).category == 4
+    codes = itertools.product((1, 2, 3, 4), (1, 2, 3), range(1, 8), (1, 2, 3))
+    assert {wb.Owas(*code).category for code in codes} == {1, 2, 3, 4}
+
+
+def test_angles_are_those_of_the_joints_that_are_turned(person: wb.Figure) -> None:
+    for side, other in (("left", "right"), ("right", "left")):
+        angles = wb.body_angles(person, bent(person, **{
+            f"{side}_shoulder_flexion": 50, f"{side}_elbow_flexion": 80, f"{side}_elbow_pronation": 40,
+            f"{side}_wrist_flexion": 25, f"{side}_knee_flexion": 35,
+        }))  # fmt: skip
+        mine, still = angles.side(side), angles.side(other)
+        arm = [mine.shoulder_flexion, mine.elbow_flexion, mine.wrist_flexion, mine.forearm_twist]
+        found = np.degrees([*arm, mine.knee_flexion])
+        np.testing.assert_allclose(found, [50, 80, 25, 40, 35], atol=1.0)
+        assert abs(still.shoulder_flexion) < 1e-6
+    bowed = wb.body_angles(person, bent(person, neck1_flexion=15, spine2_rotation=20))
+    assert np.degrees(bowed.neck_flexion) == pytest.approx(15.0, abs=1e-6)
+    assert np.degrees(bowed.trunk_twist) == pytest.approx(20.0, abs=1e-6)
+
+
+def test_angles_do_not_depend_on_where_a_person_stands_and_looks(person: wb.Figure) -> None:
+    q = bent(person, left_shoulder_flexion=50, spine1_flexion=20, neck1_rotation=15)
+    moved = q.copy()
+    moved[:3] += (1.0, -2.0, 0.3)
+    half = radians(60.0)
+    moved[3:7] = 0.0, 0.0, np.sin(half), np.cos(half)
+    one, other = wb.body_angles(person, q), wb.body_angles(person, moved)
+    for name in ("trunk_flexion", "trunk_lateral", "trunk_twist", "neck_twist", "left_share"):
+        assert getattr(one, name) == pytest.approx(getattr(other, name), abs=1e-9)
+    assert one.left.shoulder_flexion == pytest.approx(other.left.shoulder_flexion, abs=1e-9)
+
+
+def test_upright_is_acceptable_and_stooping_is_not(person: wb.Figure) -> None:
+    upright = wb.ergonomics_of(person, person.posture("standing"))
+    assert upright.rula.score <= 2
+    assert upright.reba.score == 1
+    assert upright.owas.code == "1121"
+    stoop = bent(person, left_hip_flexion=70, right_hip_flexion=70, spine1_flexion=15, spine2_rotation=20)
+    stoop[3:7] = 0.0, np.sin(radians(35)), 0.0, np.cos(radians(35))
+    stooping = wb.ergonomics_of(person, stoop, wb.Work(load=25.0, repeated=True))
+    assert stooping.rula.score == 7
+    assert stooping.reba.score == 7  # table A 4 and load 2, table B 1: table C 6, and repeated
+    assert stooping.owas.back == 2 or stooping.owas.back == 4
+    assert stooping.owas.load == 3
+    assert stooping.torques.worst[1] > upright.torques.worst[1]
+
+
+def test_the_worse_side_is_reported(person: wb.Figure) -> None:
+    raised = wb.rula(person, bent(person, left_shoulder_flexion=100, left_wrist_flexion=40))
+    assert raised.left.score > raised.right.score
+    assert (raised.worse, raised.score) == ("left", raised.left.score)
+    raised = wb.reba(person, bent(person, right_shoulder_flexion=100, right_wrist_flexion=40))
+    assert raised.worse == "right"
+
+
+@pytest.mark.parametrize(("posture", "legs"), [("standing", 2), ("sitting", 1), ("kneeling", 6), ("squatting", 4)])
+def test_owas_tells_how_a_body_is_carried(person: wb.Figure, posture: str, legs: int) -> None:
+    assert wb.owas(person, person.posture(posture)).legs == legs
+
+
+def test_one_leg_is_told_from_two(person: wb.Figure) -> None:
+    lifted = bent(person, left_hip_flexion=60, left_knee_flexion=60)
+    assert wb.owas(person, lifted).legs == 3
+    assert wb.reba(person, lifted).right.legs == 2
+
+
+def test_colours_are_of_every_segment_and_red_where_it_is_worst(person: wb.Figure) -> None:
+    found = wb.ergonomics_of(person, bent(person, left_shoulder_flexion=120, left_shoulder_abduction=30))
+    colors = found.colors(person)
+    assert set(colors) == set(person.segments)
+    assert colors["left_upper_arm"][0] > colors["right_upper_arm"][0]
+
+
+def test_a_figure_that_is_no_person_is_refused() -> None:
+    arm = wb.load(Path(__file__).resolve().parents[2] / "examples" / "tasks" / "arm.urdf")
+    with pytest.raises(wb.InputError, match="load a person"):
+        wb.rula(arm, arm.neutral)
+
+
+def test_the_command_prints_a_table_and_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    task = tmp_path / "task.toml"
+    task.write_text(
+        '[figure]\nname = "human"\n[[goal]]\ntype = "point"\nframe = "head_top"\ntarget = [0.0, 0.0, 1.74]\n'
+    )
+    main(["pose", str(task), "--out", str(tmp_path), "--no-picture", "--json"])
+    capsys.readouterr()
+    assert main(["assess", str(tmp_path / "result.json"), "--ergonomics", "--load", "6"]) == 0
+    shown = capsys.readouterr().out
+    assert all(word in shown for word in ("RULA", "REBA", "OWAS", "strength"))
+    assert main(["assess", str(tmp_path / "result.json"), "--ergonomics", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["ergonomics"]["rula"]["score"] == max(
+        found["ergonomics"]["rula"][s]["score"] for s in ("left", "right")
+    )
+    assert found["assessment"]["penetration"] < 1e-5
+    assert main(["assess", str(tmp_path / "result.json"), "--ergonomics", "--coupling", "firm"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

@@ -1,0 +1,59 @@
+"""Sight: directions whose angles are known, and things in between."""
+
+from __future__ import annotations
+
+from math import cos, radians, sin
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+
+
+@pytest.fixture(scope="module")
+def person() -> wb.Figure:
+    return wb.load("human")
+
+
+def ahead(person: wb.Figure, side: float, height: float, distance: float = 1.0) -> np.ndarray:
+    """A point in a direction from the eyes, degrees."""
+    a, b = radians(side), radians(height)
+    direction = np.array((cos(b) * cos(a), cos(b) * sin(a), sin(b)))
+    eyes = person.placement(person.posture("standing"), "gaze")
+    return np.array(eyes.act(distance * direction))
+
+
+@pytest.mark.parametrize(
+    ("side", "height", "seen", "comfortable"),
+    [
+        (0, -15, True, True),  # the normal line of sight
+        (14, -15, True, True),
+        (30, -15, True, False),
+        (-40, -15, False, False),
+        (0, 24, True, False),  # 39 degrees above the line of sight
+        (0, 27, False, False),
+        (0, -34, True, False),
+        (0, -37, False, False),
+        (180, 0, False, False),
+    ],
+)
+def test_cones(person: wb.Figure, side: float, height: float, seen: bool, comfortable: bool) -> None:
+    found = wb.sight(wb.Scene(person), person.posture("standing"), ahead(person, side, height))
+    assert (found.seen, found.comfortable) == (seen, comfortable)
+    assert found.distance == pytest.approx(1.0)
+
+
+def test_a_thing_in_between_hides(person: wb.Figure) -> None:
+    q, scene, point = person.posture("standing"), wb.Scene(person), ahead(person, 0, -15)
+    scene.add(wb.Box((0.02, 0.3, 0.3)), name="board", at=ahead(person, 0, -15, 0.5))
+    assert wb.sight(scene, q, point).hidden_by == "board"
+    scene.move("board", at=ahead(person, 60, -15, 0.5))
+    assert wb.sight(scene, q, point).seen
+    scene.move("board", at=ahead(person, 0, -15, 1.5))
+    assert wb.sight(scene, q, point).seen
+
+
+def test_a_thing_does_not_hide_its_own_surface(person: wb.Figure) -> None:
+    scene, point = wb.Scene(person), ahead(person, 0, -15)
+    scene.add(wb.Sphere(0.05), name="ball", at=ahead(person, 0, -15, 1.05))
+    assert wb.sight(scene, person.posture("standing"), point).seen

@@ -1,0 +1,91 @@
+"""`wholebody assess`: judge the posture of a result again, and score its ergonomics."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+HELP = "judge a posture, and score its ergonomics"
+DESCRIPTION = """\
+Judge the posture of a result.json that `wholebody pose` wrote: goals, overlaps, limits, constraints. With --ergonomics
+print RULA, REBA, OWAS and the torques against published strength too; --json prints all of it."""
+EPILOG = """\
+examples:
+  wholebody assess out/shelf/result.json --ergonomics
+  wholebody assess out/shelf/result.json --ergonomics --load 6 --repeated --json"""
+FLAGS = {
+    "static": "the posture is held for minutes",
+    "repeated": "the action is repeated more than four times a minute",
+    "shock": "the load comes with a shock",
+    "unstable": "the base is unstable, or the posture changes rapidly",
+    "arms_supported": "the arms rest on something",
+    "walking": "the person walks",
+}
+
+
+def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command."""
+    shape = argparse.RawDescriptionHelpFormatter
+    parser = commands.add_parser("assess", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
+    parser.add_argument("result", type=Path, metavar="RESULT.json", help="the result")
+    parser.add_argument("--ergonomics", action="store_true", help="score the ergonomics of a person")
+    parser.add_argument("--load", type=float, default=0.0, metavar="KG", help="mass in both hands (default: 0)")
+    parser.add_argument("--coupling", default="good", metavar="WORD", help="grip: good, fair, poor, unacceptable")
+    for name, says in FLAGS.items():
+        parser.add_argument(f"--{name.replace('_', '-')}", action="store_true", help=says)
+    parser.add_argument("--sex", default="male", metavar="SEX", help="of the strength: male or female (default: male)")
+    parser.add_argument("--percentile", type=float, default=50.0, metavar="P", help="of the strength, 5 to 95")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Judge and print; 1 if the posture violates something."""
+    from wholebody.assessment import assess
+    from wholebody.cli import result
+
+    task, q = result.read(arguments.result)
+    judged = assess(task.problem, q)
+    described: dict[str, Any] = {"assessment": judged.summary()}
+    scores = None
+    if arguments.ergonomics:
+        from wholebody.ergonomics.assessment import ergonomics_of
+        from wholebody.ergonomics.work import Work
+        from wholebody.motion.strength import Strength
+
+        work = Work(arguments.load, coupling=arguments.coupling, **{name: getattr(arguments, name) for name in FLAGS})
+        scores = ergonomics_of(task.problem.scene.figure, q, work, Strength(arguments.percentile, arguments.sex))
+        described["ergonomics"] = scores.summary()
+    if arguments.json:
+        print(result.as_json(described), end="")
+    else:
+        _show(judged, scores)
+    return 0 if judged.holds(VIOLATION) else 1
+
+
+VIOLATION = 1e-4  # m, rad: of limits, constraints and clearances, beyond which a posture does not hold
+
+
+def _show(judged: Any, scores: Any) -> None:
+    """Print tables."""
+    import math
+
+    from rich.console import Console
+    from rich.markup import escape
+
+    from wholebody.cli.tables import table
+
+    console = Console()
+    made = table("judged", "")
+    made.add_row("goals missed by", f"{1e3 * judged.goal_error:.3f} mm, {math.degrees(judged.goal_angle):.3f} deg")
+    made.add_row("deepest overlap", f"{1e3 * judged.penetration:.4f} mm")
+    made.add_row("limits, worst violation", f"{math.degrees(judged.limit_violation):.4f} deg")
+    made.add_row("constraints, worst violation", f"{1e3 * judged.constraint_violation:.4f} mm or mrad")
+    console.print(made)
+    if scores is not None:
+        made = table("ergonomics", "left", "right", "worse")
+        made.columns[3].justify = "left"
+        for row in scores.rows():
+            made.add_row(*map(escape, row))
+        console.print(made)

@@ -1,0 +1,133 @@
+"""All ergonomic scores of one posture, as an object, a table and plain values."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from math import degrees
+from typing import Any
+
+from wholebody.arrays import Array
+from wholebody.ergonomics.angles import SIDES, BodyAngles, body_angles, check_person
+from wholebody.ergonomics.owas import Owas, owas_code
+from wholebody.ergonomics.reba import Reba, reba_parts
+from wholebody.ergonomics.rula import Rula, rula_parts
+from wholebody.ergonomics.static_torques import StaticTorques, static_torques
+from wholebody.ergonomics.work import Work, check_work
+from wholebody.figures.figure import Figure
+from wholebody.motion.strength import Strength
+
+Color = tuple[float, float, float, float]
+
+COLORS: tuple[Color, ...] = (
+    (0.10, 0.59, 0.25, 1.0),
+    (0.65, 0.85, 0.42, 1.0),
+    (0.99, 0.75, 0.38, 1.0),
+    (0.84, 0.19, 0.15, 1.0),
+)
+"""Green to red, of scores from the least to the greatest."""
+
+PARTS = {
+    "upper_arm": ("upper_arm", "clavicle"),
+    "lower_arm": ("forearm",),
+    "wrist": ("hand",),
+}
+"""Parts of a side in RULA -> the segments that are coloured by them."""
+
+MOST = {"upper_arm": 6, "lower_arm": 3, "wrist": 4, "neck": 6, "trunk": 6, "legs": 2}
+
+
+@dataclass(frozen=True)
+class Ergonomics:
+    """The ergonomic scores of a posture.
+
+    Attributes:
+        angles: of the body.
+        rula, reba, owas: the scores.
+        torques: static torques against strength.
+    """
+
+    angles: BodyAngles
+    rula: Rula
+    reba: Reba
+    owas: Owas
+    torques: StaticTorques
+
+    def rows(self) -> list[tuple[str, str, str, str]]:
+        """Rows of a table: method, left, right, and what it says of the worse side."""
+        made = [
+            (name, str(found.left.score), str(found.right.score), f"{found.score}: {found.action}")
+            for name, found in (("RULA", self.rula), ("REBA", self.reba))
+        ]
+        made.append(("OWAS", "", "", f"category {self.owas.category}: {self.owas.action} ({self.owas})"))
+        sides = [f"{share:.0%} {joint}" if joint else "" for joint, share in map(self.torques.of_side, SIDES)]
+        joint, share = self.torques.worst
+        made.append(("strength", *sides, f"{share:.0%} of the strength of {joint}" if joint else "not known"))  # type: ignore[arg-type]
+        return made
+
+    def summary(self) -> dict[str, Any]:
+        """All of it as plain numbers and texts; angles in degrees."""
+        scores = {}
+        for name, found in (("rula", self.rula), ("reba", self.reba)):
+            sides = {side: {**asdict(getattr(found, side)), "score": getattr(found, side).score} for side in SIDES}
+            scores[name] = {**sides, "worse": found.worse, "score": found.score, "action": found.action}
+        joint, share = self.torques.worst
+        return {
+            **scores,
+            "owas": {"code": self.owas.code, "category": self.owas.category, "action": self.owas.action},
+            "strength": {"worst": joint, "share": share, "shares": dict(self.torques.share)},
+            "torques": dict(self.torques.torque),
+            "angles": _plain(asdict(self.angles)),
+        }
+
+    def colors(self, figure: Figure) -> dict[str, Color]:
+        """Segment -> colour by its part's score in RULA: green is the least, red the greatest.
+
+        Raises:
+            InputError: the figure is no person.
+        """
+        found: dict[str, Color] = {}
+        for name in check_person(figure, "colors: figure").segments:
+            side, _, part = name.partition("_")
+            if side in SIDES:
+                mine = self.rula.left if side == "left" else self.rula.right
+                known = next((key for key, names in PARTS.items() if part in names), "legs")
+            else:
+                mine, known = self.rula.right, "neck" if name in ("neck", "head") else "trunk"
+            level = (getattr(mine, known) - 1) / (MOST[known] - 1)
+            found[name] = COLORS[min(int(level * len(COLORS)), len(COLORS) - 1)]
+        return found
+
+
+def ergonomics_of(figure: Figure, q: Array, work: Work | None = None, strength: Strength | None = None) -> Ergonomics:
+    """Assess a person's posture: RULA, REBA, OWAS, and static torques against strength.
+
+    Args:
+        figure: a person, see `body_angles`.
+        q: (nq,) posture.
+        work: load, repetition, support; none if left out.
+        strength: of the person; a man of median strength if left out.
+
+    Raises:
+        InputError: no person, no posture, no work or no strength.
+    """
+    angles, asked = body_angles(figure, q), check_work(work, "ergonomics_of: work")
+    return Ergonomics(
+        angles,
+        Rula(*(rula_parts(angles, side, asked) for side in SIDES)),
+        Reba(*(reba_parts(angles, side, asked) for side in SIDES)),
+        owas_code(angles, asked),
+        static_torques(figure, q, load=asked.load, seated=asked.sits(angles), strength=strength),
+    )
+
+
+def _plain(values: dict[str, Any]) -> dict[str, Any]:
+    """Angles in degrees; lengths, shares and flags as they are."""
+    kept = ("shoulder_rise", "foot_height", "knee_height", "left_share", "center_ahead")
+    return {
+        name: _plain(value)
+        if isinstance(value, dict)
+        else value
+        if name in kept or isinstance(value, bool)
+        else degrees(value)
+        for name, value in values.items()
+    }

@@ -1,0 +1,172 @@
+"""The revised NIOSH lifting equation.
+
+T. R. Waters, V. Putz-Anderson, A. Garg, "Applications manual for the revised NIOSH lifting equation", DHHS (NIOSH)
+publication 94-110, revised 2021.
+
+RWL = 23 kg (25 / H) (1 - 0.003 |V - 75|) (0.82 + 4.5 / D) (1 - 0.0032 A) FM CM, with H, V, D in cm and A in degrees.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import degrees, inf, pi
+
+import numpy as np
+
+from wholebody import checks
+from wholebody.arrays import Array
+from wholebody.ergonomics.angles import check_person
+from wholebody.figures.figure import Figure
+
+CONSTANT = 23.0  # kg
+COUPLINGS = ("good", "fair", "poor")
+KNEE_HIGH = 75.0  # cm: height of the hands from which the second columns of the tables count
+
+FREQUENCIES = (0.2, 0.5, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+"""Lifts a minute, of the manual's table 5. Beyond the last one nothing may be lifted."""
+
+MULTIPLIERS = {
+    1.0: (
+        (1.0, 0.97, 0.94, 0.91, 0.88, 0.84, 0.8, 0.75, 0.7, 0.6, 0.52, 0.45, 0.41, 0.37, 0.0, 0.0, 0.0),
+        (1.0, 0.97, 0.94, 0.91, 0.88, 0.84, 0.8, 0.75, 0.7, 0.6, 0.52, 0.45, 0.41, 0.37, 0.34, 0.31, 0.28),
+    ),
+    2.0: (
+        (0.95, 0.92, 0.88, 0.84, 0.79, 0.72, 0.6, 0.5, 0.42, 0.35, 0.3, 0.26, 0.0, 0.0, 0.0, 0.0, 0.0),
+        (0.95, 0.92, 0.88, 0.84, 0.79, 0.72, 0.6, 0.5, 0.42, 0.35, 0.3, 0.26, 0.23, 0.21, 0.0, 0.0, 0.0),
+    ),
+    8.0: (
+        (0.85, 0.81, 0.75, 0.65, 0.55, 0.45, 0.35, 0.27, 0.22, 0.18, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        (0.85, 0.81, 0.75, 0.65, 0.55, 0.45, 0.35, 0.27, 0.22, 0.18, 0.15, 0.13, 0.0, 0.0, 0.0, 0.0, 0.0),
+    ),
+}
+"""Greatest duration, hours -> frequency multipliers with the hands below 75 cm, and at 75 cm or above."""
+
+COUPLING = {"good": (1.0, 1.0), "fair": (0.95, 1.0), "poor": (0.9, 0.9)}
+"""Coupling multipliers below 75 cm, and at 75 cm or above (table 7)."""
+
+CLOSEST, FARTHEST = 25.0, 63.0  # cm, of H
+HIGHEST = 175.0  # cm, of V and D
+LEAST_TRAVEL = 25.0  # cm
+MOST_TURNED = 135.0  # degrees
+
+
+@dataclass(frozen=True)
+class Lift:
+    """A lift, and what the equation says of it.
+
+    Attributes:
+        horizontal: H, of the hands from the middle of the ankles, metres.
+        vertical: V, of the hands above the floor, metres.
+        travel: D, by which the hands go up or down, metres.
+        asymmetry: A, of the hands from the middle plane of the body, radians.
+        frequency: lifts a minute.
+        duration: of the lifting, hours, up to 8.
+        coupling: "good", "fair" or "poor".
+        load: kg; None for a lift of which only the limit is asked.
+
+    Raises:
+        InputError: a value of the wrong kind or out of range.
+    """
+
+    horizontal: float
+    vertical: float
+    travel: float
+    asymmetry: float = 0.0
+    frequency: float = 0.2
+    duration: float = 1.0
+    coupling: str = "good"
+    load: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        for name in ("horizontal", "vertical", "travel"):
+            checks.number(getattr(self, name), f"Lift: {name}", 0.0, 3.0, "m")
+        checks.number(self.asymmetry, "Lift: asymmetry", 0.0, pi, "rad")
+        checks.number(self.frequency, "Lift: frequency", 0.0, 60.0, "lifts a minute")
+        checks.number(self.duration, "Lift: duration", 0.0, 8.0, "hours")
+        checks.choice(self.coupling, COUPLINGS, "Lift: coupling")
+        if self.load is not None:
+            checks.number(self.load, "Lift: load", 0.0, 1000.0, "kg")
+
+    @property
+    def multipliers(self) -> dict[str, float]:
+        """HM, VM, DM, AM, FM and CM by name, each 0 to 1."""
+        h, v, d, a = 100.0 * self.horizontal, 100.0 * self.vertical, 100.0 * self.travel, degrees(self.asymmetry)
+        high = int(v >= KNEE_HIGH)
+        column = next(table[high] for most, table in MULTIPLIERS.items() if self.duration <= most)
+        return {
+            "HM": 25.0 / max(h, CLOSEST) if h <= FARTHEST else 0.0,
+            "VM": 1.0 - 0.003 * abs(v - 75.0) if v <= HIGHEST else 0.0,
+            "DM": 0.82 + 4.5 / max(d, LEAST_TRAVEL) if d <= HIGHEST else 0.0,
+            "AM": 1.0 - 0.0032 * a if a <= MOST_TURNED else 0.0,
+            "FM": _frequency(self.frequency, column),
+            "CM": COUPLING[self.coupling][high],
+        }
+
+    @property
+    def limit(self) -> float:
+        """The recommended weight limit, kg; 0 where the equation allows no such lift."""
+        return float(CONSTANT * np.prod(list(self.multipliers.values())))
+
+    @property
+    def index(self) -> float | None:
+        """The lifting index: load / limit; infinite where nothing may be lifted, None without a load."""
+        if self.load is None:
+            return None
+        return self.load / self.limit if self.limit > 0.0 else inf if self.load > 0.0 else 0.0
+
+
+def lift_between(
+    figure: Figure, origin: Array, destination: Array, *, floor: float = 0.0, frequency: float = 0.2,
+    duration: float = 1.0, coupling: str = "good", load: float | None = None,
+) -> tuple[Lift, Lift]:  # fmt: skip
+    """The lift between two postures of a person: at its origin, and at its destination, where control is needed.
+
+    The hands are the middle of both palms. The middle plane goes through the middle of the ankles, in the mean
+    direction in which the feet point.
+
+    Args:
+        figure: a person, see `body_angles`.
+        origin: (nq,) posture in which the load is taken.
+        destination: (nq,) posture in which it is put down.
+        floor: height of the floor, metres.
+        frequency: lifts a minute.
+        duration: of the lifting, hours.
+        coupling: see `Lift`.
+        load: kg; None for a lift of which only the limit is asked.
+
+    Raises:
+        InputError: no person, no posture, or a value out of range.
+    """
+    person = check_person(figure, "lift_between: figure")
+    floor = checks.number(floor, "lift_between: floor", -100.0, 100.0, "m")
+    found = [
+        _hands(person, checks.posture(q, person.model.nq, "lift_between: a posture")) for q in (origin, destination)
+    ]
+    travel = abs(found[1][1] - found[0][1])
+    first, second = (
+        Lift(h, max(v - floor, 0.0), travel, a, frequency, duration, coupling, load) for h, v, a in found
+    )  # fmt: skip
+    return first, second
+
+
+def _hands(figure: Figure, q: Array) -> tuple[float, float, float]:
+    """Horizontal distance, height and asymmetry of the hands."""
+    names = [f"{side}_{part}" for side in ("left", "right") for part in ("palm", "ankle")]
+    places = {name: figure.placement(q, name) for name in names}
+    hands = 0.5 * (places["left_palm"].translation + places["right_palm"].translation)
+    ankles = 0.5 * (places["left_ankle"].translation + places["right_ankle"].translation)
+    forward = sum(figure.placement(q, f"{side}_foot").rotation[:2, 0] for side in ("left", "right"))
+    away = (hands - ankles)[:2]
+    turned = abs(np.arctan2(forward[0] * away[1] - forward[1] * away[0], forward @ away))
+    return float(np.linalg.norm(away)), float(hands[2]), float(turned)
+
+
+def _frequency(asked: float, column: tuple[float, ...]) -> float:
+    """The frequency multiplier, interpolated between the frequencies of the table; 0 from where the table has 0."""
+    if asked > FREQUENCIES[-1]:
+        return 0.0
+    upper = next(k for k, frequency in enumerate(FREQUENCIES) if asked <= frequency)
+    if column[upper] == 0.0:
+        return 0.0
+    return float(np.interp(asked, FREQUENCIES, column))

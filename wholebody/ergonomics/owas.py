@@ -1,0 +1,135 @@
+"""OWAS, Ovako working posture analysing system: O. Karhu, P. Kansi, I. Kuorinka, Applied Ergonomics 8(4), 1977.
+
+The action categories are those of Karhu, Härkönen, Sorvali and Vepsäläinen, Applied Ergonomics 12(1), 1981, as
+handbooks tabulate them. The papers have pictures instead of angles; the constants say what is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+
+from wholebody import checks
+from wholebody.arrays import Array
+from wholebody.ergonomics.angles import BodyAngles, body_angles
+from wholebody.ergonomics.work import KNEELING, Work, both_feet, check_work
+from wholebody.figures.figure import Figure
+
+BENT = radians(20.0)  # of the trunk forward or backward
+TURNED = radians(20.0)  # of the trunk sideways or about its axis
+BENT_KNEE = radians(30.0)
+
+BACK = ("straight", "bent", "twisted", "bent and twisted")
+ARMS = ("both below the shoulders", "one at the shoulder or above", "both at the shoulders or above")
+LEGS = (
+    "sitting",
+    "standing on two straight legs",
+    "standing on one straight leg",
+    "standing on two bent knees",
+    "standing on one bent knee",
+    "kneeling",
+    "walking",
+)
+LOADS = ("less than 10 kg", "10 to 20 kg", "more than 20 kg")
+
+CATEGORIES = (
+    ("111111111222222111111", "111111111222222111111", "111111111223223111112"),
+    ("223223223333333222233", "223223233344344334234", "334223333344444444234"),
+    ("111111112333444111111", "223111112444444333111", "223111233444444444111"),
+    ("233223223444444444234", "334234334444444444234", "444234334444444444234"),
+)
+"""Action categories by back and arms; in a text by legs, and for each by load."""
+
+ACTIONS = (
+    "no harmful effect",
+    "some harm; correct it in the near future",
+    "distinct harm; correct it as soon as possible",
+    "extreme harm; correct it at once",
+)
+
+
+@dataclass(frozen=True)
+class Owas:
+    """An OWAS code.
+
+    Attributes:
+        back: 1 to 4.
+        arms: 1 to 3.
+        legs: 1 to 7.
+        load: 1 to 3.
+    """
+
+    back: int
+    arms: int
+    legs: int
+    load: int
+
+    def __post_init__(self) -> None:
+        """Check the ranges.
+
+        Raises:
+            InputError: a code out of its range.
+        """
+        for name, most in {"back": 4, "arms": 3, "legs": 7, "load": 3}.items():
+            checks.whole(getattr(self, name), f"Owas: {name}", 1, most)
+
+    @property
+    def code(self) -> str:
+        """The four digits."""
+        return f"{self.back}{self.arms}{self.legs}{self.load}"
+
+    @property
+    def category(self) -> int:
+        """The action category, 1 to 4."""
+        return int(CATEGORIES[self.back - 1][self.arms - 1][3 * (self.legs - 1) + self.load - 1])
+
+    @property
+    def action(self) -> str:
+        """What the category says."""
+        return ACTIONS[self.category - 1]
+
+    def __str__(self) -> str:
+        """The code in words."""
+        words = (BACK[self.back - 1], ARMS[self.arms - 1], LEGS[self.legs - 1], LOADS[self.load - 1])
+        return f"{self.code}: back {words[0]}, arms {words[1]}, {words[2]}, {words[3]}"
+
+
+def owas(figure: Figure, q: Array, work: Work | None = None) -> Owas:
+    """OWAS of a person's posture.
+
+    Args:
+        figure: a person, see `body_angles`.
+        q: (nq,) posture.
+        work: the load, and whether the person walks; none if left out.
+
+    Raises:
+        InputError: no person, no posture, or no work.
+    """
+    return owas_code(body_angles(figure, q), check_work(work, "owas: work"))
+
+
+def owas_code(angles: BodyAngles, work: Work) -> Owas:
+    """The code of a body's angles."""
+    bent = abs(angles.trunk_flexion) > BENT
+    twisted = max(abs(angles.trunk_twist), abs(angles.trunk_lateral)) > TURNED
+    return Owas(
+        back=1 + int(bent) + 2 * int(twisted),
+        arms=1 + int(angles.left.arm_raised) + int(angles.right.arm_raised),
+        legs=_legs(angles, work),
+        load=1 if work.load < 10.0 else 2 if work.load <= 20.0 else 3,
+    )
+
+
+def _legs(angles: BodyAngles, work: Work) -> int:
+    sides = (angles.left, angles.right)
+    if work.sits(angles):
+        return 1
+    if work.walking:
+        return 7
+    if any(side.knee_height <= KNEELING and side.knee_flexion > BENT_KNEE for side in sides):
+        return 6
+    if both_feet(angles):
+        return 4 if any(side.knee_flexion > BENT_KNEE for side in sides) else 2
+    lower = min(sides, key=lambda side: side.foot_height)
+    bearing = lower if abs(sides[0].foot_height - sides[1].foot_height) > 0.01 else sides[int(angles.left_share < 0.5)]
+    return 5 if bearing.knee_flexion > BENT_KNEE else 3

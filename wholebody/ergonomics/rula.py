@@ -1,0 +1,242 @@
+"""RULA, rapid upper limb assessment: L. McAtamney and E. N. Corlett, Applied Ergonomics 24(2), 1993, pages 91 to 99.
+
+The tables are those of the paper as the worksheets of A. Hedge (Cornell University) and ErgonomicsPlus print them.
+Where the paper has words instead of numbers ("twisted", "raised"), the constants say what is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+
+from wholebody import checks
+from wholebody.arrays import Array
+from wholebody.ergonomics.angles import SIDES, BodyAngles, SideAngles, body_angles
+from wholebody.ergonomics.work import Work, both_feet, check_work
+from wholebody.figures.figure import Figure
+
+TURNED = radians(10.0)
+"""From which a trunk or neck counts as twisted or bent sideways: EN 1005-4 (2005) calls up to 10 degrees "not clearly
+visible"."""
+NEUTRAL = radians(5.0)
+"""Up to which a wrist is neutral, a trunk upright, and a head not in extension."""
+ABDUCTED = radians(20.0)
+RAISED = 0.03  # m: of a shoulder
+OUTWARD = radians(30.0)  # of a forearm out of the sagittal plane: "out to the side of the body"
+DEVIATED = radians(10.0)  # of a wrist from its middle line
+END_OF_TWIST = radians(45.0)  # half of the forearm's usual range to either side: "at or near the end of range"
+
+TABLE_A = (
+    (((1, 2), (2, 2), (2, 3), (3, 3)), ((2, 2), (2, 2), (3, 3), (3, 3)), ((2, 3), (3, 3), (3, 3), (4, 4))),
+    (((2, 3), (3, 3), (3, 4), (4, 4)), ((3, 3), (3, 3), (3, 4), (4, 4)), ((3, 4), (4, 4), (4, 4), (5, 5))),
+    (((3, 3), (4, 4), (4, 4), (5, 5)), ((3, 4), (4, 4), (4, 4), (5, 5)), ((4, 4), (4, 4), (4, 5), (5, 5))),
+    (((4, 4), (4, 4), (4, 5), (5, 5)), ((4, 4), (4, 4), (4, 5), (5, 5)), ((4, 4), (4, 5), (5, 5), (6, 6))),
+    (((5, 5), (5, 5), (5, 6), (6, 7)), ((5, 6), (6, 6), (6, 7), (7, 7)), ((6, 6), (6, 7), (7, 7), (7, 8))),
+    (((7, 7), (7, 7), (7, 8), (8, 9)), ((8, 8), (8, 8), (8, 9), (9, 9)), ((9, 9), (9, 9), (9, 9), (9, 9))),
+)
+"""Of upper arm (1 to 6), lower arm (1 to 3), wrist (1 to 4) and wrist twist (1 to 2)."""
+
+TABLE_B = (
+    ((1, 3), (2, 3), (3, 4), (5, 5), (6, 6), (7, 7)),
+    ((2, 3), (2, 3), (4, 5), (5, 5), (6, 7), (7, 7)),
+    ((3, 3), (3, 4), (4, 5), (5, 6), (6, 7), (7, 7)),
+    ((5, 5), (5, 6), (6, 7), (7, 7), (7, 7), (8, 8)),
+    ((7, 7), (7, 7), (7, 8), (8, 8), (8, 8), (8, 8)),
+    ((8, 8), (8, 8), (8, 8), (8, 9), (9, 9), (9, 9)),
+)
+"""Of neck (1 to 6), trunk (1 to 6) and legs (1 to 2)."""
+
+TABLE_C = (
+    (1, 2, 3, 3, 4, 5, 5),
+    (2, 2, 3, 4, 4, 5, 5),
+    (3, 3, 3, 4, 4, 5, 6),
+    (3, 3, 3, 4, 5, 6, 6),
+    (4, 4, 4, 5, 6, 7, 7),
+    (4, 4, 5, 6, 6, 7, 7),
+    (5, 5, 6, 6, 7, 7, 7),
+    (5, 5, 6, 7, 7, 7, 7),
+)
+"""Of score C (arm and wrist, 1 to 8 and more) and score D (neck, trunk and legs, 1 to 7 and more)."""
+
+ACTIONS = (
+    (2, "acceptable"),
+    (4, "investigate further; changes may be needed"),
+    (6, "investigate and change soon"),
+    (7, "investigate and change at once"),
+)
+"""Greatest score of each action level, and what the paper says of it."""
+
+
+@dataclass(frozen=True)
+class RulaParts:
+    """Scores of the parts of the body, which the tables combine.
+
+    Attributes:
+        upper_arm: 1 to 6.
+        lower_arm: 1 to 3.
+        wrist: 1 to 4.
+        wrist_twist: 1 or 2.
+        neck: 1 to 6.
+        trunk: 1 to 6.
+        legs: 1 or 2.
+        muscle: 0 or 1, of static or repeated use.
+        force: 0 to 3.
+    """
+
+    upper_arm: int
+    lower_arm: int
+    wrist: int
+    wrist_twist: int
+    neck: int
+    trunk: int
+    legs: int
+    muscle: int = 0
+    force: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the ranges.
+
+        Raises:
+            InputError: a score out of its range.
+        """
+        limits = {"upper_arm": 6, "lower_arm": 3, "wrist": 4, "wrist_twist": 2, "neck": 6, "trunk": 6, "legs": 2}
+        for name, most in limits.items():
+            checks.whole(getattr(self, name), f"RulaParts: {name}", 1, most)
+        checks.whole(self.muscle, "RulaParts: muscle", 0, 1)
+        checks.whole(self.force, "RulaParts: force", 0, 3)
+
+    @property
+    def arm(self) -> int:
+        """Posture score A, of table A."""
+        return TABLE_A[self.upper_arm - 1][self.lower_arm - 1][self.wrist - 1][self.wrist_twist - 1]
+
+    @property
+    def body(self) -> int:
+        """Posture score B, of table B."""
+        return TABLE_B[self.neck - 1][self.trunk - 1][self.legs - 1]
+
+    @property
+    def score(self) -> int:
+        """The grand score, 1 to 7, of table C."""
+        more = self.muscle + self.force
+        return TABLE_C[min(self.arm + more, 8) - 1][min(self.body + more, 7) - 1]
+
+    @property
+    def action(self) -> str:
+        """What the paper says of the score."""
+        return next(words for most, words in ACTIONS if self.score <= most)
+
+
+@dataclass(frozen=True)
+class Rula:
+    """RULA of both sides.
+
+    Attributes:
+        left, right: the parts of each side.
+    """
+
+    left: RulaParts
+    right: RulaParts
+
+    @property
+    def worse(self) -> str:
+        """The side with the greater score; "right" where they are equal."""
+        return "left" if self.left.score > self.right.score else "right"
+
+    @property
+    def score(self) -> int:
+        """The greater score of both sides."""
+        return max(self.left.score, self.right.score)
+
+    @property
+    def action(self) -> str:
+        """What the paper says of the greater score."""
+        return getattr(self, self.worse).action  # type: ignore[no-any-return]
+
+
+def rula(figure: Figure, q: Array, work: Work | None = None) -> Rula:
+    """RULA of a person's posture.
+
+    Args:
+        figure: a person, see `body_angles`.
+        q: (nq,) posture.
+        work: load and repetition; none if left out.
+
+    Raises:
+        InputError: no person, no posture, or no work.
+    """
+    angles, asked = body_angles(figure, q), check_work(work, "rula: work")
+    return Rula(*(rula_parts(angles, side, asked) for side in SIDES))
+
+
+def rula_parts(angles: BodyAngles, side: str, work: Work) -> RulaParts:
+    """Scores of the parts of one side."""
+    arm = angles.side(side)
+    return RulaParts(
+        upper_arm=_upper_arm(arm, work),
+        lower_arm=lower_arm(arm) + int(arm.across or arm.forearm_outward > OUTWARD),
+        wrist=_wrist(arm),
+        wrist_twist=1 + int(abs(arm.forearm_twist) > END_OF_TWIST),
+        neck=_neck(angles),
+        trunk=_trunk(angles),
+        legs=_legs(angles, work),
+        muscle=int(work.static or work.repeated),
+        force=_force(work),
+    )
+
+
+def position(arm: SideAngles) -> int:
+    """Score of the upper arm's flexion, 1 to 4; of RULA and REBA."""
+    flexion = arm.shoulder_flexion
+    if flexion > radians(90.0):
+        return 4
+    if flexion > radians(45.0):
+        return 3
+    return 2 if abs(flexion) > radians(20.0) else 1
+
+
+def lower_arm(arm: SideAngles) -> int:
+    """Score of the elbow's flexion, 1 or 2; of RULA and REBA."""
+    return 1 if radians(60.0) <= arm.elbow_flexion <= radians(100.0) else 2
+
+
+def turned(*angles: float) -> int:
+    """How many of some angles, to one or the other side, count as turned."""
+    return sum(abs(angle) > TURNED for angle in angles)
+
+
+def _upper_arm(arm: SideAngles, work: Work) -> int:
+    score = position(arm) + int(arm.shoulder_rise > RAISED) + int(abs(arm.shoulder_abduction) > ABDUCTED)
+    return max(score - int(work.arms_supported), 1)
+
+
+def _wrist(arm: SideAngles) -> int:
+    bent = abs(arm.wrist_flexion)
+    score = 1 if bent <= NEUTRAL else 2 if bent <= radians(15.0) else 3
+    return score + int(abs(arm.wrist_deviation) > DEVIATED)
+
+
+def _neck(angles: BodyAngles) -> int:
+    bent = angles.neck_flexion
+    score = 4 if bent < -NEUTRAL else 1 if bent <= radians(10.0) else 2 if bent <= radians(20.0) else 3
+    return score + turned(angles.neck_twist, angles.neck_lateral)
+
+
+def _trunk(angles: BodyAngles) -> int:
+    bent = abs(angles.trunk_flexion)
+    score = 1 if bent <= NEUTRAL else 2 if bent <= radians(20.0) else 3 if bent <= radians(60.0) else 4
+    return score + turned(angles.trunk_twist, angles.trunk_lateral)
+
+
+def _legs(angles: BodyAngles, work: Work) -> int:
+    balanced = work.sits(angles) or both_feet(angles)
+    return 1 if work.legs_supported and balanced else 2
+
+
+def _force(work: Work) -> int:
+    """Loads of less than 2 kg: 0; of 2 to 10 kg: 1, static or repeated 2; of more: 2, static or repeated 3; shock 3."""
+    if work.shock:
+        return 3
+    if work.load < 2.0:
+        return 0
+    return (1 if work.load <= 10.0 else 2) + int(work.static or work.repeated)

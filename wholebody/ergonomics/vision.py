@@ -1,0 +1,143 @@
+"""What a person sees: cones about the line of sight, and whether something is in between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi, radians
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wholebody import checks
+from wholebody.arrays import Array
+from wholebody.errors import InputError
+from wholebody.scene import Scene
+
+EYES = "gaze"
+"""Frame between the eyes; its x axis points ahead."""
+
+OWN = ("head", "neck")
+"""Segments that do not hide anything from their own eyes."""
+
+RAY = 1e-3  # m: radius of a line of sight
+NEAR = 0.02  # m: at both ends of a line of sight that is not looked at: the thing that is seen hides nothing
+BLURRED = 0.05  # m: nearer points are not seen
+
+
+@dataclass(frozen=True)
+class FieldOfView:
+    """An elliptical cone about the normal line of sight.
+
+    Attributes:
+        horizontal: to either side, radians.
+        up: above the normal line of sight, radians.
+        down: below it, radians.
+        declination: of the normal line of sight below the head's own axis ahead, radians.
+
+    Raises:
+        InputError: a value out of range.
+    """
+
+    horizontal: float = radians(35.0)
+    up: float = radians(40.0)
+    down: float = radians(20.0)
+    declination: float = radians(15.0)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        for name in ("horizontal", "up", "down"):
+            checks.number(getattr(self, name), f"FieldOfView: {name}", 1e-3, pi, "rad")
+        checks.number(self.declination, "FieldOfView: declination", -pi / 2, pi / 2, "rad")
+
+    def off(self, direction: Array) -> float:
+        """How far a direction (3,) in the eyes' axes is off the line of sight: 1 at the border of the cone.
+
+        Raises:
+            InputError: it is no direction.
+        """
+        sine, cosine = np.sin(self.declination), np.cos(self.declination)
+        x, y, z = checks.numbers(direction, (3,), "off: direction").tolist()
+        ahead, above = cosine * x - sine * z, sine * x + cosine * z
+        side, height = np.arctan2(y, ahead), np.arctan2(above, np.hypot(ahead, y))
+        return float(np.hypot(side / self.horizontal, height / (self.up if height > 0.0 else self.down)))
+
+
+COMFORTABLE = FieldOfView(radians(15.0), radians(15.0), radians(15.0))
+"""Easy eye movement: 15 degrees to each side, up and down (MIL-STD-1472G, figure of the visual field: optimum eye
+rotation about the normal line of sight, which is 15 degrees below the horizontal)."""
+
+LARGEST = FieldOfView()
+"""Largest eye movement: 35 degrees to each side, 40 up, 20 down (same source, maximum eye rotation)."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What is known of seeing a point.
+
+    Attributes:
+        off: of the line of sight in shares of the largest eye movement; up to 1 the eyes reach it.
+        comfortable: whether easy eye movement reaches it.
+        distance: from the eyes, metres.
+        hidden_by: name of the thing or segment that is in between; "" for none.
+    """
+
+    off: float
+    comfortable: bool
+    distance: float
+    hidden_by: str
+
+    @property
+    def seen(self) -> bool:
+        """Whether the point is seen without turning the head."""
+        return self.off <= 1.0 and not self.hidden_by and self.distance >= BLURRED
+
+
+def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST) -> Sight:
+    """Whether a person in a posture sees a point, without turning the head.
+
+    Args:
+        scene: with a figure that has the frame "gaze".
+        q: (nq,) posture.
+        point: (3,) metres.
+        field: how far the eyes turn.
+
+    Raises:
+        InputError: a value of the wrong kind, or a figure without eyes.
+    """
+    checks.instance(scene, Scene, "sight: scene", "make one with wb.Scene(figure)")
+    q = checks.posture(q, scene.model.nq, "sight: q")
+    target = checks.numbers(point, (3,), "sight: point")
+    checks.instance(field, FieldOfView, "sight: field", "give one such as FieldOfView()")
+    if EYES not in scene.figure.frames:
+        raise InputError(f"sight: {scene.figure.name} has no frame {EYES!r} between its eyes; load a person")
+    eyes = scene.figure.placement(q, EYES)
+    local = eyes.actInv(target)
+    distance = float(np.linalg.norm(local))
+    if distance < BLURRED:
+        return Sight(0.0, False, distance, "")
+    hidden = _between(scene, q, np.asarray(eyes.translation), target, distance)
+    return Sight(field.off(local), COMFORTABLE.off(local) <= 1.0, distance, hidden)
+
+
+def _between(scene: Scene, q: Array, eyes: Array, target: Array, distance: float) -> str:
+    """The piece that a thin capsule from the eyes to the point meets first, by its owner; "" for none."""
+    length = distance - 2.0 * NEAR
+    if length <= 0.0:
+        return ""
+    data = scene.model.createData()
+    placed = pin.GeometryData(scene.geometry)
+    pin.updateGeometryPlacements(scene.model, data, scene.geometry, placed, q)
+    turn = pin.Quaternion.FromTwoVectors(np.array((0.0, 0.0, 1.0)), (target - eyes) / distance)
+    ray, at = coal.Capsule(RAY, length), coal.Transform3s(turn.matrix(), 0.5 * (eyes + target))
+    found, nearest = "", np.inf
+    for piece, owner, place in zip(scene.geometry.geometryObjects, scene.piece_owner, placed.oMg, strict=True):
+        if owner in OWN:
+            continue
+        request, result = coal.CollisionRequest(), coal.CollisionResult()
+        there = coal.Transform3s(place.rotation, place.translation)
+        if coal.collide(piece.geometry, there, ray, at, request, result):
+            away = float(np.linalg.norm(np.asarray(place.translation) - eyes))
+            if away < nearest:
+                found, nearest = owner, away
+    return found
