@@ -43,7 +43,7 @@ def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> Non
 def run(arguments: argparse.Namespace) -> int:
     """Judge and print; 1 if the posture violates something."""
     from wholebody.assessment import assess
-    from wholebody.cli import result
+    from wholebody.taskfile import result
 
     task, q = result.read(arguments.result)
     judged = assess(task.problem, q)

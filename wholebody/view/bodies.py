@@ -185,11 +185,14 @@ class Bodies:
         return tops
 
     def dye(self, keyframe: Keyframe, colors: Mapping[str, Color]) -> None:
-        """Give the pieces of segments their colours (segment -> colour)."""
+        """Give the pieces and the surface of segments their colours (segment -> colour)."""
         for index, body in enumerate(self.all):
             owner = self.scene.piece_owner[index] if body.thing is None and colors else ""
             if owner in colors and body.path in keyframe.colors:
                 keyframe.colors[body.path] = colors[owner]
+        for patch in self._patches:
+            if patch.segment in colors:
+                keyframe.colors[patch.path] = colors[patch.segment]
 
     def _box(self, index: int, data: Any) -> Array:
         """Corners (8, 3) in the world of the box around a piece."""
