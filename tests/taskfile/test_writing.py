@@ -66,7 +66,7 @@ def test_a_problem_of_a_script_goes_round(tmp_path: Path, root: Path) -> None:
 def test_a_scene_alone_and_a_result(tmp_path: Path) -> None:
     scene = wb.Scene(wb.load("human", sex="female", stature=1.6)).add(wb.HalfSpace(), name="floor")
     task = wb.read_task(wb.write_task(scene, tmp_path / "scene.toml"))
-    assert (task.problem.goals, task.problem.constraints) == ((), ())
+    assert (task.problem.goals, task.problem.constraints) == ((), task.problem.defaults)
     solution = wb.solve(task.problem)
     result = wb.read_result(wb.write_result(task, solution, tmp_path / "result.json"))
     np.testing.assert_array_equal(result.q, solution.q)

@@ -60,7 +60,7 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
     for thing in scene.objects.values():
         parts.append(_table("[[object]]" if thing.segment is None else "[[attach]]", _thing(thing, target, beside)))
     parts += [_table("[[goal]]", _term(term, GOALS, "goals", n)) for n, term in enumerate(problem.goals)]
-    held = (*problem.constraints, *problem.bounds)
+    held = (*problem.stated, *problem.bounds)
     parts += [_table("[[constraint]]", _term(term, CONSTRAINTS, "constraints", n)) for n, term in enumerate(held)]
     if problem.measures_given:
         parts += [

@@ -86,7 +86,7 @@ class LiveDrag:
             if thing.segment is None and not isinstance(thing.shape, HalfSpace)
         )
         self._fixed: tuple[Any, ...] = tuple(
-            term for term in (*problem.constraints, *problem.bounds) if not _releasable(term, self.handles)
+            term for term in (*problem.stated, *problem.bounds) if not _releasable(term, self.handles)
         )
         self.held = {_handle_of(term, self.handles) for term in problem.constraints if _releasable(term, self.handles)}
         self.method: Method = method_for_motions(method)
