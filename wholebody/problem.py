@@ -74,7 +74,7 @@ class Problem:
             measures: costs to minimise; None for `Effort()`, and `Rhythm()` beside it for a person.
             clearance: least distance between pieces, metres.
             touching: pairs of segment or object names whose clearance is zero; those of contact terms are added.
-            range_of_motion: whether a person keeps its ranges of motion and reach cones.
+            range_of_motion: whether a person keeps its ranges of motion and reach cones, and moves in its `Rhythm`.
             balance: whether the centre of mass stays above the feet; None if the figure is a person who stands.
 
         Raises:
@@ -88,10 +88,11 @@ class Problem:
         terms = [*_checked(goals, (Goal,), "goals")]
         given = [*_checked(constraints, (Constraint, Bound), "constraints")]
         self.measures_given = measures is not None
-        measured = default_measures(scene) if measures is None else _checked(measures, (Measure,), "measures")
+        moving = checks.flag(range_of_motion, "range_of_motion")
+        usual = default_measures(scene, ranges=moving)
+        measured = usual if measures is None else _checked(measures, (Measure,), "measures")
         self.goals: tuple[Goal, ...] = tuple(goal.resolve(scene, self.start) for goal in terms)
         stated = tuple(term.resolve(scene, self.start) for term in given if isinstance(term, Constraint))
-        checks.flag(range_of_motion, "range_of_motion")
         if balance is not None:
             checks.flag(balance, "balance")
         self.bounds: tuple[Bound, ...] = tuple(

@@ -28,7 +28,7 @@ TOP = (
         kinds.Several(kinds.Several(kinds.Text(), 2), example='[["right_hand", "table"]]'),
         "pairs of segments or objects whose clearance is 0",
     ),
-    Key("range_of_motion", kinds.Flag(), "whether a person keeps ranges of motion and reach cones; true if left out"),
+    Key("range_of_motion", kinds.Flag(), "whether a person keeps ranges of motion, cones and rhythm; true if left out"),
     Key("balance", kinds.Flag(), "whether the centre of mass stays above the feet; if left out, where a person stands"),
 )
 

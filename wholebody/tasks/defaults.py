@@ -25,13 +25,14 @@ AS_AT_START = 1e-3
 """m, rad: a foot held this near to its place at the start stands where the support polygon is computed."""
 
 
-def default_measures(scene: Surroundings) -> list[Measure]:
+def default_measures(scene: Surroundings, *, ranges: bool) -> list[Measure]:
     """`Effort`, and for a person `Rhythm` beside it.
 
     Args:
         scene: with the figure.
+        ranges: whether a person moves as people do; without it `Effort` is alone.
     """
-    person = bool(scene.figure.ranges) and bool(girdles_of(scene.figure))
+    person = ranges and bool(scene.figure.ranges) and bool(girdles_of(scene.figure))
     return [Effort(), Rhythm()] if person else [Effort()]
 
 
