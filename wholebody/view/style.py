@@ -30,7 +30,7 @@ SEE_THROUGH = 0.22
 TINT = 0.45
 """Share of the colour of state in the colour of a thing (not of the figure), which stays recognisable."""
 
-PAINT = 0.75
+PAINT = 0.45
 """Share of the colour of state in the colour of a body's surface, so that clothes stay recognisable."""
 
 NORMAL = (0.13, 0.36, 0.60)
