@@ -13,7 +13,7 @@ def build() -> wb.Problem:
     """State the problem; tasks/take_a_seat.toml states the same."""
     scene = wb.Scene(wb.load("human", sex="female", stature=1.65))
     scene.add(wb.HalfSpace(), name="floor")
-    scene.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.0, 0.38), color=OAK)
+    scene.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.0, 0.36), color=OAK)
     scene.add(wb.Box((0.03, 0.48, 0.36)), name="backrest", at=(-0.56, 0.0, 0.80), color=OAK)
     return wb.Problem(
         scene,

@@ -160,7 +160,7 @@ def test_objects_cannot_be_changed_behind_the_scenes_back(scene):
         scene.excluded_pairs["a", "b"] = "because"
 
 
-@pytest.mark.parametrize("wrong", ["red", (1, 0), (1, 0, 0, 0, 0), (2, 0, 0), (np.nan, 0, 0), 3, object(), {}])
+@pytest.mark.parametrize("wrong", ["no color", (1, 0), (1, 0, 0, 0, 0), (2, 0, 0), (np.nan, 0, 0), 3, object(), {}])
 def test_colors_are_checked_when_they_are_given(scene, wrong):
     with pytest.raises(wb.InputError, match=r"'ball': color is .*each from 0 to 1"):
         scene.add(wb.Sphere(0.1), name="ball", color=wrong)

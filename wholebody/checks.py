@@ -101,7 +101,7 @@ def slipped(value: float, low: float, high: float) -> str:
     fits = [
         f"{value * factor:.6g} if it is in {unit}"
         for factor, unit in ((1e-3, "millimetres"), (1e-2, "centimetres"))
-        if low <= value * factor <= high and abs(value) < FAR
+        if abs(value) < FAR and low <= value * factor <= high  # a large int times a float overflows
     ]
     return f"; write {' or '.join(fits)}" if fits else ""
 

@@ -55,7 +55,7 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str]) ->
     assert "assets/bench/step-times.svg" in page
     assert (docs / "assets" / "bench" / "step-times.svg").read_text().startswith("<?xml")
     assert (tmp_path / "out" / "step-distances.png").read_bytes().startswith(b"\x89PNG")
-    assert "994 pairs" in capsys.readouterr().out
+    assert "1342 pairs" in capsys.readouterr().out
 
 
 def test_reaches(tmp_path: Path, docs: Path) -> None:

@@ -317,4 +317,4 @@ def test_pairs_that_cannot_have_come_near_are_not_asked_and_none_is_missed(step)
         found_any += len(found.distance)
     assert found_any > 50
     if step == 3e-4:
-        assert np.mean(asked[1:4]) < 0.8 * asked[0]  # what is far away was not asked again
+        assert np.mean(asked[1:4]) < 0.95 * asked[0]  # what is far away was not asked again

@@ -41,7 +41,7 @@ def test_a_held_foot_inside_a_thing(standing):
 
 def test_a_frozen_arm_inside_a_thing(standing):
     arm = ("right_arm", "spine", "root")
-    problem = standing((wb.Sphere(0.1), (0.0, -0.2, 1.1)), constraints=[wb.Freeze(*arm)])
+    problem = standing((wb.Sphere(0.1), (0.0, -0.22, 1.12)), constraints=[wb.Freeze(*arm)])
     assert [entry.status for entry in found(problem)] == ["infeasible"]
     free = standing(constraints=[wb.Freeze("right_arm", "root")])  # the trunk can still take the arm away
     assert found(free) == ()

@@ -182,7 +182,7 @@ def arm_into_trunk(human: Figure, frames: int = 60) -> wb.Clip:
     """The right forearm sinks into the trunk, 10 cm deep, and comes out again."""
     q0 = human.posture("standing")
     wave = np.sin(np.pi * np.arange(frames) / (frames - 1)) ** 2
-    turned = {"right_elbow_flexion": 1.2, "right_shoulder_rotation": 0.9, "right_shoulder_abduction": -0.1}
+    turned = {"right_elbow_flexion": 1.5, "right_shoulder_rotation": 0.9, "right_shoulder_abduction": -0.1}
     values = human.joint_values(q0)
     q = [
         human.clamp(human.with_joints(q0, {name: (1 - one) * values[name] + one * end for name, end in turned.items()}))

@@ -115,7 +115,7 @@ def test_what_passes_through_a_dragged_person_is_named(method: str, kind: str) -
         target, before = np.array(drag.problem.goals[0].target), drag.q
         for frame in range(throw.frames):
             way = throw.next()
-            if (frame + 1) * DT * speed < 0.3:
+            if (frame + 1) * DT * speed < 0.1:
                 continue  # nothing is near yet
             answer = drag.to(target + (0.0, 0.0, 0.002 * frame))
             began, ends = (throw.deepest(((s, q), (s, q)), way, 1) for s, q in ((0.0, before), (1.0, answer.q)))

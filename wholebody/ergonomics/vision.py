@@ -13,6 +13,7 @@ from wholebody import checks
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.scene import Scene
+from wholebody.tasks import inputs
 
 EYES = "gaze"
 """Frame between the eyes; its x axis points ahead."""
@@ -107,7 +108,7 @@ def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST) ->
     """
     checks.instance(scene, Scene, "sight: scene", "make one with wb.Scene(figure)")
     q = checks.posture(q, scene.model.nq, "sight: q")
-    target = checks.numbers(point, (3,), "sight: point")
+    target = inputs.point(point, "sight: point")
     checks.instance(field, FieldOfView, "sight: field", "give one such as FieldOfView()")
     if EYES not in scene.figure.frames:
         raise InputError(f"sight: {scene.figure.name} has no frame {EYES!r} between its eyes; load a person")

@@ -29,7 +29,7 @@ POUCH = (0.05, 0.17, 0.20)  # m: depth, width, height of a double magazine pouch
 PLATE = (0.025, 0.24, 0.32)  # m: a medium plate of body armour (24 x 32 cm)
 PACK = (0.20, 0.32, 0.50)  # m: depth, width, height of a day pack of 30 litres
 RING = (0.13, 0.03)  # m: radii of the torus and of its tube; the hole is wide enough for a forearm
-SIDE, WAIST, BELT = -0.05, -0.11, -0.16  # m: heights above the origin of the lower thorax
+SIDE, WAIST, BELT = -0.05, -0.11, -0.15  # m: heights above the origin of the lower thorax
 SECTIONS, ROUND = 16, 12  # convex sections of the torus, and corners of each
 SLIT = 1e-4  # rad: between two sections, so that they stay separate parts, each convex
 

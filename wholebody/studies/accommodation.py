@@ -15,11 +15,11 @@ from wholebody.ergonomics.vision import sight
 from wholebody.errors import InputError
 from wholebody.figures.anthropometry import STATURE_RANGE, table
 from wholebody.methods.base import Method
-from wholebody.problem import Problem
 from wholebody.studies.many import SolveProgress
 from wholebody.studies.records import Records
 from wholebody.studies.study import TaskFunction, Variant, study
 from wholebody.studies.task_files import TaskFile
+from wholebody.tasks import inputs
 
 SEXES = {"male": "M", "female": "F"}
 MOST_PEOPLE = 10_000
@@ -111,7 +111,7 @@ def accommodation(
         InputError: a value of the wrong kind or range.
         FileFormatError: the task file cannot be read.
     """
-    point = None if sees is None else checks.numbers(sees, (3,), "accommodation: sees")
+    point = None if sees is None else inputs.point(sees, "accommodation: sees")
     population = people(count, sexes)
     records = study(task, people=population, method=method, jobs=jobs, folder=folder, progress=progress)
     reaches = tuple(one.q is not None and max(one.goal_error, one.goal_angle) <= REACHED for one in records)
@@ -122,13 +122,13 @@ def accommodation(
     seen = None
     if point is not None:
         make = TaskFile(checks.path(task, "task")) if isinstance(task, (str, os.PathLike)) else task
-        problems = (Variant(make, person, None, None)() for person in population.values())
-        seen = tuple(_seen(problem, one.q, point) for problem, one in zip(problems, records, strict=True))
+        variants = [Variant(make, person, None, None) for person in population.values()]
+        seen = tuple(_seen(variant, one.q, point) for variant, one in zip(variants, records, strict=True))
     return Accommodation(records, reaches, fits, seen)
 
 
-def _seen(problem: Problem, q: Any, point: Any) -> bool:
-    return q is not None and sight(problem.scene, q, point).seen
+def _seen(variant: Variant, q: Any, point: Any) -> bool:
+    return q is not None and sight(variant().scene, q, point).seen  # a problem that failed is not made again
 
 
 def _statures(sex: str) -> tuple[float, float]:

@@ -23,7 +23,7 @@ from wholebody.studies.reach_bounds import beyond, lacking, reach_balls
 from wholebody.studies.reach_result import ReachMap
 from wholebody.studies.reach_search import SURE, Asked, Brick, Try, covered, search_brick
 from wholebody.studies.reach_verdicts import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED
-from wholebody.tasks.inputs import find_place
+from wholebody.tasks import inputs
 
 MOST_PLACES = 1_000_000
 ROUNDS = 12  # most rounds in which bricks hand postures on to their neighbours
@@ -89,8 +89,8 @@ def reach_map(
     """
     what = "reach_map"
     check_problem(problem, f"{what}: problem").check_fresh()
-    find_place(problem.scene, frame, what)
-    point = checks.numbers(offset, (3,), f"{what}: offset")
+    inputs.find_place(problem.scene, frame, what)
+    point = inputs.point(offset, f"{what}: offset")
     grid = _grid(low, high, step)
     whole, quick = _methods(method)
     jobs = checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS)
@@ -283,9 +283,10 @@ def _grid(low: Any, high: Any, step: Any) -> _Grid:
         raise InputError(
             f"{what}: low is {least.tolist()} and high {most.tolist()}; give the least corner first, metres"
         )
-    steps = np.full(3, checks.number(step, f"{what}: step", 1e-4, FARTHEST, "m")) if np.ndim(step) == 0 else (
-        checks.numbers(step, (3,), f"{what}: step")
-    )  # fmt: skip
+    if checks.array(step, f"{what}: step", "metres, one number or three").ndim == 0:
+        steps = np.full(3, checks.number(step, f"{what}: step", 1e-4, FARTHEST, "m"))
+    else:
+        steps = checks.numbers(step, (3,), f"{what}: step")
     if (steps < 1e-4).any():
         raise InputError(f"{what}: step is {steps.tolist()}; give 0.0001 m or more")
     counts = np.floor((most - least) / steps + 1e-9) + 1

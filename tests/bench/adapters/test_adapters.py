@@ -67,6 +67,8 @@ def table() -> wb.Problem:
         goals=[wb.Point("right_hand", (0.35, -0.2, 0.9), offset=(0.0, 0.0, -0.05))],
         constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")],
         clearance=0.003,
+        range_of_motion=False,  # tools cannot be told of what a person keeps
+        balance=False,
     )
 
 

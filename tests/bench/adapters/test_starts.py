@@ -25,6 +25,8 @@ def shelf() -> wb.Problem:
         goals=[wb.Point("right_index_tip", (0.4, -0.1, 1.2))],
         constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")],
         clearance=0.003,
+        range_of_motion=False,
+        balance=False,
     )
 
 

@@ -28,7 +28,7 @@ def test_two_methods_on_one_problem(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert facts["cases beside each other"] == "1 on this machine"
     assert {row.method for row in rows} == {"qp/daqp", "dls"}
     assert "Robot arm" in (tmp_path / "report.html").read_text()
-    with pytest.raises(InputError, match="holds a run with seed = 0, and 3 is asked for"):
+    with pytest.raises(InputError, match=r"holds a run with seeds = \[0, 1, 2\], and \[3, 4, 5\] is asked for"):
         bench(*words, "--seed", "3")
 
 

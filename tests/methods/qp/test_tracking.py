@@ -50,7 +50,8 @@ def test_other_goals_are_followed_as_by_a_new_tracker(scene: wb.Scene, change: s
         problem.retarget(goals)
         step = tracker.step(q)
         assert step.displacement == pytest.approx(fresh(problem, q), abs=1e-6)
-    for foot in problem.constraints:
+    assert len(problem.stated) == 2
+    for foot in problem.stated:
         assert np.abs(foot.value(scene.state(step.q))).max() < 1e-3
 
 

@@ -172,6 +172,7 @@ def test_the_second_hand_keeps_its_place_on_the_weapon_in_every_frame(person: Fi
     held = wb.Problem(
         wb.Scene(person),
         goals=[wb.Point("right_palm", (0.25, -0.12, 1.1)), wb.Point("left_palm", (0.42, 0.06, 1.12))],
+        constraints=[wb.Freeze("root", "lower_body", "spine")],
     )
     base = wb.solve(held).q
     ways = 0.1 * np.sin(2 * np.pi * np.arange(24) / 24)

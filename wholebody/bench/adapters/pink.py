@@ -60,7 +60,7 @@ class PinkLoop(Loop):
 
     name = "pink"
     safe: ClassVar[float] = 0.0  # gain of the barrier's cost of leaving a safe displacement, which here is no motion
-    longest = 0.025  # twice that leaves pink no solution more often
+    longest = 0.0125  # twice that leaves pink no solution more often
     margin = 3.5e-4
 
     def build(self, problem: Problem) -> Stepper:
