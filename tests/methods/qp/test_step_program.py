@@ -14,6 +14,7 @@ from wholebody.figures.state import State
 from wholebody.linearisation import Linearisation, Passing
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.step_program import (
+    AGAIN,
     DAMPING,
     LITTLE,
     RADIUS,
@@ -63,7 +64,7 @@ class Plain:
             if not np.abs(shift[:goals]).max(initial=0.0) < RESTING:
                 shift[:goals] = 0.0
             damping = DAMPING * min(1.0, self.before[2] / error)
-        for _ in range(2):
+        for _ in range(1 + AGAIN):
             program = self.subproblem.program(
                 at, rows, RADIUS, ERROR_CLAMP * RADIUS, damping, shift, True, DT / SETTLING if goals else 1.0
             )

@@ -36,8 +36,9 @@ RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before veloc
 DAMPING = 1.0  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at obstacles
 SETTLING = 0.5  # s: measures lessen by 1/e in it: longer = slower to settle, shorter = joints swing about the optimum
 RESTING = 1e-5  # m, rad: a goal missed by less than this, and more than foreseen, rests; less left of one is reached
-LITTLE = 0.1  # damping that makes no difference to how a step looks
+LITTLE = 0.01  # damping that makes no difference to how a step looks
 WORSE = 2.0  # times the damping of a program that its answer may ask for before it is solved again with that
+AGAIN = 2  # times that a program is solved again at most; with 1 a goal that is just blocked makes limbs jump
 
 
 class Answer(NamedTuple):
@@ -113,8 +114,10 @@ class StepProgram:
             measures: whether the measures count; without them the nearest posture to the goals is sought.
         """
         answer, damping, asked = self._once(at, measures, 0.0)
-        if asked > WORSE * max(damping, LITTLE):
-            answer, _, _ = self._once(at, measures, asked)
+        for _ in range(AGAIN):
+            if asked <= WORSE * max(damping, LITTLE):
+                break
+            answer, damping, asked = self._once(at, measures, asked)
         return answer
 
     def ended(self, q: Array, displacement: Array, whole: bool) -> None:
