@@ -15,6 +15,7 @@ from wholebody.methods.newton.angles import Angle
 from wholebody.methods.newton.batches import Batch, Coincide, Slide, Turn, Unit
 from wholebody.methods.newton.directions import Cone, Toward
 from wholebody.methods.newton.mass_center import MassCenter
+from wholebody.methods.newton.root_motion import RootMotion
 
 K, N, H = 5, 6, 1e-6
 
@@ -73,8 +74,15 @@ MAKERS: dict[str, Callable[[np.random.Generator], Batch]] = {
         g.normal(size=(4, 3)),
         g.normal(size=4),
     ),
+    "root": lambda g: _root(g),
     "angle": lambda g: Angle(_pairs(g), NAMES, _forms(g)[:, 2:], np.zeros(K), np.zeros(K), np.sign(g.normal(size=K))),
 }
+
+
+def _root(g: np.random.Generator) -> RootMotion:
+    motion, turn = RootMotion(1, "the root"), g.normal(size=4)
+    motion.anchor(np.concatenate([g.normal(size=3), turn / np.linalg.norm(turn)]), g.normal(size=6))
+    return motion
 
 
 WITHOUT_CURVATURE = ("toward", "cone", "mass center")
@@ -120,3 +128,15 @@ def test_an_angle_is_the_angle_of_the_joint() -> None:
     identity = np.tile((0.0, 0.0, 0.0, 1.0), (K, 1))
     batch = Angle(pairs, NAMES, quat.relative_forms(identity, identity)[:, 2:], np.zeros(K), np.zeros(K), np.ones(K))
     assert batch.angle(x) == pytest.approx(wanted, abs=1e-12)
+
+
+def test_the_motion_of_a_root_is_pinocchios_to_first_order() -> None:
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
+    rng = np.random.default_rng(3)
+    q = pin.integrate(model, pin.neutral(model), rng.normal(size=6))
+    motion, step = RootMotion(0, "the root"), 1e-6 * rng.normal(size=6)
+    motion.anchor(q, np.zeros(6))
+    assert motion.residual(q[None])[0] == pytest.approx(np.zeros(6), abs=1e-15)
+    after = pin.integrate(model, q, step)
+    np.testing.assert_allclose(motion.residual(after[None])[0], step, atol=1e-11)

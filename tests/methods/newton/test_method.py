@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import itertools
 from collections.abc import Callable
 from typing import Any
@@ -27,8 +26,7 @@ def human() -> wb.Figure:
 
 def _standing(scene: wb.Scene, *goals: Any, **more: Any) -> wb.Problem:
     holds = [wb.Hold("left_foot"), wb.Hold("right_foot")]
-    # a measure without the root, which this method does not minimise
-    return wb.Problem(scene, "standing", goals=goals, constraints=holds, **{"measures": [wb.Displacement()], **more})
+    return wb.Problem(scene, "standing", goals=goals, constraints=holds, **more)
 
 
 def _honest(problem: wb.Problem, solution: wb.Solution, tolerance: float = 1e-5) -> None:
@@ -91,8 +89,6 @@ def test_things_in_the_way_are_not_entered(human: wb.Figure, least_distance: Cal
 
 
 def test_two_hands_on_one_box_close_a_loop(human: wb.Figure) -> None:
-    human = copy.deepcopy(human)
-    human.effort_weights[:6] = 0.0  # this method does not minimise the root's part
     scene = wb.Scene(human)
     q = human.posture("arms_forward")
     problem = wb.Problem(
@@ -212,3 +208,18 @@ def test_a_barrier_goes_where_slacks_go(human: wb.Figure) -> None:
     assert slack.solved
     assert barrier.solved
     assert slack.assessment.measure == pytest.approx(barrier.assessment.measure, rel=1e-4)
+
+
+@pytest.mark.parametrize("place", [(0.45, -0.3, 1.0), (0.55, 0.0, 0.75), (0.3, -0.4, 1.5)])
+def test_the_effort_of_the_root_is_minimised_too(human: wb.Figure, place: tuple[float, float, float]) -> None:
+    problem = _standing(
+        wb.Scene(human),
+        wb.Point("right_index_tip", place),
+        measures=[wb.Effort()],
+        range_of_motion=False,
+        balance=False,
+    )
+    assert (human.effort_weights[:6] > 0.0).all()
+    found = {method: wb.solve(problem, method=method).assessment for method in ("qp", "newton")}
+    assert found["newton"].goal_error < 1e-5
+    assert found["newton"].measure == pytest.approx(found["qp"].measure, rel=1e-4)

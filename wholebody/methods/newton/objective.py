@@ -2,8 +2,8 @@
 
 A measure f with gradient g and diagonal second derivative h at angles theta is, to second order, a sum of squares of
 angles from theta - g / h, with the factors h / 2. For `Effort` and `Displacement` that is exact. This applies to every
-measure of the revolute joints. A measure that depends on the root's position or on other joints is only reported, and
-the solution's message names it. Of `Effort` and `Rhythm` the part of a free root is not minimised.
+measure of the revolute joints, and of a free root that one of these measures counts. A measure that depends on
+other joints is only reported, and the solution's message names it.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from wholebody.arrays import Array, Indices
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.root_motion import RootMotion
 from wholebody.methods.newton.system import System
 from wholebody.problem import Problem
 from wholebody.tasks import Discomfort, Displacement, Effort, Rhythm
 from wholebody.tasks.base import Measure
 
-CAN = (Effort, Displacement, Discomfort, Rhythm)  # minimised over the revolute joints alone
+CAN = (Effort, Displacement, Discomfort, Rhythm)  # minimised over the revolute joints, and a root that they count
 SAMPLES = 3  # postures at which the dependence of a measure on joints is tested
 STIFFNESS = 10.0  # m^2 per unit of effort [rad^2]: weight of effort against motion; larger = nearer to least effort
 LEAST_STIFFNESS = 0.03  # rad^-2: half of the least second derivative of a joint
@@ -30,6 +31,7 @@ class Objective:
 
     Attributes:
         rows: the joints' angles, each relative to its minimiser.
+        root: the root's motion relative to its minimiser; None where it is fixed, or counts nothing.
         minimised: the measures that are minimised.
         reported: names of the others.
     """
@@ -43,7 +45,9 @@ class Objective:
             state: of the run; it is moved.
         """
         self._state, self._bodies = state, bodies
-        self.rows, self._tangent = bodies.distance(problem.start)
+        self.rows, tangent = bodies.distance(problem.start)
+        self.root = RootMotion(0, "the root") if bodies.floating and _counts_root(problem, state) else None
+        self._tangent = tangent if self.root is None else np.concatenate([tangent, np.arange(6)])
         self.minimised: list[Measure] = []
         self.reported: list[str] = []
         for term in problem.measures:
@@ -52,7 +56,7 @@ class Objective:
             else:
                 self.reported.append(type(term).__name__)
         self._follows = True
-        self.stiffness = np.full(len(self.rows), STIFFNESS * LEAST_STIFFNESS)
+        self.stiffness = np.full(len(self._tangent), STIFFNESS * LEAST_STIFFNESS)
 
     def value(self, x: Array) -> float:
         """The minimised measures at the bodies x (7 n,)."""
@@ -62,7 +66,7 @@ class Objective:
     def anchor(self, q: Array) -> None:
         """Use displacements from q (nq,), the last state of a drag, with the measures' second derivatives."""
         self._model_at(q)
-        self.rows.bound = self._bodies.angles_at(q)
+        self._aim(q, np.zeros(len(self._tangent)))
         self._follows = False
 
     def follow(self) -> None:
@@ -85,8 +89,23 @@ class Objective:
             gradient += term.weight * term.gradient(state)
             curvature += term.weight * term.curvature(state)
         half = np.maximum(0.5 * curvature[self._tangent], LEAST_STIFFNESS)
-        self.rows.bound = self._bodies.angles_at(q) - 0.5 * gradient[self._tangent] / half
+        self._aim(q, -0.5 * gradient[self._tangent] / half)
         self.stiffness = STIFFNESS * half
+
+    def _aim(self, q: Array, way: Array) -> None:
+        """Count from the posture q (nq,), towards displacements (k,) of the revolute joints and the root."""
+        joints = len(self.rows)
+        self.rows.bound = self._bodies.angles_at(q) + way[:joints]
+        if self.root is not None:
+            self.root.anchor(q[:7], way[joints:])
+
+
+def _counts_root(problem: Problem, state: State) -> bool:
+    """Whether the measures that are always minimised count the motion of a free root."""
+    curved = [
+        term.weight * term.curvature(state.update(problem.start)) for term in problem.measures if type(term) in CAN
+    ]
+    return bool(curved) and float(np.min(np.sum(curved, axis=0)[:6])) > 0.0
 
 
 def _depends_on(measure: Measure, tangent: Indices, start: Array, state: State) -> bool:
