@@ -215,6 +215,8 @@ class WholebodyTool(Tool):
             ],
             measures=[wb.Displacement()],
             clearance=track.clearance,
+            range_of_motion=False,  # the other tools cannot be told of what a person keeps
+            balance=False,
         )
         self._tracker = wb.QP(**qp_settings(solver)).tracker(self.problem, DT)
         self._q = np.array(track.start)
