@@ -52,23 +52,18 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.interaction import report
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_text
-    from wholebody.errors import InputError, UnknownNameError
+    from wholebody.cli.scene_choice import scene_names
+    from wholebody.errors import UnknownNameError
     from wholebody.tracking import SCENES, build_scene
     from wholebody.tracking.loop import OVERLAPS
 
-    if arguments.list:
-        for name, about in SCENES.items():
-            print(f"{name:18} {about}")
+    names = scene_names(arguments, SCENES, "interact", files=False)
+    if not names:
         return 0
-    if arguments.scene is None:
-        raise InputError(f"name a scene: {', '.join(SCENES)}, or all; see wholebody interact --list")
-    names = list(SCENES) if arguments.scene == "all" else [arguments.scene]
     chosen = list(OVERLAPS) if arguments.overlap == "all" else [arguments.overlap]
     for overlap in chosen:
         if overlap not in OVERLAPS:
             raise UnknownNameError("way to remove overlap", overlap, OVERLAPS, "--overlap")
-    if arguments.seed < 0:
-        raise InputError(f"--seed is {arguments.seed}; give 0 or more")
     _check_writable(arguments.out, arguments.update_docs)
     facts, worst = machine(), []
     for name in names:

@@ -61,25 +61,17 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_text
     from wholebody.bench.world_runs import report
+    from wholebody.cli.scene_choice import scene_names
     from wholebody.dynamics.scenes import WORLD_SCENES
-    from wholebody.errors import InputError, UnknownNameError
+    from wholebody.errors import UnknownNameError
     from wholebody.files import check_writable, make_folder
     from wholebody.tracking.loop import OVERLAPS
 
-    if arguments.list:
-        for name, about in WORLD_SCENES.items():
-            print(f"{name:20} {about}")
+    names = scene_names(arguments, WORLD_SCENES, "world", files=True)
+    if not names:
         return 0
-    if arguments.scene is None:
-        raise InputError(f"name a scene: {', '.join(WORLD_SCENES)}, or all; see wholebody world --list")
-    names = list(WORLD_SCENES) if arguments.scene == "all" else [arguments.scene]
-    for name in names:
-        if name not in WORLD_SCENES and not name.endswith(".toml"):
-            raise UnknownNameError("scene", name, WORLD_SCENES)
     if arguments.overlap not in OVERLAPS:
         raise UnknownNameError("way to remove overlap", arguments.overlap, OVERLAPS, "--overlap")
-    if arguments.seed < 0:
-        raise InputError(f"--seed is {arguments.seed}; give 0 or more")
     make_folder(arguments.out)
     check_writable(arguments.out / f"{Path(names[0]).stem}.csv")
     facts = machine()
