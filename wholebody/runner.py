@@ -20,6 +20,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from os import _exit
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -268,7 +269,7 @@ def end_with_parent() -> None:
 def _end_after(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(ORPHANED)
-    os._exit(1)
+    _exit(1)
 
 
 def serve(descriptor: int) -> None:
@@ -301,7 +302,7 @@ def _serve_one(parent: Connection, job: Job, environment: Mapping[str, str]) -> 
     _end_at_alarms()
     allow(job.seconds)
     parent.send((True, job.function(*job.arguments)))
-    os._exit(0)  # the process must not close resources of the parent
+    _exit(0)  # the process must not close resources of the parent
 
 
 def _end_at_alarms() -> None:

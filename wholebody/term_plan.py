@@ -17,6 +17,7 @@ from wholebody import tasks
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench, extended_columns
+from wholebody.records import with_values
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.distance import LEAST_CURVATURE, SquaredDistance
 from wholebody.tasks.rhythm import CLAVICLE_RISE, CLAVICLE_WEIGHT, LUMBAR_MOST, LUMBAR_RATE, LUMBAR_WEIGHT
@@ -106,7 +107,7 @@ class TermPlan(NamedTuple):
             if entries is None or known is None:
                 if entries is not known or type(goal) is not type(others[number].term):
                     return None
-                others[number] = others[number]._replace(term=goal, value=goal.error)
+                others[number] = with_values(others[number], term=goal, value=goal.error)
                 number += 1
                 continue
             if [entry[:2] for entry in entries] != [entry[:2] for entry in known]:
@@ -116,7 +117,7 @@ class TermPlan(NamedTuple):
                 place = start + columns * filled[entry.table]
                 floats[place : place + columns] = entry.floats
                 filled[entry.table] += 1
-        return self._replace(floats=floats, goals=tuple(found), others=tuple(others))
+        return with_values(self, floats=floats, goals=tuple(found), others=tuple(others))
 
 
 def make_plan(

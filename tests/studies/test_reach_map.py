@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.cli.main import main
-from wholebody.studies.reach_verdicts import BEYOND, INSIDE, REACHED
+from wholebody.studies.reach_result import BEYOND, INSIDE, REACHED
 
 PLANAR = """<robot name="planar"><link name="base"/>
 <link name="upper"><collision><origin xyz="0.2 0 0"/><geometry><sphere radius="0.02"/></geometry></collision></link>

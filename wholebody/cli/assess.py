@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from wholebody.cli.arguments import Commands
+
 HELP = "judge a posture, and score its ergonomics"
 DESCRIPTION = """\
 Judge the posture of a result.json that `wholebody pose` wrote: goals, overlaps, limits, constraints. With --ergonomics
@@ -24,7 +26,7 @@ FLAGS = {
 }
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("assess", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)

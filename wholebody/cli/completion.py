@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from wholebody.cli.arguments import Commands
+
 SHELLS = ("bash", "zsh", "tcsh")
 HELP = "print the completion script of a shell"
 DESCRIPTION = """\
@@ -15,7 +17,7 @@ examples:
   wholebody completion zsh > ~/.zfunc/_wholebody"""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("completion", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.cli.arguments import Commands
+
 HELP = "pose a packaged task"
 DESCRIPTION = """\
 Pose a packaged task (by default a person who reaches between the boards of a shelf), and print where the pictures are.
 You can copy and change the task file."""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("demo", help=HELP, description=DESCRIPTION, formatter_class=shape)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from wholebody.cli.arguments import Commands
+
 HELP = "check this installation: versions, methods, QP solvers, tools"
 DESCRIPTION = """\
 Print the versions of all packages, use every method and QP solver once, and name wrong combinations of versions and
@@ -13,7 +15,7 @@ something is wrong; an absent optional package is no fault."""
 _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[red]broken[/]"}
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("doctor", help=HELP, description=DESCRIPTION, formatter_class=shape)

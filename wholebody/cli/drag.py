@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wholebody.cli.arguments import Commands
 from wholebody.methods import METHODS
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ examples:
 exit code: 1 if the end is not met, or if the overlap in a frame or between two exceeds 1 mm, or a limit is violated"""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("drag", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)

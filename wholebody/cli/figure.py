@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from wholebody.cli.arguments import Commands
+
 HELP = "describe a figure, or write a person as a URDF"
 DESCRIPTION = """\
 List the joints with their limits, the frames for goals, groups and postures of a figure:
@@ -18,7 +20,7 @@ examples:
   wholebody figure robot.urdf"""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("figure", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)

@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wholebody.cli.arguments import Commands
+
 if TYPE_CHECKING:
     from wholebody.bench.interaction import InteractionRow, WorstFrames
     from wholebody.tracking import InteractionScene, Judgement, Recording
@@ -28,7 +30,7 @@ CHARTED = ("hand_on_table", "two_arms")
 """Scenes whose charts go into the documentation: those of figures 7 and 8 of the paper."""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("interact", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
@@ -52,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.interaction import report
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_text
-    from wholebody.cli.scene_choice import scene_names
+    from wholebody.cli.arguments import scene_names
     from wholebody.errors import UnknownNameError
     from wholebody.tracking import SCENES, build_scene
     from wholebody.tracking.loop import OVERLAPS

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.cli.arguments import Commands
 from wholebody.methods import METHODS
 
 HELP = "find a posture for a task file"
@@ -23,7 +24,7 @@ examples:
   wholebody pose shelf.toml --json | jq .joints"""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("pose", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.cli.arguments import Commands
+
 HELP = "map the places that a hand or another frame can reach"
 DESCRIPTION = """\
 Find which places of a grid a frame of a task file's figure reaches, with everything that the task file asks except its
@@ -20,7 +22,7 @@ examples:
   wholebody reach seat.toml --frame left_palm --low 0.2,-0.5,0.9 --high 0.9,0.5,0.9 --step 0.05 --jobs 2"""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("reach", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)

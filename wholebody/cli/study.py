@@ -6,6 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from wholebody.cli.arguments import Commands
+
 HELP = "solve one task for many people, targets and layouts"
 DESCRIPTION = """\
 Solve the task of a study file for each person, with each target, in each layout, and write into a folder:
@@ -34,7 +36,7 @@ examples:
   wholebody study shelf-study.toml --out results/study --parquet"""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("study", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)

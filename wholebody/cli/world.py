@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wholebody.cli.arguments import Commands
+
 if TYPE_CHECKING:
     from wholebody.bench.world_runs import WorldRow
     from wholebody.dynamics.overlaps import Overlap
@@ -31,7 +33,7 @@ STANDING = 180  # frames of a task file
 FILM = (460, 420)  # pixels of a moment
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("world", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
@@ -61,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_text
     from wholebody.bench.world_runs import report
-    from wholebody.cli.scene_choice import scene_names
+    from wholebody.cli.arguments import scene_names
     from wholebody.dynamics.scenes import WORLD_SCENES
     from wholebody.errors import UnknownNameError
     from wholebody.files import check_writable, make_folder

@@ -11,6 +11,7 @@ from wholebody.dynamics import contact_kernel, impact_kernel, solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactPoints
 from wholebody.dynamics.joints import JointRows, Joints
+from wholebody.records import with_values
 
 SKIN = 5e-5  # m: gap at which bodies rest: coal's distances stay positive, its normals right to 0.02 rad
 TOUCH = 1e-5  # m: a gap larger than SKIN by this still touches
@@ -47,7 +48,7 @@ class Impulses(NamedTuple):
     def over(self, time: float) -> Impulses:
         """The same forces during another time."""
         share = time / self.time
-        return self._replace(impulse=share * self.impulse, held=share * self.held, time=time)
+        return with_values(self, impulse=share * self.impulse, held=share * self.held, time=time)
 
 
 class _Laid(NamedTuple):

@@ -17,6 +17,7 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.anthropometry import Body
+from wholebody.records import with_values
 
 
 class Solid(NamedTuple):
@@ -145,9 +146,9 @@ def _with_virtual_masses(spec: BodySpec) -> list[Link]:
     made = []
     for link in spec.links:
         if not link.mass and link.name in moving:
-            made.append(link._replace(mass=VIRTUAL_MASS, inertia=(VIRTUAL_INERTIA,) * 3))
+            made.append(with_values(link, mass=VIRTUAL_MASS, inertia=(VIRTUAL_INERTIA,) * 3))
         else:
-            made.append(link._replace(mass=link.mass - taken[link.name]) if link.mass else link)
+            made.append(with_values(link, mass=link.mass - taken[link.name]) if link.mass else link)
     return made
 
 

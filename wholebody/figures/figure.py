@@ -15,6 +15,7 @@ from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
 from wholebody.figures.grounding import Among, grounded
 from wholebody.figures.reduction import reduced_parts
+from wholebody.records import as_dict
 
 LARGEST = 1e6
 """Largest value of a joint, radians or metres, and largest tolerance; larger ones are refused as mistakes."""
@@ -139,8 +140,7 @@ class Figure:
     def __reduce__(self) -> tuple[Any, ...]:
         """Return the arguments that it is made from; read-only mappings cannot be pickled."""
         known: dict[str, Any] = {
-            name: dict(part) if isinstance(part, Mapping) else part
-            for name, part in self._description._asdict().items()
+            name: dict(part) if isinstance(part, Mapping) else part for name, part in as_dict(self._description).items()
         }
         visual = None if self.visual is self.geometry else self.visual
         made_from = (self.name, self.model, self.geometry, self.detail, Description(**known), visual)

@@ -17,6 +17,7 @@ from wholebody.figures.human_pairs import body_pairs, collision_group, sphere_pa
 from wholebody.figures.motion_ranges import human_ranges
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
+from wholebody.records import with_values
 
 ROOT_EFFORT = (5.0, 2.0)
 """Weight of the root in a person's effort, beside 1 of an arm: of its position [rad^2/m^2] and of its rotation.
@@ -133,7 +134,7 @@ def avatar_spec(person: Body | None = None, detail: str = "capsules") -> BodySpe
     """Return the specification of an avatar; arguments as for the person."""
     person = person or body()
     whole = human_spec(person, detail)
-    joints = tuple(joint._replace(axis=None) if joint.name.startswith(RIGID) else joint for joint in whole.joints)
+    joints = tuple(with_values(joint, axis=None) if joint.name.startswith(RIGID) else joint for joint in whole.joints)
     return replace(whole, name="avatar", joints=joints)
 
 

@@ -10,6 +10,7 @@ import pinocchio as pin
 from wholebody.figures import hulls, human_capsules
 from wholebody.figures.body_spec import Solid, place
 from wholebody.figures.dimensions import Dimensions
+from wholebody.records import with_values
 
 _TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck")
 
@@ -42,4 +43,4 @@ def _hull_of(solid: Solid) -> Solid:
         radius, half = solid.geometry.radius, solid.geometry.halfLength
         shape, center = hulls.tapered(radius, radius, 2.0 * half, solid.name)
         center = place(z=half) * center
-    return solid._replace(geometry=shape, placement=solid.placement * center)
+    return with_values(solid, geometry=shape, placement=solid.placement * center)

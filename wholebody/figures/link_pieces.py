@@ -20,6 +20,7 @@ from wholebody.geometry.hull import hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces, cached
 from wholebody.geometry.meshes import EmptyMeshError, read_mesh
 from wholebody.geometry.pieces import LARGEST, SMALLEST
+from wholebody.records import with_values
 
 CYLINDER_SIDES = 32
 """A cylinder becomes a prism around it with this many sides; its corners protrude by 0.5 % of the radius."""
@@ -146,7 +147,7 @@ def _pieces(vertices: Array, faces: NDArray[np.int64], share: float | None, what
     if split.added_volume <= 0.01:
         return split
     told = f"{what}: its convex pieces ({len(split.pieces)}) have {split.added_volume:.0%} more volume"
-    return split._replace(notes=(*split.notes, told))
+    return with_values(split, notes=(*split.notes, told))
 
 
 def _prism(radius: float, length: float) -> Array:

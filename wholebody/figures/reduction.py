@@ -13,6 +13,7 @@ from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair
 from wholebody.figures.motion_ranges import CoupledRange, EllipseAxis, EllipticRange, MotionRange
+from wholebody.records import with_values
 
 _LOCKED = "locked together"
 
@@ -93,7 +94,7 @@ def _ranges(
 
 def _without_locked(axis: EllipseAxis, kept: set[str], values: Mapping[str, float]) -> EllipseAxis:
     still = sum(values[joint] for joint in axis.joints if joint not in kept)
-    return axis._replace(joints=tuple(joint for joint in axis.joints if joint in kept), offset=axis.offset + still)
+    return with_values(axis, joints=tuple(joint for joint in axis.joints if joint in kept), offset=axis.offset + still)
 
 
 def drop_rigid_pairs(geometry: pin.GeometryModel) -> list[ExcludedPair]:

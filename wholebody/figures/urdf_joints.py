@@ -14,6 +14,7 @@ from wholebody.checks import shown
 from wholebody.errors import FileFormatError
 from wholebody.figures.xml_reading import bounded, numbers, placement, unique_names
 from wholebody.geometry.pieces import LARGEST
+from wholebody.records import with_values
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 FOLLOWING = ("revolute", "continuous", "prismatic")
@@ -101,7 +102,7 @@ def _with_leaders(joints: list[UrdfJoint], notes: list[str]) -> list[UrdfJoint]:
                 f"joint {shown(joint.name)}: it mimics {shown(joint.mimic.joint)}, which is not in the file, so it is "
                 "on its own"
             )
-            joint = joint._replace(mimic=None)
+            joint = with_values(joint, mimic=None)
         made.append(joint)
     return made
 

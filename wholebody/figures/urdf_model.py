@@ -18,6 +18,7 @@ from wholebody.checks import shown
 from wholebody.errors import FileFormatError
 from wholebody.figures.urdf_file import UrdfFile
 from wholebody.figures.urdf_joints import Mimic, UrdfJoint
+from wholebody.records import with_values
 
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -80,7 +81,7 @@ def _with_constant_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJ
             moved = pin.SE3(np.eye(3), law.offset * joint.axis)
         else:
             moved = pin.SE3(pin.exp3(law.offset * joint.axis), np.zeros(3))
-        made.append(joint._replace(kind="fixed", origin=joint.origin * moved, mimic=None))
+        made.append(with_values(joint, kind="fixed", origin=joint.origin * moved, mimic=None))
     return tuple(made), tuple(notes)
 
 
@@ -102,13 +103,13 @@ def _led_by_the_first(joints: tuple[UrdfJoint, ...], order: dict[str, int]) -> t
         if joint.name != head:
             base = laws.get(head, _Law(head, 1.0, 0.0))
             slope = law.slope / base.slope
-            made.append(joint._replace(kind=kind, mimic=Mimic(head, slope, law.offset - slope * base.offset)))
+            made.append(with_values(joint, kind=kind, mimic=Mimic(head, slope, law.offset - slope * base.offset)))
             continue
         leader = by_name[law.leader]
         ends = sorted(law.slope * end + law.offset for end in (leader.lower, leader.upper))
         made.append(
-            joint._replace(
-                kind=kind, mimic=None, lower=ends[0], upper=ends[1], velocity=abs(law.slope) * leader.velocity
+            with_values(
+                joint, kind=kind, mimic=None, lower=ends[0], upper=ends[1], velocity=abs(law.slope) * leader.velocity
             )
         )
     return tuple(made)

@@ -17,6 +17,7 @@ from wholebody.geometry.components import Component, enclosed_volume, split_comp
 from wholebody.geometry.hull import hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, cached
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
+from wholebody.records import with_values
 
 if TYPE_CHECKING:
     from wholebody.runner import Child
@@ -66,7 +67,9 @@ def convex_pieces(
     if not isinstance(threshold, (int, float, np.floating)) or not 0.01 <= threshold <= 1.0:
         raise InputError(f"{what}: threshold is {threshold!r}; give a number between 0.01 and 1")
     found = _decomposed(cloud.tobytes(), triangles.tobytes(), int(max_vertices), float(threshold), what)
-    return found._replace(pieces=tuple(piece._replace(placement=pin.SE3(piece.placement)) for piece in found.pieces))
+    return with_values(
+        found, pieces=tuple(with_values(piece, placement=pin.SE3(piece.placement)) for piece in found.pieces)
+    )
 
 
 def mesh_hull(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> ConvexPieces:

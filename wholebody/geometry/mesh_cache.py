@@ -22,6 +22,7 @@ import pinocchio as pin
 
 from wholebody.geometry.hull import coal_convex
 from wholebody.geometry.pieces import Piece
+from wholebody.records import with_values
 from wholebody.version import __version__
 
 T = TypeVar("T")
@@ -109,9 +110,9 @@ def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[
     path = cache_folder() / f"{digest.hexdigest()}{_SUFFIX}"
     found = _read(path, _unpacked)
     if found is not None:
-        return found._replace(notes=tuple(what + note for note in found.notes))
+        return with_values(found, notes=tuple(what + note for note in found.notes))
     made = make()
-    _write(path, _packed(made._replace(notes=tuple(note.removeprefix(what) for note in made.notes))))
+    _write(path, _packed(with_values(made, notes=tuple(note.removeprefix(what) for note in made.notes))))
     return made
 
 

@@ -18,6 +18,7 @@ from wholebody.methods.control import Progress
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.moving_things import Collision, FrameMotion
 from wholebody.problem import Problem
+from wholebody.records import with_values
 from wholebody.solution import Solution
 from wholebody.workspace import Workspace
 
@@ -200,7 +201,7 @@ class SolvingTracker:
         motion, step = self.workspace.next_frame(), self.frame(q)
         if motion is None:
             return step
-        return step._replace(collisions=judged(self.workspace, motion, q, step.q))
+        return with_values(step, collisions=judged(self.workspace, motion, q, step.q))
 
     def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
         """A whole solve from the posture q (nq,): by the method, or without a tolerance by the rough method."""

@@ -27,6 +27,7 @@ from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
 from wholebody.motion.trajectory.sqp import WindowProgram
 from wholebody.motion.windows import Window, windows
+from wholebody.records import with_values
 from wholebody.workspace import Workspace
 
 MARGIN = 0.1  # s, before and after what is wrong: in which postures may change; what is left gets twice as much
@@ -68,7 +69,7 @@ class _Looking(Looking):
 
     def at(self, node: Node, x: Array, within: float) -> Rows:
         rows = super().at(node, x, min(within, NEAR))
-        return rows._replace(gap=rows.gap - self.room[node.frame])
+        return with_values(rows, gap=rows.gap - self.room[node.frame])
 
     def ask(self, gap: int) -> None:
         """Ask for more room in a gap, and in the frames at its ends."""

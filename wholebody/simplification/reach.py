@@ -16,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array, Indices
+from wholebody.records import with_values
 
 
 class Range(NamedTuple):
@@ -111,18 +112,18 @@ class Reach:
                 return Balls(
                     np.zeros_like(balls.center), balls.radius + np.linalg.norm(balls.center, axis=1), balls.piece
                 )
-            return balls._replace(radius=np.full_like(balls.radius, np.inf))
+            return with_values(balls, radius=np.full_like(balls.radius, np.inf))
         half = 0.5 * (bound.high - bound.low)
         middle = 0.5 * sign * (bound.high + bound.low) if np.isfinite(half) else 0.0
         if not bound.turns:
-            return balls._replace(center=balls.center + middle * bound.axis, radius=balls.radius + half)
+            return with_values(balls, center=balls.center + middle * bound.axis, radius=balls.radius + half)
         along = np.outer(balls.center @ bound.axis, bound.axis)
         across = balls.center - along
         lever = np.linalg.norm(across, axis=1)
         if half >= 0.5 * np.pi:
-            return balls._replace(center=along, radius=balls.radius + lever)
+            return with_values(balls, center=along, radius=balls.radius + lever)
         turned = np.cos(middle) * across + np.sin(middle) * across @ pin.skew(bound.axis).T
-        return balls._replace(center=along + np.cos(half) * turned, radius=balls.radius + np.sin(half) * lever)
+        return with_values(balls, center=along + np.cos(half) * turned, radius=balls.radius + np.sin(half) * lever)
 
     def _range(self, index: int) -> Range | None:
         """Range of a revolute or prismatic joint; None for any other."""
@@ -156,7 +157,7 @@ def about_point(balls: Balls, point: Array) -> Balls:
 
 def placed(balls: Balls, place: Any) -> Balls:
     """Balls in another frame, given the placement of the old frame in it."""
-    return balls._replace(center=balls.center @ place.rotation.T + place.translation)
+    return with_values(balls, center=balls.center @ place.rotation.T + place.translation)
 
 
 def _joined(parts: list[Balls]) -> Balls:

@@ -20,9 +20,8 @@ from wholebody.problem import Problem
 from wholebody.runner import packed
 from wholebody.studies.many import MOST_JOBS
 from wholebody.studies.reach_bounds import beyond, lacking, reach_balls
-from wholebody.studies.reach_result import ReachMap
+from wholebody.studies.reach_result import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED, ReachMap
 from wholebody.studies.reach_search import SURE, Asked, Brick, Try, covered, search_brick
-from wholebody.studies.reach_verdicts import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED
 from wholebody.tasks import inputs
 
 MOST_PLACES = 1_000_000

@@ -12,7 +12,6 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.files import write
-from wholebody.studies.reach_verdicts import INSIDE
 
 MOST_SLICES = 24  # heights in one picture; of more, some are left out evenly
 COLUMNS = 6
@@ -103,7 +102,7 @@ def _slice(axis: Any, found: Any, values: Array, k: int) -> Any:
         values[:, :, k], origin="lower", extent=extent, cmap=colors, vmin=-1.0, vmax=1.0, interpolation="nearest"
     )
     gray = np.zeros((*values.shape[:2], 4))
-    gray[found.verdict[:, :, k] == INSIDE] = INSIDE_GRAY
+    gray[found.inside[:, :, k]] = INSIDE_GRAY
     axis.imshow(gray, origin="lower", extent=extent, interpolation="nearest")
     axis.invert_xaxis()
     axis.set_title(f"z = {found.z[k]:.2f} m", fontsize="small")

@@ -13,7 +13,10 @@ from wholebody import checks
 from wholebody.arrays import Array, Mask
 from wholebody.files import check_writable, write
 from wholebody.problem import Problem
-from wholebody.studies.reach_verdicts import REACHED, VERDICTS
+
+NOT_TRIED, REACHED, MISSED, EXCLUDED, BEYOND, INSIDE = range(6)
+VERDICTS = ("not tried", "reached", "missed", "excluded", "beyond", "inside")
+"""Words of the codes of a verdict."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,6 +47,11 @@ class ReachMap:
     measure: Array
     q: Array
     solves: int
+
+    @property
+    def inside(self) -> Mask:
+        """(nx, ny, nz) which places lie inside of a thing."""
+        return np.asarray(self.verdict == INSIDE)
 
     @property
     def reached(self) -> Mask:

@@ -10,6 +10,7 @@ from wholebody import checks
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.geometry.placement import placement
 from wholebody.problem import Problem
+from wholebody.records import with_values
 from wholebody.taskfile.reading import Entry, read_contents
 from wholebody.taskfile.task import task_from
 
@@ -64,15 +65,15 @@ class TaskFile:
             old = goal.values["target"]
             if goal.name == "frame" and len(old) == 7:
                 place = (*place, *old[3:])
-            tables["goal"][number] = goal._replace(values={**goal.values, "target": place})
+            tables["goal"][number] = with_values(goal, values={**goal.values, "target": place})
         if layout is not None:
             moved = self._things(layout)
             tables["object"] = [
-                entry._replace(values={**entry.values, "at": moved[name]})
+                with_values(entry, values={**entry.values, "at": moved[name]})
                 if (name := entry.values["name"]) in moved else entry
                 for entry in tables["object"]
             ]  # fmt: skip
-        return task_from(self.contents._replace(tables=tables), self.path).problem
+        return task_from(with_values(self.contents, tables=tables), self.path).problem
 
     def __reduce__(self) -> tuple[Any, ...]:
         return TaskFile, (self.path,)
@@ -86,7 +87,7 @@ class TaskFile:
         kept = dict(entry.values)
         if {"sex", "stature", "mass"} & person.keys():  # a stature of the file does not belong to another person
             kept = {name: value for name, value in kept.items() if name not in ("sex", "stature", "mass")}
-        return entry._replace(values={**kept, **person})
+        return with_values(entry, values={**kept, **person})
 
     def _goal(self) -> int:
         for number, entry in enumerate(self.contents.tables.get("goal", ())):

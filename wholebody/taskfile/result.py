@@ -18,6 +18,7 @@ from wholebody.figures.state import State
 from wholebody.files import read_text, write
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
+from wholebody.records import as_dict
 from wholebody.solution import Solution
 from wholebody.taskfile.task import Task, read_task
 from wholebody.version import __version__
@@ -70,7 +71,7 @@ def describe(task: Task, solution: Solution, folder: Path) -> dict[str, Any]:
         "seconds": solution.seconds,
         "iterations": solution.iterations,
         "programs": dict(solution.programs),
-        "goals": [goal._asdict() for goal in goals_left(task, q)],
+        "goals": [as_dict(goal) for goal in goals_left(task, q)],
         "measures": {type(term).__name__: float(term.value(state)) for term in task.problem.measures},
         "assessment": solution.assessment.summary(),
         "root": q[:7].tolist() if figure.root == "free" else None,

@@ -22,6 +22,7 @@ from wholebody.matter.body import Body
 from wholebody.methods.base import Method
 from wholebody.methods.solve import method_named
 from wholebody.problem import Problem
+from wholebody.records import with_values
 from wholebody.scene import Scene
 from wholebody.taskfile.reading import Contents, Entry, read_contents
 from wholebody.taskfile.where import Where
@@ -193,7 +194,7 @@ def _body(options: dict[str, Any]) -> dict[str, Any]:
 def _shape(entry: Entry, options: dict[str, Any]) -> Shape:
     assert entry.form is not None
     if entry.form.make is not None:
-        shape: Shape = entry._replace(values=options).make()
+        shape: Shape = with_values(entry, values=options).make()
         return shape
     file = _file(options.pop("path"), entry.where.at("path"))
     return _said(entry.where.at("path"), lambda: Mesh(file, **options))

@@ -12,6 +12,7 @@ from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
+from wholebody.records import with_values
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Measure, Surroundings, filled
 from wholebody.tasks.distance import LEAST_CURVATURE
@@ -147,7 +148,7 @@ def _lumbar(figure: Figure, start: Array) -> Lumbar | None:
         return None
     a, b, c = (figure.model.joints[figure.joint_id(name)] for name in names)
     part = Lumbar((a.idx_q, b.idx_q, c.idx_q), (a.idx_v, b.idx_v, c.idx_v), 0.0)
-    return part._replace(rest=_bent(start, part)[0])
+    return with_values(part, rest=_bent(start, part)[0])
 
 
 def _beyond(q: Array, girdle: Girdle) -> tuple[float, tuple[float, float, float]]:

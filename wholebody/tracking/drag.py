@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.checks import time_step
+from wholebody.checks import shown, time_step
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.passing_through import GRAZE, is_free
 from wholebody.methods.base import Method, Tracker, goal_error, judged
@@ -203,8 +203,10 @@ class Drag(Generic[Answer]):
         self._run: ProblemDrag | AssemblyDrag
         if isinstance(problem, Assembly):
             time_step(dt, "dt")
-            if isinstance(method, str) and method not in ("qp", "newton"):
-                raise InputError(f"Drag: an assembly is solved by Newton steps, not by {method!r}; leave method out")
+            if method not in ("qp", "newton"):
+                raise InputError(
+                    f"Drag: an assembly is solved by Newton steps, not by {shown(method)}; leave method out"
+                )
             self._run = AssemblyDrag(problem, goal)
         else:
             self._run = ProblemDrag(problem, method, goal=goal, dt=dt)

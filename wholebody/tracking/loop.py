@@ -25,6 +25,7 @@ from wholebody.methods.inputs import SEED
 from wholebody.methods.qp.method import QP
 from wholebody.moving_things import Collision, FrameMotion
 from wholebody.problem import Problem
+from wholebody.records import with_values
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
 from wholebody.tracking.attraction import Attraction
@@ -168,7 +169,7 @@ class FrameLoop:
             stop = f"{owners} would pass through each other on the way; the figure stays"
             note = "; ".join(part for part in (note, stop) if part)
         spent = resolution.contact_seconds + time.perf_counter() - began
-        return resolution._replace(candidates=(q,), contact_seconds=spent, note=note)
+        return with_values(resolution, candidates=(q,), contact_seconds=spent, note=note)
 
     def _kept_from_moving(
         self, resolution: Resolution, motion: FrameMotion
@@ -194,7 +195,7 @@ class FrameLoop:
         self._workspace.keep(motion, found)
         note = "; ".join(part for part in (resolution.note, *map(str, found)) if part)
         spent = resolution.contact_seconds + time.perf_counter() - began
-        return resolution._replace(candidates=(best[-1][1],), contact_seconds=spent, note=note), found
+        return with_values(resolution, candidates=(best[-1][1],), contact_seconds=spent, note=note), found
 
     def _strategy_for(self, overlap: str, dt: float, seed: int, rigid: bool) -> OverlapStrategy:
         if overlap == "qp":

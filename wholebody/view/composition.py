@@ -13,13 +13,11 @@ from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.view import style
-from wholebody.view.axes import mark_frames
 from wholebody.view.blocker_markers import mark_blockers
 from wholebody.view.bodies import Bodies
 from wholebody.view.camera import camera_on
-from wholebody.view.contact_markers import color_contacts, mark_contacts
-from wholebody.view.goal_markers import Goals
-from wholebody.view.overlap_markers import mark_overlaps
+from wholebody.view.contact_markers import color_contacts, mark_contacts, mark_overlaps
+from wholebody.view.goal_markers import Goals, mark_frames
 from wholebody.view.scene_graph import Keyframe, Marker, SceneGraph
 from wholebody.view.server import Command
 from wholebody.view.viewed_scene import ViewedScene

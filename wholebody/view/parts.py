@@ -16,6 +16,7 @@ from wholebody.arrays import Array
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.geometry.placement import FARTHEST, PlacementLike, placement
 from wholebody.geometry.shapes import Shape
+from wholebody.records import with_values
 from wholebody.view.style import Color
 
 
@@ -123,7 +124,7 @@ class Parts:
 
 def _part(entry: Any, name: str) -> Part:
     """A part from an entry of a list, with its shape and color checked."""
-    part = Part(*entry) if isinstance(entry, tuple) and 1 <= len(entry) <= len(Part._fields) else Part(entry)
+    part = Part(*entry) if isinstance(entry, tuple) and 1 <= len(entry) <= len(Part.__match_args__) else Part(entry)
     if not isinstance(part.shape, Shape):
         raise InputError(f"part {name!r} has {checks.shown(part.shape)} for a shape; give wb.Box, wb.Sphere or another")
-    return part if part.color is None else part._replace(color=checks.color(part.color, f"part {name!r}: color"))
+    return part if part.color is None else with_values(part, color=checks.color(part.color, f"part {name!r}: color"))

@@ -16,6 +16,7 @@ import os
 import socket
 import struct
 import sys
+from os import _exit
 from typing import Any, NamedTuple
 
 OBJECT, TRANSFORM, PROPERTY, DELETE = b"o", b"t", b"p", b"d"
@@ -306,4 +307,4 @@ async def serve(parent: int, host: str, port: int) -> None:
 if __name__ == "__main__":
     with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
         asyncio.run(serve(int(sys.argv[1]), sys.argv[2], int(sys.argv[3])))
-    os._exit(0)
+    _exit(0)

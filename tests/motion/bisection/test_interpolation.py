@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
-from wholebody.motion.bisection.interpolation import fill, linear, quadratic
-from wholebody.motion.bisection.key_frames import key_frames
+from wholebody.motion.bisection.interpolation import fill, key_frames, linear, quadratic
 
 SEEDS = st.integers(0, 10_000)
 

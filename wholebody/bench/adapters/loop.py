@@ -19,6 +19,7 @@ from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress
 from wholebody.methods.differential import Iteration, Settings
 from wholebody.problem import Problem
+from wholebody.records import with_values
 from wholebody.solution import Solution
 
 NEAR = 0.1  # of the size of a figure: pairs nearer than this have a row, where a tool has such a setting
@@ -123,7 +124,7 @@ class Loop(ABC):
         longest = self.longest * max(1.0, size(problem.scene.figure))  # the tool bounds turns and lengths apart
         settings = Settings(self.tolerance, self.iterations, longest, DECAY, best=True)
         if room:
-            settings = settings._replace(best=False, least=min(STEPS, self.iterations))
+            settings = with_values(settings, best=False, least=min(STEPS, self.iterations))
         with problem.borrow() as workspace, Control(None, progress) as control:
             stepper.begin(room)
             run = Iteration(problem, workspace, stepper, settings, control)

@@ -14,6 +14,7 @@ from wholebody.bench.adapters.own import NEWTONS, ccd_adapter, dls_adapter, newt
 from wholebody.bench.adapters.starts import FAMILY, ONE, restarted
 from wholebody.bench.track import Track
 from wholebody.errors import MissingPackageError, UnknownNameError
+from wholebody.records import with_values
 
 SOLVERS = {"quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
 """Further QP solvers that the extra `solvers` installs: their names in qpsolvers -> the modules they need."""
@@ -110,7 +111,7 @@ def _rows() -> dict[str, _Row]:
     for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake"):
         row = rows.get(f"{family}/{ONE}", rows.get(family))
         assert row is not None
-        rows[f"{family}/{FAMILY}"] = row._replace(build=partial(_restarted, row))
+        rows[f"{family}/{FAMILY}"] = with_values(row, build=partial(_restarted, row))
     return rows
 
 

@@ -10,6 +10,7 @@ from wholebody.bench.compare.record import COARSE
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.settings import SEEDS
 from wholebody.bench.compare.statistics import LEAST, LEVEL, Ranking, ranking, same_share
+from wholebody.records import with_values
 
 
 class SetRanking(NamedTuple):
@@ -75,7 +76,7 @@ def sensitivity(results: Results) -> list[SeedShares]:
             shares = tuple((sum(record.success(COARSE) for record in group), len(group)) for group in groups)
             found.append(SeedShares(family, adapter, shares, same_share(shares), False))
     differing = _holm([row.p_value for row in found])
-    return [row._replace(differs=differs) for row, differs in zip(found, differing, strict=True)]
+    return [with_values(row, differs=differs) for row, differs in zip(found, differing, strict=True)]
 
 
 def _holm(p_values: Sequence[float]) -> list[bool]:

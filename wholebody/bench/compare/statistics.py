@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
+from wholebody.records import with_values
 
 RESAMPLES = 2000  # of a bootstrap: the ends of its intervals then vary by about 3 % of their width
 LEVEL = 0.95
@@ -93,7 +94,7 @@ def ratio(one: Mapping[tuple[str, int], float], other: Mapping[tuple[str, int], 
     """Geometric mean of positive figures of one method over those of another, on the problems that both have."""
     logs = np.array([log(one[key] / other[key]) for key in one if key in other])
     if len(logs) < LEAST:
-        return NOTHING._replace(low=0.0, cases=len(logs))
+        return with_values(NOTHING, low=0.0, cases=len(logs))
     drawn = np.exp(logs[_draws(len(logs))].mean(axis=1))
     return Interval(exp(float(logs.mean())), *_ends(drawn), len(logs))
 

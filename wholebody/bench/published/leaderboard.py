@@ -22,6 +22,7 @@ from wholebody.bench.report import render, words
 from wholebody.bench.tables import write_text
 from wholebody.errors import InputError
 from wholebody.files import is_folder
+from wholebody.records import with_values
 
 PAGE = "leaderboard.html"
 MOST = 6  # methods in a chart
@@ -234,7 +235,7 @@ def styles(names: Sequence[str]) -> dict[str, Style]:
         style = method_style(name)
         taken = {other.color for other in found.values()}
         free = (other for other in SPARE if other not in taken)
-        found[name] = style if style.color not in taken else style._replace(color=next(free, style.color))
+        found[name] = style if style.color not in taken else with_values(style, color=next(free, style.color))
     return found
 
 

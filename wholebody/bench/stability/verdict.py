@@ -14,6 +14,7 @@ from wholebody.bench.stability.asking import Cell
 from wholebody.bench.stability.case import Answer, HardCase, Kind
 from wholebody.bench.stability.judging import INSIDE, Judged
 from wholebody.bench.tables import filled
+from wholebody.records import with_values
 
 BEYOND = 1e-6  # rad, m: farther than this is out of limits
 BROKEN = 1e-4  # m, rad: farther than this a constraint does not hold
@@ -157,7 +158,7 @@ def audited(case: str, method: str, verdict: Verdict) -> Verdict:
     """The verdict, but "adapter" in place of "wrong" where the tool alone does better."""
     if verdict.kind != "wrong" or (case, method) not in ALONE:
         return verdict
-    return verdict._replace(kind="adapter", figure=f"{verdict.figure}; {ALONE[case, method]}")
+    return with_values(verdict, kind="adapter", figure=f"{verdict.figure}; {ALONE[case, method]}")
 
 
 @dataclass(frozen=True)

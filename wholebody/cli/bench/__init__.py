@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
-
+from wholebody.cli.arguments import Commands
 from wholebody.cli.bench import (
     ablation,
     attack,
@@ -35,7 +34,7 @@ Measure what the package does, and write the numbers as CSV, the charts as SVG a
 on the machine and on what else runs on it: compare ratios of one run. Set OMP_NUM_THREADS=1 for steady ones."""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command `bench` with its own commands."""
     parser = commands.add_parser("bench", help=HELP, description=DESCRIPTION)
     kinds = parser.add_subparsers(title="what to measure", metavar="WHAT", required=True)

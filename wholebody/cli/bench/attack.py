@@ -6,6 +6,7 @@ import argparse
 from itertools import count
 from typing import TYPE_CHECKING
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.bench.publishing import add_folders, check_count
 from wholebody.errors import InputError
 
@@ -23,7 +24,7 @@ Every failure is written as a script that repeats it. Case K of a seed is always
 something was wrong: a false claim, an error other than one sentence, a crash, or no end within a minute."""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = commands.add_parser("attack", help="random hard cases of every kind, judged", description=DESCRIPTION)
     parser.add_argument("--seconds", type=float, default=60.0, metavar="S", help="how long (default: 60)")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.bench.publishing import add_common, check_count, publish
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = commands.add_parser(
         "challenge",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.bench.publishing import add_folders, check_count
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ ended goes on where it was when it is called again with the same settings and fo
 anew. --jobs works on cases beside each other through joblib; --cluster does so on a dask cluster."""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = commands.add_parser("compare", help="every method on every problem set", description=DESCRIPTION)
     parser.add_argument("--quick", action="store_true", help="20 problems a set, within three minutes on two cores")

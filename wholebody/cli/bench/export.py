@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.bench.publishing import check_count
 
 DESCRIPTION = """\
@@ -13,7 +14,7 @@ seeds each (near: the start; far: random), what must hold, and apart from them a
 of how hard it is. The same sets, number and seed give the same files. They are in the public domain (CC0)."""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = commands.add_parser("export", help="the problem sets as files for any program", description=DESCRIPTION)
     parser.add_argument("folder", type=Path, metavar="DIR", help="a folder that does not exist yet")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.cli.arguments import Commands
+
 DESCRIPTION = """\
 Score a file of answers to problems that `wholebody bench export` wrote, whatever program wrote the answers: goals,
 overlap of all pairs, clearances, joint limits, what is held, and effort above the best known. The scenes are rebuilt
@@ -14,7 +16,7 @@ are refused with one sentence that names the entry."""
 WIDTH = 230  # columns of the table, also where the terminal has fewer
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = commands.add_parser("judge", help="score anybody's answers to published problems", description=DESCRIPTION)
     parser.add_argument("answers", type=Path, metavar="ANSWERS.json", help="as answers.schema.json says")

@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.cli.arguments import Commands
+
 DESCRIPTION = """\
 Judge every file of answers in a folder, and write a page that compares them: tables, charts and sentences that say who
 solves most, and who cannot be told apart."""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = commands.add_parser("leaderboard", help="a page from a folder of answers", description=DESCRIPTION)
     parser.add_argument("folder", type=Path, metavar="DIR", help="with a file of answers for each method")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.cli.arguments import Commands
+
 DESCRIPTION = """\
 Count what the methods do on a fixed selection of problems, reaches, drags and hard cases: iterations, kinematic passes,
 pairs asked of coal, contact rows, programs, memory of a step. Counts are the same on every machine but for rounding, so
@@ -12,7 +14,7 @@ they show what a noisy clock does not. They are compared with locked ones; each 
 told in one sentence, and the exit code is 1 where one is worse. Times are told and compare nothing."""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = commands.add_parser(
         "regress", help="counts of work, beside those that are locked", description=DESCRIPTION

@@ -5,13 +5,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.cli.arguments import Commands
+
 DESCRIPTION = """\
 Run a published comparison again, from the lock file that it left: the same sets, seeds, methods and amounts. Says which
 figures differ by more than their intervals, and what of the machine and the versions is not the same. Times are
 compared in units of a reference kernel. Ends with 1 where what is solved differs."""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = commands.add_parser("reproduce", help="a published comparison once more", description=DESCRIPTION)
     parser.add_argument("lock", type=Path, metavar="LOCK.json", help="which `wholebody bench compare` left")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.bench.publishing import add_common, check_count, publish
 from wholebody.errors import UnknownNameError
 
 CAPTION = "Time of a solve, of a step, of the judgement and of the building of the geometry, as one size grows"
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = commands.add_parser(
         "scaling",

@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.bench.publishing import add_common, check_count
 from wholebody.errors import InputError
 
@@ -24,7 +25,7 @@ PAGE = "where-methods-fail.md"
 ASSETS = "assets/stability"
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = commands.add_parser(
         "stability",

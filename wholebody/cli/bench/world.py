@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.bench.publishing import add_common, publish
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ LONGEST = 1000.0  # minutes
 PARTS = ("closed", "throws", "drops", "long")
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = commands.add_parser(
         "world",

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wholebody.cli.arguments import Commands
+
 if TYPE_CHECKING:
     from wholebody.figures import Figure
     from wholebody.motion.clip import Clip
@@ -16,7 +18,7 @@ MOST_JOBS = 4096
 
 
 def add_command(
-    commands: argparse._SubParsersAction[argparse.ArgumentParser], name: str, help: str, description: str,
+    commands: Commands, name: str, help: str, description: str,
     epilog: str = "", many: bool = False,
 ) -> argparse.ArgumentParser:  # fmt: skip
     """Add a command that takes the file of a clip, or of several, and the figure that it moves."""

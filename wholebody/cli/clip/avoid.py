@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.clip.arguments import add_command, add_equipment, add_jobs, bar, figure_of, jobs_of
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ METHOD, WORN, FOLDER = "trajectory", "nothing", "freed"
 WIDE = 120  # letters that a line of a batch's table needs
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = add_command(commands, "avoid", "free motions of collisions", DESCRIPTION, EPILOG, many=True)
     parser.add_argument(

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.clip.arguments import add_command, add_equipment, add_jobs, bar, figure_of, jobs_of
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ MOST = 20  # lines of a table
 WIDE = 110  # letters that its lines need
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = add_command(
         commands, "check", "what overlaps in motions, when and how deep", DESCRIPTION, EPILOG, many=True

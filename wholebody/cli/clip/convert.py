@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.clip.arguments import add_command, clip_of
 
 DESCRIPTION = """\
@@ -16,7 +17,7 @@ examples:
   wholebody clip convert walk.npz slow.bvh --dt 0.04 --mirror"""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = add_command(commands, "convert", "write a motion in another format", DESCRIPTION, EPILOG)
     parser.add_argument("out", type=Path, metavar="OUT", help="the file to write")

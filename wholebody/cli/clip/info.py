@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.clip.arguments import add_command, clip_of
 
 DESCRIPTION = """\
@@ -12,7 +13,7 @@ greatest speed."""
 MOST = 12
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = add_command(commands, "info", "what a file of motion holds", DESCRIPTION)
     parser.set_defaults(run=run)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.clip.arguments import add_command, clip_of
 
 DESCRIPTION = """\
@@ -19,7 +20,7 @@ VIEW = (1.6, 1.0, 0.5)
 """Direction from the figure to the camera: from in front, from the left and from above."""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = add_command(commands, "play", "show a motion", DESCRIPTION, EPILOG)
     parser.add_argument("--ghost", type=Path, metavar="FILE", help="another motion of the figure, shown transparent")

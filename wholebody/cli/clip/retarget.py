@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.cli.arguments import Commands
 from wholebody.cli.clip.arguments import add_command, add_jobs, bar, figure_of, jobs_of
 
 DESCRIPTION = """\
@@ -19,7 +20,7 @@ examples:
   wholebody clip retarget walk.bvh run.bvh jump.bvh clips --jobs 4"""
 
 
-def add_to(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = add_command(commands, "retarget", "skeletons' motions for a figure", DESCRIPTION, EPILOG, many=True)
     parser.add_argument(

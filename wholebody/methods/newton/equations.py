@@ -12,6 +12,7 @@ from wholebody.arrays import Array
 from wholebody.methods.newton.angles import Angle
 from wholebody.methods.newton.batches import Batch, Coincide, Key, Slide, Turn, Unit
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
+from wholebody.records import with_values
 
 
 class Row(NamedTuple):
@@ -89,8 +90,8 @@ class EquationSet:
         """A copy whose equalities are goals."""
         result = EquationSet()
         for key, rows in self.rows.items():
-            result.rows.setdefault(key._replace(goal=not key.one_sided), []).extend(rows)
-        result.made = [(make, key._replace(goal=not key.one_sided)) for make, key in self.made]
+            result.rows.setdefault(with_values(key, goal=not key.one_sided), []).extend(rows)
+        result.made = [(make, with_values(key, goal=not key.one_sided)) for make, key in self.made]
         return result
 
     def batches(self, count: int) -> list[tuple[Batch, Key]]:

@@ -19,6 +19,7 @@ from wholebody.arrays import Array
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.system import System
+from wholebody.records import with_values
 
 DAMPING = 1e-10  # redundant equations are tolerated at this loss of accuracy
 HALVINGS = 12  # of a step that is not accepted
@@ -80,7 +81,7 @@ def project(
             step, multiplier = algebra.solve(task, second)
             convexity = max(FIRST_CONVEXITY, LESS * convexity) if not algebra.convex() else 0.0
             while convexity and convexity < MOST_CONVEXITY:  # far from the answer: more of D, until it is convex
-                raised = task._replace(weight=(1.0 + convexity) * system.weight)
+                raised = with_values(task, weight=(1.0 + convexity) * system.weight)
                 step, multiplier = algebra.solve(raised, second)
                 if algebra.convex():
                     break
@@ -109,7 +110,7 @@ def _brought_back(
     for _ in range(BACK):
         if not np.isfinite(residual).all() or np.abs(residual).max(initial=0.0) <= tolerance:
             break
-        back = task._replace(values=system.values(x), gradient=np.zeros(len(x)), residual=residual)
+        back = with_values(task, values=system.values(x), gradient=np.zeros(len(x)), residual=residual)
         try:
             x = x + algebra.solve(back)[0]
         except SingularSystemError:

@@ -19,6 +19,7 @@ from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.refinement import refine
 from wholebody.methods.starts import Minima, bent, restarts
+from wholebody.records import with_values
 from wholebody.solution import Solution, TraceEntry
 
 SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessment uses norms over the rows of a goal
@@ -153,7 +154,7 @@ class Search:
         active_system, tolerance = self.active_system, self.settings.tolerance
         x, spent = refine(active_system, found.reached.x, active_system.objective.value, tolerance=tolerance)
         self.iterations += spent
-        lower = self._judged(found.reached._replace(x=x), found.how)
+        lower = self._judged(with_values(found.reached, x=x), found.how)
         return lower if self._serves(lower) and self._better(lower, found) else found
 
     def _least_violation(self, best: Found, q: Array) -> Found:
@@ -164,7 +165,7 @@ class Search:
         found = self._go(q, best.how, self.settings.iterations)
         self.active_system = whole
         stationary = best.reached.stationary or found.reached.stationary
-        found = found._replace(reached=found.reached._replace(stationary=stationary))
+        found = with_values(found, reached=with_values(found.reached, stationary=stationary))
         return found if self._better(found, best) else best
 
     def _judged(self, reached: FeasibilityResult, how: str) -> Found:

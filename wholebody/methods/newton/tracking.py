@@ -20,6 +20,7 @@ from wholebody.methods.newton.multistart import SHARPER, Search, Settings
 from wholebody.moving_things import Collision
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
+from wholebody.records import with_values
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
 
@@ -92,7 +93,7 @@ class NewtonTracker:
         motion, step = self.workspace.next_frame(), self.frame(q, tolerance)
         if motion is None:
             return step
-        return step._replace(collisions=judged(self.workspace, motion, q, step.q))
+        return with_values(step, collisions=judged(self.workspace, motion, q, step.q))
 
     def frame(self, q: Array, tolerance: float | None = None) -> NewtonStep:
         """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.

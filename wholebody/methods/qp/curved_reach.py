@@ -30,6 +30,7 @@ from wholebody.methods.qp.sqp import Iterate, LocalSolution
 from wholebody.methods.qp.subproblem import Rows, Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
+from wholebody.records import with_values
 
 ENDLESS = 1e3  # m: of relaxation, with which no pair is looked at
 WITHIN = 0.12  # m: pairs nearer than this get rows
@@ -107,7 +108,7 @@ class CurvedReach:
             foreseen = self._subproblem.violation(rows, x)
             pull = float(rows.soft_weight[: rows.goals].max(initial=1.0))
             goal = np.sqrt(foreseen.goal**2 + float(weight @ (bend @ x) ** 2) / pull)
-            gain = here.violation.total - foreseen._replace(goal=float(goal)).total
+            gain = here.violation.total - with_values(foreseen, goal=float(goal)).total
             held = not within or max(here.violation.hold, here.violation.elastic) <= enough
             if gain <= (flat * here.violation.total if held else enough):
                 converged = True

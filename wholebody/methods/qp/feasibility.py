@@ -29,6 +29,7 @@ from wholebody.methods.qp.sqp import Iterate, LocalSolution, stalls
 from wholebody.methods.qp.subproblem import BOX, Subproblem, Violation
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
+from wholebody.records import with_values
 from wholebody.solution import TraceEntry
 
 STEP = 0.2  # rad, m: most that a degree of freedom moves in a program; larger = fewer programs, limbs jump over others
@@ -75,7 +76,9 @@ class Feasibility:
         if local.violation.worst <= self.tolerance or not directions.any() or directions.all():
             return local
         other = self._attempt(start, directions, True, local.iterations)
-        return other if other.violation.total < local.violation.total else local._replace(iterations=other.iterations)
+        return (
+            other if other.violation.total < local.violation.total else with_values(local, iterations=other.iterations)
+        )
 
     def once(self, start: Array) -> LocalSolution:
         """The same by one attempt, with places and directions together: for one start of many."""
@@ -121,7 +124,7 @@ class Feasibility:
         soft_weight[: rows.goals] *= weight
         none = np.zeros(len(rows.soft_error))
         return self.subproblem.program(
-            here.at, rows._replace(soft_weight=soft_weight), box / BOX, None, DAMPING, none, False
+            here.at, with_values(rows, soft_weight=soft_weight), box / BOX, None, DAMPING, none, False
         )
 
     def _directions(self, q: Array) -> Mask:
@@ -171,7 +174,7 @@ class Feasibility:
 
 
 def _merit(violation: Violation, goal: float) -> float:
-    return violation._replace(goal=goal).total
+    return with_values(violation, goal=goal).total
 
 
 def _end(here: Iterate, converged: bool, count: int) -> LocalSolution:

@@ -20,6 +20,7 @@ from wholebody.methods.qp.sqp import SQP, LocalSolution
 from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.starts import Minima, restarts, throughout
 from wholebody.problem import Problem
+from wholebody.records import with_values
 from wholebody.solution import TraceEntry
 from wholebody.workspace import Workspace
 
@@ -95,8 +96,8 @@ class Search:
         if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than what is asked
         if self._out_of_reach:  # which is known, although a nearer posture may be near
-            self._best = self.best._replace(converged=True)
-        return self.best._replace(converged=False) if self.control.reason else self.best
+            self._best = with_values(self.best, converged=True)
+        return with_values(self.best, converged=False) if self.control.reason else self.best
 
     def _try_ways(self) -> None:
         start = self.problem.scene.figure.clamp(self.problem.start)
@@ -257,7 +258,7 @@ class Search:
             self._accept(nearest, self.how)
             nearest = self._descend(self.best.q, note="nearest", measures=False)
         self._accept(nearest, self.how)
-        self._best = self.best._replace(converged=self.best.converged or nearest.converged)
+        self._best = with_values(self.best, converged=self.best.converged or nearest.converged)
 
     def _come_near(self) -> None:
         """Where the goals are out of reach, come as near as goes without passing through anything."""
@@ -291,8 +292,8 @@ class Search:
         stayed = self._descent(most, nearest, "nearest").run(local.q)
         self.spent += stayed.iterations
         left = float(np.linalg.norm(self._goal_errors(stayed.q)))
-        violation = stayed.violation._replace(goal=left, left=left)
-        return stayed._replace(violation=violation, converged=local.converged)
+        violation = with_values(stayed.violation, goal=left, left=left)
+        return with_values(stayed, violation=violation, converged=local.converged)
 
     def _goal_errors(self, q: Array) -> Array:
         state = self.lineariser.state.update(q)

@@ -26,6 +26,7 @@ from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import ERROR_CLAMP, Rows, Subproblem, Violation
 from wholebody.methods.qp.working_set import WorkingSet
+from wholebody.records import with_values
 from wholebody.solution import TraceEntry
 
 FIRST_RADIUS = 0.3  # rad, m: of the trust region; larger = fewer iterations in the open, more rejected ones in clutter
@@ -298,8 +299,8 @@ class SQP:
     def _judge(self, here: Iterate, there: Iterate, predicted: PredictedReduction) -> StepAcceptance:
         """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""
         if self._anchor is not None:
-            predicted = predicted._replace(
-                violation=max(0.1 * predicted.violation, 1e-3 * self._anchor.violation.total)
+            predicted = with_values(
+                predicted, violation=max(0.1 * predicted.violation, 1e-3 * self._anchor.violation.total)
             )
         before = here if self._anchor is None else self._anchor
         return self._funnel.judge(

@@ -23,6 +23,7 @@ from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.moving_things import MOST_SHARES, Collision, FrameMotion
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
+from wholebody.records import with_values
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
 
@@ -225,7 +226,7 @@ class QPTracker:
         self._program.take(self.dt)
         collisions = motion.collisions(path)
         workspace.keep(motion, collisions)
-        return _together(model, path, steps, self.dt)._replace(collisions=collisions)
+        return with_values(_together(model, path, steps, self.dt), collisions=collisions)
 
     def _speeds(self, q: Array) -> Array | None:
         """Largest displacements (2, nv) of the step from q (nq,) that bounds on speeds allow; None without."""
@@ -372,7 +373,8 @@ def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequ
     for step in steps:
         for by, count in step.programs.items():
             programs[by] = programs.get(by, 0) + count
-    return steps[-1]._replace(
+    return with_values(
+        steps[-1],
         displacement=displacement,
         velocity=displacement / dt,
         exact=all(step.exact for step in steps),

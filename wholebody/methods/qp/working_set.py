@@ -9,6 +9,7 @@ from wholebody.arrays import Array, Mask
 from wholebody.methods.qp.active_set import BOUND_TOLERANCE, FULL_CORRECTIONS, ROW_TOLERANCE, compiled_kernel
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
+from wholebody.records import with_values
 
 NEAR = 0.03  # m: rows lacking less than this at x = 0 are in from the beginning
 ROUNDS = 8  # most times that rows are added before all of them are
@@ -104,7 +105,7 @@ class WorkingSet:
             chosen |= missed
         active = ActiveSet(answer.active.lower, answer.active.upper, pushing)
         self._remember(active, key)
-        return answer._replace(active=active, iterations=iterations, by=self.solver.count(closed))
+        return with_values(answer, active=active, iterations=iterations, by=self.solver.count(closed))
 
     def _remember(self, active: ActiveSet, key: NDArray[np.intp]) -> None:
         self.held = np.array([active.lower, active.upper])

@@ -1,4 +1,4 @@
-"""Interpolation of postures between key frames, on the configuration manifold, a free root included."""
+"""Interpolation of postures between key frames, on the configuration manifold, and which frames those are."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.arrays import Array, Mask
 
 Kind = Literal["linear", "quadratic"]
 
@@ -42,3 +42,29 @@ def fill(model: pin.Model, q: Array, a: int, m: int, b: int, kind: Kind) -> None
             q[frame] = linear(model, a, m, ends[0], ends[1], frame)
         else:
             q[frame] = linear(model, m, b, ends[1], ends[2], frame)
+
+
+def key_frames(model: pin.Model, q: Array, moving: Mask, deviation: float) -> tuple[int, ...]:
+    """Frames between which linear interpolation misses no frame by more than a deviation.
+
+    An interval is split at the frame that is missed most (Ramer 1972; Douglas and Peucker 1973), from the whole motion
+    on. The first and the last frame are among them.
+
+    Args:
+        model: Pinocchio's model.
+        q: (n, nq) postures.
+        moving: (nv,) the degrees of freedom that count.
+        deviation: radians and metres.
+    """
+    found, waiting = {0, len(q) - 1}, [(0, len(q) - 1)]
+    while waiting:
+        a, b = waiting.pop()
+        missed = [
+            np.abs(pin.difference(model, linear(model, a, b, q[a], q[b], k), q[k])[moving]).max(initial=0.0)
+            for k in range(a + 1, b)
+        ]
+        if missed and max(missed) > deviation:
+            worst = a + 1 + int(np.argmax(missed))
+            found.add(worst)
+            waiting += [(a, worst), (worst, b)]
+    return tuple(sorted(found))

@@ -13,8 +13,7 @@ from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
-from wholebody.motion.bisection.interpolation import Kind
-from wholebody.motion.bisection.key_frames import key_frames
+from wholebody.motion.bisection.interpolation import Kind, key_frames
 from wholebody.motion.bisection.path_planes import ANKLES, ELBOWS
 from wholebody.motion.bisection.prediction import Predictor
 from wholebody.motion.bisection.recursion import Recursion, changed_frames, hold_between

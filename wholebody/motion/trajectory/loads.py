@@ -26,6 +26,7 @@ from wholebody.motion.strength import Strength, torque_limits
 from wholebody.motion.torques import CUTOFF, smoothed
 from wholebody.motion.trajectory.chart import Chart
 from wholebody.motion.trajectory.retiming import TimedRows
+from wholebody.records import with_values
 
 FRICTION = 0.8
 """Coefficient of friction of the ground, as that of `wb.torques`."""
@@ -100,7 +101,7 @@ class ClipLoads:
             far if here is stand else np.full(len(stand.normals), far.max(initial=0.0))
             for far, here, stand in zip(bounds.outside, own, stands, strict=True)
         ]
-        return cls(clip, dynamics, stands, bounds._replace(outside=tuple(outside)))
+        return cls(clip, dynamics, stands, with_values(bounds, outside=tuple(outside)))
 
     def motion(self, before: Array, here: Array, after: Array) -> tuple[Array, Array]:
         """Velocity and acceleration (nv,) of the middle one of three postures (nq,), by central differences."""
@@ -136,7 +137,7 @@ class ClipLoads:
         if times is None:
             return ClipLoads(clip, self.dynamics, self.stands, self.bounds)
         nearest = np.clip(np.rint(times / self.dt).astype(int), 0, len(self.base) - 1)
-        bounds = self.bounds._replace(outside=tuple(self.bounds.outside[frame] for frame in nearest))
+        bounds = with_values(self.bounds, outside=tuple(self.bounds.outside[frame] for frame in nearest))
         return ClipLoads(clip, self.dynamics, [self.stands[frame] for frame in nearest], bounds)
 
     def timed(self, b: Array) -> TimedRows:

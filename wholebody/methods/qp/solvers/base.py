@@ -11,6 +11,7 @@ from wholebody.arrays import Array
 from wholebody.methods.qp.active_set import lacking, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.fallback import NOT_EXACT, SEMISMOOTH, last_resort
+from wholebody.records import with_values
 
 ACTIVE_SET = "active set"
 """What `QPSolution.by` says of answers that the hot start found: an active set that was known, corrected."""
@@ -57,7 +58,7 @@ class QPSolver(ABC):
             return self.solve_cold(program)
         solution = solve_from(program, lacking(program) if guess is None else guess, WARM_CORRECTIONS)
         if solution is not None:
-            return solution._replace(by=ACTIVE_SET)
+            return with_values(solution, by=ACTIVE_SET)
         if len(program.target) + len(program.least) > LARGEST:
             return last_resort(program, np.zeros(program.size), 0)
         return self.solve_cold(program)

@@ -6,6 +6,7 @@ from wholebody.arrays import Array
 from wholebody.methods.qp.active_set import guess_active_set, solve_from
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.semismooth_newton import minimise
+from wholebody.records import with_values
 
 SEMISMOOTH = "semismooth newton"
 """What `QPSolution.by` says of answers that `last_resort` found."""
@@ -36,7 +37,7 @@ def finish(program: QuadraticProgram, x: Array, iterations: int, by: str) -> QPS
         by: name of the solver it came from.
     """
     solution = solve_from(program, guess_active_set(program, x, GUESS_TOLERANCE), CORRECTIONS)
-    return None if solution is None else solution._replace(iterations=iterations, by=by)
+    return None if solution is None else with_values(solution, iterations=iterations, by=by)
 
 
 def last_resort(program: QuadraticProgram, x: Array, iterations: int) -> QPSolution:
@@ -50,6 +51,6 @@ def last_resort(program: QuadraticProgram, x: Array, iterations: int) -> QPSolut
     x, active, used = minimise(program, x, LAST_ITERATIONS)
     solution = solve_from(program, active, CORRECTIONS)
     if solution is not None:
-        return solution._replace(iterations=iterations + used, by=SEMISMOOTH)
+        return with_values(solution, iterations=iterations + used, by=SEMISMOOTH)
     exact = program.optimality(x) <= EXACT
     return QPSolution(x, active, exact, iterations + used, SEMISMOOTH if exact else NOT_EXACT)

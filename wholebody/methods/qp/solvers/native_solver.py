@@ -13,6 +13,7 @@ from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.fallback import CORRECTIONS, last_resort
 from wholebody.methods.qp.solvers.split_form import SCALE, SplitForm, read_active, scaled_split, slots_for
+from wholebody.records import with_values
 
 
 class Native(NamedTuple):
@@ -62,7 +63,7 @@ class NativeSolver(QPSolver):
             x = self._own = np.where(np.isfinite(found.z[:n]), found.z[:n], 0.0) / SCALE
             solution = solve_from(program, read_active(found.box, found.push[:k]), CORRECTIONS)
             if solution is not None:
-                return solution._replace(iterations=iterations, by=self.name)
+                return with_values(solution, iterations=iterations, by=self.name)
             self._workspace = None
         return last_resort(program, x, iterations)
 

@@ -21,6 +21,7 @@ from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, Quadra
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
 from wholebody.methods.qp.solvers.fallback import CORRECTIONS, last_resort
 from wholebody.methods.qp.solvers.split_form import HEAVIEST, IDLE, SCALE, read_active, slots_for
+from wholebody.records import with_values
 
 RHO = 0.1  # OSQP's step length at the beginning; it adapts
 ROUNDS = (25, 50, 100, 200, 400)  # iterations, until an active set read off the multipliers settles
@@ -60,7 +61,7 @@ class OSQPSolver(QPSolver):
             iterations += workspace.run(limit)
             solution = solve_from(program, workspace.active(), CORRECTIONS)
             if solution is not None:
-                return solution._replace(iterations=iterations, by=self.name)
+                return with_values(solution, iterations=iterations, by=self.name)
         return last_resort(program, workspace.x(), iterations)
 
     def workspace(self, program: QuadraticProgram) -> Workspace:
@@ -88,7 +89,7 @@ class ActiveSetSolver(QPSolver):
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise from no bounds and the rows that x = 0 does not meet; see `QPSolver.solve_cold`."""
         solution = solve_from(program, lacking(program), WARM_CORRECTIONS)
-        return self._osqp.solve_cold(program) if solution is None else solution._replace(by=ACTIVE_SET)
+        return self._osqp.solve_cold(program) if solution is None else with_values(solution, by=ACTIVE_SET)
 
 
 class Workspace:

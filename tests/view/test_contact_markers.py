@@ -9,7 +9,7 @@ import wholebody as wb
 from wholebody.dynamics.overlaps import overlaps
 from wholebody.errors import InputError
 from wholebody.view import Viewer
-from wholebody.view.overlap_markers import mark_overlaps
+from wholebody.view.contact_markers import mark_overlaps
 from wholebody.view.scene_graph import Keyframe
 
 

@@ -1,11 +1,19 @@
-"""What `wholebody interact` and `wholebody world` share: a scene, all of them, or their list."""
+"""What the parsers of several commands share: the type of a group of commands, and the choice of a scene."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from typing import Any, Protocol
 
 from wholebody.errors import InputError, UnknownNameError
+
+
+class Commands(Protocol):
+    """A group of commands, as `argparse` makes it by `add_subparsers`."""
+
+    def add_parser(self, name: str, /, **options: Any) -> argparse.ArgumentParser:
+        """Add a command; the options are those of `argparse.ArgumentParser`, and `help`."""
 
 
 def scene_names(arguments: argparse.Namespace, scenes: Mapping[str, str], command: str, *, files: bool) -> list[str]:
