@@ -175,7 +175,11 @@ def make_plan(
     parts[BODY] = [
         ((parent, first, width), np.array([inertia.mass, *inertia.lever]))
         for parent, first, width, inertia in zip(
-            model.parents.tolist(), model.idx_vExtendeds.tolist(), model.nvExtendeds.tolist(), model.inertias, strict=True
+            model.parents.tolist(),
+            model.idx_vExtendeds.tolist(),
+            model.nvExtendeds.tolist(),
+            model.inertias,
+            strict=True,
         )
     ]
     columns = extended_columns(model)
