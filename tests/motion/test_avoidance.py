@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ import wholebody as wb
 from wholebody.cli import main
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import METHODS
-from wholebody.motion.avoider import AvoidProgress
+from wholebody.motion.avoider import AvoidProgress, MethodResult
 
 DT = 1 / 30
 BALL, RADIUS, LINK, WIDTH = np.array([0.95, 0.0]), 0.1, 0.5, 0.02
@@ -219,6 +221,45 @@ def test_a_two_handed_grip_is_kept(human: Figure) -> None:
     found = wb.avoid(clip, constraints=[wb.Hold("left_hand", relative_to="right_hand")])
     assert found.report.solved, found.report.message
     assert found.report.missed < 1e-4
+
+
+@dataclass(frozen=True)
+class Replaced:
+    """A method that gives other postures, whatever is asked."""
+
+    q: np.ndarray
+    name: str = "replaced"
+
+    def avoid(self, *asked: object) -> MethodResult:
+        return MethodResult(self.q)
+
+
+@pytest.mark.parametrize(
+    ("term", "joints", "name"),
+    [
+        (wb.Hold("left_hand", relative_to="right_hand"), {"left_elbow_flexion": 0.8}, "Hold('left_hand')"),
+        (wb.Freeze("left_arm"), {"left_elbow_flexion": 0.8}, "Freeze('left_arm')"),
+        (wb.StanceFeet(), {"left_knee_flexion": 0.4}, "Hold('left_heel')"),
+    ],
+)
+def test_a_free_clip_that_misses_what_is_held_is_not_solved(
+    human: Figure, term: Any, joints: dict[str, float], name: str
+) -> None:
+    """Nothing collides in it; one frame of many misses what is held, and the message says what and when."""
+    q = np.array([human.with_joints(human.posture("standing"), {"left_elbow_flexion": 0.3})] * 12)
+    other = q.copy()
+    other[6] = human.with_joints(q[6], joints)
+    clip, scene = wb.Clip(human, q, DT), wb.Scene(human)
+    found = wb.avoid(clip, scene, method=Replaced(other), constraints=[term], hold_feet=False)
+    assert found.report.after.free
+    assert not found.report.solved
+    assert found.report.missed > 1e-2
+    assert f"{name} is missed by" in found.report.message
+    assert "at 0.20 s" in found.report.message
+    assert str(found.report).startswith("not free")
+    kept = wb.avoid(clip, scene, method=Replaced(q), constraints=[term], hold_feet=False)
+    assert kept.report.solved, kept.report.message
+    assert kept.report.missed < 1e-9
 
 
 def test_both_solvers_give_the_same_clip(planar_arm: Callable[..., Figure]) -> None:
