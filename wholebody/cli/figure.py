@@ -17,6 +17,7 @@ examples:
   wholebody figure human --sex female --stature 1.62 --mass 60
   wholebody figure human --sex female --stature 1.62 --mass 60 --out small-woman.urdf
   wholebody figure human --sex female --percentile 5
+  wholebody figure human --hands fingers --out with-fingers.urdf
   wholebody figure robot.urdf"""
 
 
@@ -32,6 +33,7 @@ def add_to(commands: Commands) -> None:
     parser.add_argument(
         "--detail", choices=("spheres", "capsules", "hulls"), help="detail of the geometry (default: capsules)"
     )
+    parser.add_argument("--hands", choices=("rigid", "fingers"), help="of a person: one segment each, or fingers")
     parser.add_argument("--out", type=Path, metavar="FILE.urdf", help="write a person's URDF to this file")
     parser.set_defaults(run=run)
 
@@ -44,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.figures import load
 
     given: dict[str, Any] = {
-        name: getattr(arguments, name) for name in ("sex", "stature", "mass", "percentile", "detail")
+        name: getattr(arguments, name) for name in ("sex", "stature", "mass", "percentile", "detail", "hands")
     }
     options = {name: value for name, value in given.items() if value is not None}
     if arguments.out is not None:
@@ -63,6 +65,6 @@ def _write(name: str, options: dict[str, Any], out: Path) -> int:
     if out.suffix != ".urdf":
         raise InputError(f"--out: {out} does not end in .urdf; give it that ending")
     person = body(options.get("sex", "male"), options.get("stature"), options.get("mass"), options.get("percentile"))
-    write_human(out, person)
+    write_human(out, person, options.get("hands", "rigid"))
     print(f"wrote {out}: {person.sex}, {person.stature:.3f} m, {person.mass:.1f} kg")
     return 0

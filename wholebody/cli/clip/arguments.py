@@ -36,6 +36,7 @@ def add_command(
     figure.add_argument("--stature", type=float, metavar="M", help="height of a person, m (default: median)")
     figure.add_argument("--mass", type=float, metavar="KG", help="mass of a person, kg (default: from the stature)")
     figure.add_argument("--percentile", type=float, metavar="P", help="of stature and mass if not given, 1 to 99")
+    figure.add_argument("--hands", choices=("rigid", "fingers"), help="of a person: one segment each, or fingers")
     figure.add_argument("--detail", choices=("spheres", "capsules", "hulls"), help="geometry (default: capsules)")
     return parser
 
@@ -99,7 +100,7 @@ def figure_of(arguments: argparse.Namespace) -> Figure:
     from wholebody.figures import load
 
     given: dict[str, Any] = {
-        name: getattr(arguments, name) for name in ("sex", "stature", "mass", "percentile", "detail")
+        name: getattr(arguments, name) for name in ("sex", "stature", "mass", "percentile", "detail", "hands")
     }
     return load(arguments.figure, **{name: value for name, value in given.items() if value is not None})
 
