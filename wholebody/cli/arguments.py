@@ -16,7 +16,7 @@ class Commands(Protocol):
         """Add a command; the options are those of `argparse.ArgumentParser`, and `help`."""
 
 
-PERSON = ("sex", "stature", "mass", "percentile", "proportions", "age", "detail")
+PERSON = ("sex", "stature", "mass", "percentile", "proportions", "age", "detail", "hands")
 """Options of `wb.load` that `add_person` adds."""
 
 
@@ -34,6 +34,7 @@ def add_person(parser: Any) -> None:
     parser.add_argument(
         "--detail", choices=("spheres", "capsules", "hulls"), help="detail of the geometry (default: capsules)"
     )
+    parser.add_argument("--hands", choices=("rigid", "fingers"), help="of a person: one segment each, or fingers")
 
 
 def person_options(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -18,6 +18,7 @@ examples:
   wholebody figure human --sex female --stature 1.62 --mass 60 --out small-woman.urdf
   wholebody figure human --sex female --percentile 5 --age 60
   wholebody figure human --stature 1.80 --proportion sitting_height=0.96
+  wholebody figure human --hands fingers --out with-fingers.urdf
   wholebody figure robot.urdf"""
 
 
@@ -55,8 +56,8 @@ def _write(name: str, options: dict[str, Any], out: Path) -> int:
         raise InputError("--out writes the person in capsules; write: wholebody figure human --out FILE.urdf")
     if out.suffix != ".urdf":
         raise InputError(f"--out: {out} does not end in .urdf; give it that ending")
-    size = {name: value for name, value in options.items() if name != "proportions"}
+    size = {name: value for name, value in options.items() if name not in ("proportions", "hands")}
     person = proportioned(body(**size), options.get("proportions"))
-    write_human(out, person)
+    write_human(out, person, options.get("hands", "rigid"))
     print(f"wrote {out}: {person.sex}, {person.stature:.3f} m, {person.mass:.1f} kg")
     return 0

@@ -12,8 +12,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from wholebody.errors import UnknownNameError
-from wholebody.figures import human_capsules, human_hulls, human_spheres
+from wholebody.checks import known
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures import human_capsules, human_fingers, human_hulls, human_spheres
 from wholebody.figures.anthropometry import Body, body, describe, table
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
 from wholebody.figures.dimensions import MIDDLE_TIP, Dimensions
@@ -29,17 +30,27 @@ OLDER = 45.0
 """Years from which on the ranges of motion are those of older people: the bands of Soucie et al. (2011)."""
 
 
-def human_spec(person: Body | None = None, detail: str = "capsules") -> BodySpec:
+def human_spec(person: Body | None = None, detail: str = "capsules", hands: str = "rigid") -> BodySpec:
     """Return the specification of a person.
 
     Args:
         person: from `wholebody.figures.anthropometry.body`; the median man if left out.
         detail: "spheres", "capsules" or "hulls": the collision pieces.
+        hands: "rigid": each is one segment; "fingers": each has twenty joints.
 
     Raises:
-        UnknownNameError: another detail.
+        UnknownNameError: another detail or other hands.
+        InputError: fingers in spheres.
     """
     person = person or body()
+    known(hands, human_fingers.HANDS, "kind of hands", "human")
+    if hands == "fingers" and detail == "spheres":
+        raise InputError("hands='fingers': the 39 spheres have none for fingers; give detail 'capsules' or 'hulls'")
+    spec = _spec(person, detail)
+    return human_fingers.with_fingers(spec, Dimensions(person), detail) if hands == "fingers" else spec
+
+
+def _spec(person: Body, detail: str) -> BodySpec:
     return BodySpec(
         name="human",
         title=describe(person),

@@ -82,7 +82,7 @@ def _figure(figure: Figure, target: Path) -> dict[str, Any]:
     if options.get("package_dirs"):
         options = {**options, "package_dirs": [_beside(str(folder), target) for folder in options["package_dirs"]]}
     known = {
-        "sex", "stature", "mass", "percentile", "proportions", "age", "detail", "side", "root", "package_dirs",
+        "sex", "stature", "mass", "percentile", "proportions", "age", "detail", "hands", "side", "root", "package_dirs",
         "concavity",
     }  # fmt: skip
     for option in options:
