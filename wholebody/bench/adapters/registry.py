@@ -126,6 +126,7 @@ def _rows() -> dict[str, _Row]:
     rows["mink"] = _Row(partial(_outside, "mink"), *mink)
     rows["mink/hard"] = _Row(partial(_outside, "mink", "hard"), *mink)
     rows["drake"] = _Row(partial(_outside, "drake"), ("pydrake",), "drake")
+    rows["optik"] = _Row(partial(_outside, "optik"), ("optik",), "optik")
     for family in ("qp", "newton", "ccd"):
         rows[f"{family}/{ONE}"] = _Row(partial(one_start, family))
     for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake"):
