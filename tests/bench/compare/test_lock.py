@@ -7,14 +7,20 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.bench.compare.lock import Figure, Locked, differences, in_words, read_lock, shares, write_lock
+from wholebody.bench.compare.lock import Figure, Locked, differences, in_words, locked, read_lock, shares, write_lock
+from wholebody.bench.compare.pages import Material
+from wholebody.bench.compare.record import Record
+from wholebody.bench.compare.results import Results
+from wholebody.bench.compare.solving import JUDGED
+from wholebody.bench.compare.store import Chunk
+from wholebody.bench.compare.summary import summaries
 from wholebody.cli import main
 from wholebody.errors import FileFormatError, InputError, UnknownNameError
 
 AMOUNTS = {"cases": 2, "sweep": 0, "levels": 1, "seed": 5, "cap": 5.0, "minutes": 1.0}
 FIGURES = {
     ("robot_arm", "qp", "solved"): Figure(0.98, 0.95, 0.99),
-    ("robot_arm", "qp", "mean time"): Figure(3.0, 2.5, 3.5),
+    ("robot_arm", "qp", "median time"): Figure(3.0, 2.5, 3.5),
     ("robot_arm", "dls", "solved"): Figure(0.5, 0.4, 0.6),
 }
 PUBLISHED = Locked(("robot_arm",), ("dls",), AMOUNTS, {"wholebody": "0.1", "load": "3"}, FIGURES)
@@ -38,7 +44,7 @@ def test_only_what_is_beyond_both_intervals_differs() -> None:
     assert differences(PUBLISHED, changed(key, Figure(0.58, 0.55, 0.61))) == []  # within what was published
     (one,) = differences(PUBLISHED, changed(key, Figure(0.7, 0.65, 0.75)))
     assert (one.method, one.what) == ("dls", "solved")
-    slower = differences(PUBLISHED, changed(("robot_arm", "qp", "mean time"), Figure(9.0, 8.0, 10.0)))
+    slower = differences(PUBLISHED, changed(("robot_arm", "qp", "median time"), Figure(9.0, 8.0, 10.0)))
     assert len(slower) == 1
     assert shares(slower) == []
 
@@ -74,3 +80,27 @@ def test_a_comparison_is_done_again(tmp_path: Path, capsys: pytest.CaptureFixtur
     capsys.readouterr()
     assert main(["bench", "reproduce", str(out / "lock.json"), "--out", str(tmp_path / "second")]) == 0
     assert "0 differ" in capsys.readouterr().out
+
+
+def test_a_time_in_kernels_is_as_uncertain_as_the_kernel() -> None:
+    chunks, records = [], []
+    for number in range(9):
+        record = Record("robot_arm", number, "dls", 1e-4, 0, "answered", seconds=0.06, **dict.fromkeys(JUDGED, 0.0))
+        records.append(record)
+        chunks.append(Chunk("robot_arm", number, (record,), kernel=0.02 if number % 2 else 0.03))
+    settings = PUBLISHED.settings()
+    results = Results(records, ["robot_arm"], ["dls"])
+    found = locked(Material(settings, chunks, results, summaries(results, chunks), {}, {}))
+    time = found.figures["robot_arm", "dls", "median time"]
+    assert time.value == pytest.approx(2.0)
+    assert (time.low, time.high) == pytest.approx((2.0, 3.0))  # each solve took the same, the kernel did not
+
+
+def test_the_published_lock_is_of_this_version_and_a_changed_figure_is_told(root: Path) -> None:
+    published = read_lock(root / "docs" / "assets" / "bench" / "small-lock.json")
+    assert published.settings().described()["cases"] == 12
+    said = f"{len(published.figures)} figures compared; 0 differ by more than their intervals."
+    assert in_words(published, published) == [said]
+    key = next(key for key in published.figures if key[2] == "solved" and published.figures[key].value > 0.9)
+    other = replace(published, figures={**published.figures, key: Figure(0.1, 0.05, 0.2)})
+    assert [one[:3] for one in differences(other, published)] == [key]

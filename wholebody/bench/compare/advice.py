@@ -158,7 +158,7 @@ def _in_doubt(results: Results, ranked: Sequence[Standing]) -> str:
     alike = paired.best({name: paired.times(results, results.sets, name) for name in names})
     apart = "" if len(alike) == 1 else " Their times cannot be told apart." if len(paired.algorithms(alike)) > 1 else ""
     if not apart and len(alike) > 1:
-        apart = " Its solvers' times cannot be told apart."
+        apart = " The times of its settings cannot be told apart."
     solves = "It solves" if len(paired.algorithms(alike)) == 1 else "Each solves"
     return (
         f"**If in doubt, take {named(alike)}.** {solves} at least {100 * GOOD:.0f} % of the problems in {most} of "

@@ -46,7 +46,7 @@ class Locked:
         sets, methods: names.
         amounts: the numbers of its settings.
         facts: of the machine and the versions.
-        figures: by set, method and name: "solved", as a share, and "mean time", in kernels.
+        figures: by set, method and name: "solved", as a share, and "median time" of an answer, in kernels.
     """
 
     sets: tuple[str, ...]
@@ -75,15 +75,19 @@ class Locked:
 
 
 def locked(given: Material) -> Locked:
-    """What a comparison found."""
-    kernel = 1e3 * kernel_of(given.chunks).value
+    """What a comparison found. An interval of a time in kernels has the uncertainty of the kernel's own time too."""
+    kernel = kernel_of(given.chunks)
     figures: dict[tuple[str, str, str], Figure] = {}
     for row in given.rows:
         if row.refused < row.cases:
             figures[row.set, row.method, "solved"] = Figure(row.success, row.success_low, row.success_high)
-            mean = (row.mean_ms / kernel, row.mean_low_ms / kernel, row.mean_high_ms / kernel)
-            if row.cases - row.refused >= LEAST and all(isfinite(value) for value in mean):
-                figures[row.set, row.method, "mean time"] = Figure(*mean)
+            times = (
+                1e-3 * row.median_ms / kernel.value,
+                1e-3 * row.median_low_ms / kernel.high,
+                1e-3 * row.median_high_ms / kernel.low,
+            )
+            if row.cases - row.refused >= LEAST and all(isfinite(value) for value in times):
+                figures[row.set, row.method, "median time"] = Figure(*times)
     asked = given.settings
     return Locked(
         tuple(family.name for family in asked.sets),
