@@ -110,6 +110,16 @@ def test_a_person_takes_the_place_of_the_percentile_of_a_file(folder: Path) -> N
     np.testing.assert_allclose(found[0].q, alone[0].q, atol=1e-6)
 
 
+def test_people_of_a_study_have_proportions_of_their_own(folder: Path) -> None:
+    near, far = wb.study(
+        folder / "task.toml", people=[{"proportions": {"span": 1.75}}, {"proportions": {"span": 1.90}}],
+        targets=[(3.0, 0.0, 1.0)],
+    )  # fmt: skip
+    assert near.goal_error > far.goal_error + 0.02
+    with pytest.raises(wb.UnknownNameError, match="no dimension is called 'spam'"):
+        wb.study(folder / "task.toml", people=[{"proportions": {"spam": 1.75}}])
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

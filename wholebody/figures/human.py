@@ -8,7 +8,7 @@ direction means the same on both sides: flexion, abduction, inward rotation, ele
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -24,6 +24,10 @@ DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
     "capsules": human_capsules.solids,
     "hulls": human_hulls.solids,
 }
+
+
+OLDER = 45.0
+"""Years from which on the ranges of motion are those of older people: the bands of Soucie et al. (2011)."""
 
 
 def human_spec(person: Body | None = None, detail: str = "capsules", hands: str = "rigid") -> BodySpec:
@@ -88,11 +92,35 @@ def _joints(person: Body) -> tuple[Joint, ...]:
     for row in rows:
         x, y, z = person.origin(row["name"])
         a, b, c = (float(value) for value in row["axis"].split())
-        low, high = math.radians(float(row["lower_deg"])), math.radians(float(row["upper_deg"]))
+        low, high = (math.radians(limit) for limit in joint_limits(person, row))
         joints.append(
             Joint(row["name"], child[row["parent"]], row["child_segment"], place(x, y, z), (a, b, c), low, high)
         )
     return tuple(joints)
+
+
+def joint_limits(person: Body, row: Mapping[str, str]) -> tuple[float, float]:
+    """Return the least and greatest angle of a joint, degrees.
+
+    From 45 years on they are scaled by the means of people of 45 to 69 over those of 20 to 44 (Soucie et al. 2011),
+    where both are known; else they are at most the older people's mean. Younger people have the limits of the table
+    "joints".
+
+    Args:
+        person: whose age and sex it is.
+        row: the joint in the table "joints".
+    """
+    limits = {"lower": float(row["lower_deg"]), "upper": float(row["upper_deg"])}
+    if person.age is None or person.age < OLDER:
+        return limits["lower"], limits["upper"]
+    for change in table("age_ranges"):
+        if row["name"].endswith(f"_{change['joint']}"):
+            end = change["limit"]
+            young, old = (change[f"{person.column}_{band}"] for band in ("20_44", "45_69"))
+            size = abs(limits[end])
+            size = size * float(old) / float(young) if young else min(size, float(old))
+            limits[end] = math.copysign(size, limits[end])
+    return limits["lower"], limits["upper"]
 
 
 def landmarks(size: Dimensions) -> tuple[Landmark, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -16,6 +17,7 @@ from wholebody.figures.hand import FINGERS, finger_degrees
 from wholebody.figures.human import human_spec
 from wholebody.figures.human_pairs import body_pairs, collision_group, sphere_pairs
 from wholebody.figures.motion_ranges import human_ranges
+from wholebody.figures.proportions import proportioned
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.records import with_values
@@ -31,6 +33,8 @@ def human_figure(
     mass: float | None = None,
     detail: str = "capsules",
     percentile: float | None = None,
+    proportions: Mapping[str, float] | None = None,
+    age: float | None = None,
     hands: str = "rigid",
 ) -> Figure:
     """Return the person.
@@ -41,13 +45,15 @@ def human_figure(
         mass: kilograms; the median, or what is expected at the stature that was given.
         detail: "spheres" (39, for whole motions), "capsules" (and boxes), "hulls" (convex polyhedra).
         percentile: 1 to 99, of the sex in ANSUR II, for stature and mass where they are left out.
+        proportions: metres by name of a dimension; the other dimensions follow as they go together in people.
+        age: years, 20 to 69: from 45 on some ranges of motion are smaller.
         hands: "rigid", one segment each, or "fingers", twenty joints each.
 
     Raises:
         InputError: an impossible body, or fingers in spheres.
-        UnknownNameError: an unknown detail or other hands.
+        UnknownNameError: an unknown detail or dimension, or other hands.
     """
-    person = body(sex, stature, mass, percentile)
+    person = proportioned(body(sex, stature, mass, percentile, age), proportions)
     return figure_of(human_spec(person, detail, hands), detail, person.sex)
 
 
@@ -163,10 +169,13 @@ def avatar_figure(
     mass: float | None = None,
     detail: str = "capsules",
     percentile: float | None = None,
+    proportions: Mapping[str, float] | None = None,
+    age: float | None = None,
 ) -> Figure:
     """Return the avatar; arguments as for the person.
 
     Two arms and two legs of seven joints and a neck of three, on a rigid torso (Schmidl & Lin): the person with spine,
     shoulder girdle and upper neck fixed.
     """
-    return figure_of(avatar_spec(body(sex, stature, mass, percentile), detail), detail)
+    person = proportioned(body(sex, stature, mass, percentile, age), proportions)
+    return figure_of(avatar_spec(person, detail), detail)

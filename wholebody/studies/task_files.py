@@ -17,8 +17,8 @@ from wholebody.taskfile.task import task_from
 TARGETED = ("point", "frame")
 """Types of goals whose target is a place."""
 
-SIZE = frozenset(("sex", "stature", "mass", "percentile"))
-"""Options of a figure that together say how large a person is."""
+SIZE = frozenset(("sex", "stature", "mass", "percentile", "proportions", "age"))
+"""Options of a figure that together say what person it is."""
 
 
 class TaskFile:
