@@ -138,7 +138,7 @@ def rhythms(
     elevations: Array, elevation_places: Integers, lumbars: Array, lumbar_places: Integers, q: Array, measure: Array
 ) -> None:
     """See `tasks.Rhythm`."""
-    if not len(girdles) + len(lumbars):
+    if not len(elevations) + len(lumbars):
         return
     slopes, at = np.empty(5), np.empty(5, dtype=np.int64)
     for e in range(len(elevations)):

@@ -1,7 +1,7 @@
 """The arms stretched sideways, where flexion and rotation of the shoulder turn about one axis: limits and measures.
 
-At 90 degrees of abduction, flexion and rotation by the same angle leave the arm as it was. What depends on the arm's rotation
-must not notice.
+At 90 degrees of abduction, flexion and rotation by the same angle leave the arm as it was. What depends on the arm's
+rotation must not notice.
 """
 
 from __future__ import annotations
