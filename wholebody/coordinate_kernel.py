@@ -135,22 +135,22 @@ def root_distances(tables: Array, places: Integers, q: Array, measure: Array) ->
 
 @compiled()
 def rhythms(
-    girdles: Array, girdle_places: Integers, lumbars: Array, lumbar_places: Integers, q: Array, measure: Array
+    elevations: Array, elevation_places: Integers, lumbars: Array, lumbar_places: Integers, q: Array, measure: Array
 ) -> None:
     """See `tasks.Rhythm`."""
-    if not len(girdles) + len(lumbars):
+    if not len(elevations) + len(lumbars):
         return
     slopes, at = np.empty(5), np.empty(5, dtype=np.int64)
-    for e in range(len(girdles)):
-        flexion, abduction = q[girdle_places[e, 1]], q[girdle_places[e, 2]]
-        rise = girdles[e, 1]
-        excess = q[girdle_places[e, 0]] - rise * (1.0 - np.cos(flexion) * np.cos(abduction))
+    for e in range(len(elevations)):
+        flexion, abduction = q[elevation_places[e, 1]], q[elevation_places[e, 2]]
+        rise = elevations[e, 1]
+        excess = q[elevation_places[e, 0]] - rise * (1.0 - np.cos(flexion) * np.cos(abduction)) - elevations[e, 2]
         slopes[0] = 1.0
         slopes[1] = -rise * np.sin(flexion) * np.cos(abduction)
         slopes[2] = -rise * np.cos(flexion) * np.sin(abduction)
         for k in range(3):
-            at[k] = girdle_places[e, 3 + k]
-        _square(girdles[e, 0], excess, slopes[:3], at[:3], measure)
+            at[k] = elevation_places[e, 3 + k]
+        _square(elevations[e, 0], excess, slopes[:3], at[:3], measure)
     for e in range(len(lumbars)):
         x, y, z, w = q[3], q[4], q[5], q[6]
         share = np.tanh(-lumbars[e, 2] * 2.0 * (x * z - y * w))

@@ -19,7 +19,9 @@ from wholebody.tasks.residuals import PlacementResidual
 RESIDUAL, PLANE, AXIS, MASS_CENTER, COORDINATE, TURN, ROOT, CONE, COUPLED, ELLIPSE, TWIST = range(11)
 """The tables of goals and constraints, by what a row of them stands for."""
 
-DISTANCE, DISCOMFORT, HEIGHT, BOX, LIMIT, BODY, CURVATURE, COLUMN, ROOT_DISTANCE, GIRDLE, LUMBAR, EDGE = range(11, 23)
+DISTANCE, DISCOMFORT, HEIGHT, BOX, LIMIT, BODY, CURVATURE, COLUMN, ROOT_DISTANCE, ELEVATION, LUMBAR, EDGE = range(
+    11, 23
+)
 """The other tables of a plan: of measures, of bounds, of the model, and of the edges of reach cones."""
 
 WIDTHS = {

@@ -31,8 +31,8 @@ from wholebody.term_entries import (
     DISCOMFORT,
     DISTANCE,
     EDGE,
+    ELEVATION,
     ELLIPSE,
-    GIRDLE,
     HEIGHT,
     LIMIT,
     LUMBAR,
@@ -148,7 +148,7 @@ def linearise(
     )  # fmt: skip
     root_distances(_floats(floats, layout, ROOT_DISTANCE), _integers(integers, layout, ROOT_DISTANCE), q, measure)
     rhythms(
-        _floats(floats, layout, GIRDLE), _integers(integers, layout, GIRDLE), _floats(floats, layout, LUMBAR),
+        _floats(floats, layout, ELEVATION), _integers(integers, layout, ELEVATION), _floats(floats, layout, LUMBAR),
         _integers(integers, layout, LUMBAR), q, measure,
     )  # fmt: skip
     heights(

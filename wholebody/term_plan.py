@@ -20,7 +20,7 @@ from wholebody.figures.state import State, Wrench, extended_columns
 from wholebody.records import with_values
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.distance import LEAST_CURVATURE, SquaredDistance
-from wholebody.tasks.rhythm import CLAVICLE_RISE, CLAVICLE_WEIGHT, LUMBAR_MOST, LUMBAR_RATE, LUMBAR_WEIGHT
+from wholebody.tasks.rhythm import LUMBAR_MOST, LUMBAR_RATE, LUMBAR_WEIGHT
 from wholebody.term_entries import (
     BODY,
     BOX,
@@ -30,7 +30,7 @@ from wholebody.term_entries import (
     DISCOMFORT,
     DISTANCE,
     EDGE,
-    GIRDLE,
+    ELEVATION,
     HEIGHT,
     LIMIT,
     LUMBAR,
@@ -250,9 +250,9 @@ def _measures(
                 parts[HEIGHT].append(((joint,), np.array([*centre, term.weight * weight, height])))
         elif type(term) is tasks.Rhythm:
             curvature += term.weight * LEAST_CURVATURE
-            for girdle in term.girdles:
-                rise = np.array([term.weight * CLAVICLE_WEIGHT, CLAVICLE_RISE])
-                parts[GIRDLE].append(((*girdle.idx_q, *girdle.idx_v), rise))
+            for part in (*term.girdles, *term.knees):
+                numbers = np.array([term.weight * part.weight, part.most, part.rest])
+                parts[ELEVATION].append(((*part.idx_q, *part.idx_v), numbers))
             if term.lumbar is not None:
                 share = np.array([term.weight * LUMBAR_WEIGHT, LUMBAR_MOST, LUMBAR_RATE, term.lumbar.rest])
                 parts[LUMBAR].append(((*term.lumbar.idx_q, *term.lumbar.idx_v), share))

@@ -103,7 +103,7 @@ def test_a_ball_is_taken_by_two_or_by_all_fingertips(figure, radius, kind, finge
 
 
 def test_a_power_grip_closes_every_finger_around_a_bar(figure):
-    scene = wb.Scene(figure).add(wb.Capsule(0.0175, 0.3), name="bar", at=(0.40, -0.2, 1.1))
+    scene = wb.Scene(figure).add(wb.Capsule(0.02, 0.3), name="bar", at=(0.40, -0.2, 1.1))
     start = figure.with_joints(figure.posture("standing"), {"right_elbow_flexion": np.radians(80.0)})
     solution = wb.solve(
         wb.Problem(scene, start=start, goals=[wb.Grasp("right", "bar", "power")], constraints=FEET), method="qp"

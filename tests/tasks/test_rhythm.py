@@ -85,3 +85,51 @@ def test_curvature_bounds_the_second_derivative(scene: wb.Scene) -> None:
     )  # fmt: skip
     left = np.diag(term.curvature(state.update(q))) - 0.5 * (hessian + hessian.T)
     assert np.linalg.eigvalsh(left).min() > -3.0  # the bend of the rise itself, 100 * 2 * 13 deg * what is missed
+
+
+@pytest.mark.parametrize("hip", [0.0, 45.0, 90.0, 110.0])
+def test_knees_follow_hips(scene: wb.Scene, hip: float) -> None:
+    """70 degrees where the thigh is level, in both legs, to a degree."""
+    angles = np.arange(0.0, 110.0, 0.5)
+    found = [value(scene, {"left_hip_flexion": hip, "left_knee_flexion": angle}) for angle in angles]
+    assert angles[int(np.argmin(found))] == pytest.approx(70.0 * (1.0 - math.cos(math.radians(hip))), abs=1.0)
+    sitting = scene.figure.posture("sitting")
+    assert wb.Rhythm().resolve(scene, sitting).parts(sitting)[2][1] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("posture", ["standing", "t_pose", "sitting", "squatting", "hands_up"])
+def test_gradient_is_that_of_finite_differences(scene: wb.Scene, posture: str) -> None:
+    figure = scene.figure
+    rng = np.random.default_rng(5)
+    q = figure.clamp(pin.integrate(figure.model, figure.posture(posture), 0.05 * rng.normal(size=figure.model.nv)))
+    term = wb.Rhythm().resolve(scene, figure.posture(posture))
+    state, size = State(figure.model), 1e-6
+    gradient = term.gradient(state.update(q)).copy()
+    for place, step in enumerate(size * np.eye(figure.model.nv)):
+        ends = [term.value(state.update(pin.integrate(figure.model, q, way * step))) for way in (1.0, -1.0)]
+        assert (ends[0] - ends[1]) / (2.0 * size) == pytest.approx(gradient[place], abs=1e-5)
+
+
+def test_a_box_is_taken_from_the_floor_with_bent_knees(scene: wb.Scene) -> None:
+    """Neither a stoop nor a squat: people lift from the floor with knees between 40 and 100 degrees."""
+    room = wb.Scene(scene.figure).add(wb.HalfSpace(), name="floor")
+    room.add(wb.Box((0.3, 0.3, 0.25)), name="box", at=(0.42, 0.0, 0.1255))
+    goals = [wb.Point(f"{side}_palm", (0.42, sign * 0.1505, 0.16)) for side, sign in (("left", 1), ("right", -1))]
+    solution = wb.solve(wb.Problem(room, goals=goals, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")]))
+    assert solution.status == "solved"
+    angles = scene.figure.joint_values(solution.q)
+    knees = [math.degrees(angles[f"{side}_knee_flexion"]) for side in ("left", "right")]
+    spine = math.degrees(sum(angle for joint, angle in angles.items() if joint.startswith("spine") and "flex" in joint))
+    assert 40.0 < min(knees) <= max(knees) < 100.0
+    assert spine < 70.0
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_an_arm_that_is_raised_sideways_turns_outward_by_itself(scene: wb.Scene, side: str) -> None:
+    """Without turning it ends at 120 degrees, where the greater tubercle meets the acromion."""
+    angle, out = math.radians(170.0), 1.0 if side == "left" else -1.0
+    goal = wb.Axis(f"{side}_upper_arm", (0, 0, -1), direction=(0.0, out * math.sin(angle), -math.cos(angle)))
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    solution = wb.solve(wb.Problem(wb.Scene(scene.figure), goals=[goal], constraints=feet))
+    assert solution.status == "solved"
+    assert math.degrees(scene.figure.joint_values(solution.q)[f"{side}_shoulder_rotation"]) < -10.0

@@ -21,6 +21,9 @@ WOOD = (0.60, 0.48, 0.36, 1.0)
 KEPT = -1e-3
 """Least value of a range of motion's row that counts as kept, radians."""
 
+ON_SEAT = 0.01
+"""Metres above a seat up to which a point of pelvis or thighs rests on it: flesh yields by as much."""
+
 SIZE = (360, 400)
 """Pixels of a task's picture."""
 
@@ -34,8 +37,8 @@ class TaskRow:
         status: of the solution.
         seconds: CPU time of the solve.
         ranges: least value of all ranges of motion, degrees; negative beyond one.
-        balance: least distance of the centre of mass from the edges of the feet's polygon, mm, negative outside; None
-            where a seat carries the person.
+        balance: least distance of the centre of mass from the edges of what carries the person, mm, negative outside:
+            the feet's polygon, with pelvis and thighs where they are on a seat.
         miss: largest distance of a point from its goal, mm.
         hips, knees, spine: largest flexion of a hip and a knee, and the spine's in total, degrees.
         picture: its file's name.
@@ -45,7 +48,7 @@ class TaskRow:
     status: str
     seconds: float
     ranges: float
-    balance: float | None
+    balance: float
     miss: float
     hips: float
     knees: float
@@ -55,7 +58,7 @@ class TaskRow:
     @property
     def plausible(self) -> bool:
         """Whether it is solved within the ranges of motion, and the centre of mass is above the feet."""
-        return self.status == "solved" and np.radians(self.ranges) >= KEPT and (self.balance or 0.0) >= -0.1
+        return self.status == "solved" and np.radians(self.ranges) >= KEPT and self.balance >= -0.1
 
 
 def tasks(figure: Figure) -> dict[str, Callable[[], Problem]]:
@@ -127,19 +130,15 @@ def tasks(figure: Figure) -> dict[str, Callable[[], Problem]]:
             wb.Point(f"{side}_index_tip", at(0.12, -0.085 + sign * 0.035, 0.115)) for side, sign in _SIDES
         ]
         goals.append(wb.Axis("gaze", FRONT, toward=at(0.12, -0.085, 0.1), weight=0.01))
-        return wb.Problem(room(), start="squatting", goals=goals, constraints=feet)
+        return wb.Problem(room(), goals=goals, constraints=feet)
 
     def sit() -> Problem:
-        scene, q = room(), figure.posture("standing")
-        below = -_underside(figure)
-        height = 0.43 * scale
+        scene, height = room(), 0.43 * scale
         scene.add(
             wb.Box(tuple(at(0.42, 0.5, 0.04))), name="seat", at=(-0.42 * scale, 0.0, height - 0.02 * scale), color=WOOD
         )
-        pelvis = (-0.40 * scale, 0.0, height + below + 0.010)
-        goals = [wb.Point("pelvis", pelvis), wb.Axis("pelvis", UP, direction=UP, weight=0.1)]
-        goals.append(wb.Axis("thorax", UP, direction=UP, weight=0.05))
-        return wb.Problem(scene, start=q, goals=goals, constraints=feet, balance=False)
+        goals = [wb.Sit("seat"), wb.Axis("thorax", UP, direction=UP, weight=0.05)]
+        return wb.Problem(scene, goals=goals, constraints=feet)
 
     def mouth() -> Problem:
         face = figure.placement(figure.neutral, "gaze")
@@ -149,7 +148,7 @@ def tasks(figure: Figure) -> dict[str, Callable[[], Problem]]:
         return wb.Problem(room(), goals=[goal], constraints=feet)
 
     def overhead() -> Problem:
-        goals = [wb.Point(f"{side}_index_tip", at(0.15, sign * 0.15, 2.08)) for side, sign in _SIDES]
+        goals = [wb.Point(f"{side}_index_tip", at(0.15, sign * 0.15, 2.15)) for side, sign in _SIDES]
         return wb.Problem(room(), goals=goals, constraints=feet)
 
     return {
@@ -212,9 +211,7 @@ def solve_task(name: str, problem: Problem, pictures: Path | None) -> tuple[Task
     scene, q = problem.scene, solution.q
     state = State(scene.model).update(q)
     ranges = wb.RangeOfMotion().resolve(scene, problem.start).value(state)
-    balance: float | None = None
-    if "seat" not in scene.objects:
-        balance = 1e3 * float(wb.Balance().resolve(scene, problem.start).value(state).min())
+    balance = 1e3 * _margin(scene, q)
     figure: Any = scene.figure
     angles: Mapping[str, float] = figure.joint_values(q)
     misses = [
@@ -236,6 +233,29 @@ def solve_task(name: str, problem: Problem, pictures: Path | None) -> tuple[Task
         picture=picture,
     )
     return row, q
+
+
+def _margin(scene: Any, q: Array) -> float:
+    """Least distance of the centre of mass from the edges of what carries the person, metres, negative outside."""
+    import pinocchio as pin
+    from scipy.spatial import ConvexHull
+
+    from wholebody.tasks.support import low_points, standing_points
+
+    points = [standing_points(scene, q, ("left_foot", "right_foot"))]
+    data, placed = scene.model.createData(), pin.GeometryData(scene.geometry)
+    center = pin.centerOfMass(scene.model, data, q)
+    if "seat" in scene.objects:
+        seat = scene.objects["seat"]
+        middle, half = np.asarray(seat.placement.translation), 0.5 * np.asarray(seat.shape.size)
+        pin.updateGeometryPlacements(scene.model, data, scene.geometry, placed, q)
+        for owner, piece, place in zip(scene.piece_owner, scene.geometry.geometryObjects, placed.oMg, strict=True):
+            if owner in ("pelvis", "left_thigh", "right_thigh"):
+                lows = low_points(piece.geometry, place)
+                on = (lows[:, 2] < middle[2] + half[2] + ON_SEAT) & (np.abs(lows - middle)[:, :2] < half[:2]).all(1)
+                points.append(lows[on])
+    hull = ConvexHull(np.vstack(points)[:, :2])
+    return -float((hull.equations[:, :2] @ center[:2] + hull.equations[:, 2]).max())
 
 
 def _largest(angles: Mapping[str, float], ending: str) -> float:

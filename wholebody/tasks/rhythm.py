@@ -1,4 +1,4 @@
-"""Measure: how shoulder girdle and lumbar spine share the motion of arm and pelvis."""
+"""Measure: how shoulder girdle, lumbar spine and knees share the motion of arm, pelvis and hips."""
 
 from __future__ import annotations
 
@@ -33,16 +33,30 @@ CLAVICLE_WEIGHT, LUMBAR_WEIGHT = 100.0, 10.0
 spine of a bent person is free to do what a goal needs."""
 
 
-class Girdle(NamedTuple):
-    """A clavicle and its arm.
+KNEE_MOST, KNEE_WEIGHT = math.radians(70.0), 25.0
+"""Flexion of a knee where the thigh is level, and twice that where it is lifted all the way: 70 degrees times
+1 - cos(elevation), and its weight, 1/rad^2. People who lift as they like neither stoop with straight knees nor squat,
+and are nearer to a squat the lower the load is (Davis et al. 2002, Occupational Ergonomics 3(2)); ankle, knee and hip
+bend more and the lumbar spine the same where the load is farther off (Burgess-Limerick & Abernethy 1998, International
+Journal of Industrial Ergonomics 22(4-5)). The numbers are an ESTIMATE."""
+
+
+class Elevation(NamedTuple):
+    """A joint that follows the elevation e of a limb: its usual angle is ``most (1 - cos e) + rest``.
 
     Attributes:
-        idx_q: elevation of the clavicle, flexion and abduction of the shoulder: places in the posture.
+        idx_q: the joint, flexion and abduction of the limb: places in the posture.
         idx_v: the same in the tangent.
+        weight: of the square, 1/rad^2.
+        most: the share where the limb is level, radians.
+        rest: what the joint has beyond its share at the start, radians.
     """
 
     idx_q: tuple[int, int, int]
     idx_v: tuple[int, int, int]
+    weight: float
+    most: float
+    rest: float = 0.0
 
 
 class Lumbar(NamedTuple):
@@ -61,22 +75,28 @@ class Lumbar(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Rhythm(Measure):
-    """Squared distance of clavicles and lumbar spine from their usual share of a motion [rad^2, weighted].
+    """Squared distance of clavicles, lumbar spine and knees from their usual share of a motion [rad^2, weighted].
 
-    ``100 sum (c - 13 deg (1 - cos e))^2 + 10 (l - l_0)^2``: c is the elevation of a clavicle and e that of its arm in
-    the clavicle (scapulohumeral rhythm); l is the flexion of the lumbar spine beyond its share of the tilt t of the
-    pelvis, ``46 deg tanh(2.5 sin t)``, and l_0 the same at the start (lumbar-pelvic rhythm).
+    ``100 sum (c - 13 deg (1 - cos e))^2 + 25 sum (k - 70 deg (1 - cos h) - k_0)^2 + 10 (l - l_0)^2``:
+
+    - c is the elevation of a clavicle and e that of its arm in the clavicle (scapulohumeral rhythm);
+    - k is the flexion of a knee, h the elevation of its thigh in the pelvis, and k_0 what the knee has beyond its share
+      at the start;
+    - l is the flexion of the lumbar spine beyond its share of the tilt t of the pelvis, ``46 deg tanh(2.5 sin t)``, and
+      l_0 the same at the start (lumbar-pelvic rhythm).
 
     A problem of a person has this measure by default, beside `Effort`.
 
     Attributes:
         weight: factor on the measure.
         girdles: clavicles with their arms, once resolved.
+        knees: knees with their hips, once resolved; they count where there is a lumbar spine.
         lumbar: the lumbar spine, once resolved; None without a free root.
     """
 
     weight: float = 1.0
-    girdles: tuple[Girdle, ...] = field(init=False, repr=False)
+    girdles: tuple[Elevation, ...] = field(init=False, repr=False)
+    knees: tuple[Elevation, ...] = field(init=False, repr=False)
     lumbar: Lumbar | None = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -93,12 +113,12 @@ class Rhythm(Measure):
         girdles, lumbar = girdles_of(figure), _lumbar(figure, start)
         if not girdles and lumbar is None:
             raise InputError("Rhythm: this figure has no clavicles and no lumbar spine; leave the measure out")
-        return filled(self, girdles=girdles, lumbar=lumbar)
+        return filled(self, girdles=girdles, knees=() if lumbar is None else _knees(figure, start), lumbar=lumbar)
 
     def value(self, state: State) -> float:
         """The measure."""
         q = state.q
-        total = sum(CLAVICLE_WEIGHT * _beyond(q, girdle)[0] ** 2 for girdle in self.girdles)
+        total = sum(part.weight * _beyond(q, part)[0] ** 2 for part in (*self.girdles, *self.knees))
         if self.lumbar is not None:
             total += LUMBAR_WEIGHT * _bent(q, self.lumbar)[0] ** 2
         return float(total)
@@ -121,24 +141,33 @@ class Rhythm(Measure):
     def parts(self, q: Array) -> list[tuple[float, float, list[int], Array]]:
         """Weight, excess, places in the tangent and slopes there of each square."""
         found: list[tuple[float, float, list[int], Array]] = []
-        for girdle in self.girdles:
-            excess, slopes = _beyond(q, girdle)
-            found.append((CLAVICLE_WEIGHT, excess, list(girdle.idx_v), np.array(slopes)))
+        for part in (*self.girdles, *self.knees):
+            excess, slopes = _beyond(q, part)
+            found.append((part.weight, excess, list(part.idx_v), np.array(slopes)))
         if self.lumbar is not None:
             excess, turn = _bent(q, self.lumbar)
             found.append((LUMBAR_WEIGHT, excess, [*self.lumbar.idx_v, 4, 5], np.array([1.0, 1.0, 1.0, *turn])))
         return found
 
 
-def girdles_of(figure: Figure) -> tuple[Girdle, ...]:
+def girdles_of(figure: Figure) -> tuple[Elevation, ...]:
     """The clavicles of a figure that has their arms too."""
+    parts = ("clavicle_elevation", "shoulder_flexion", "shoulder_abduction")
+    return _elevations(figure, parts, CLAVICLE_WEIGHT, CLAVICLE_RISE)
+
+
+def _knees(figure: Figure, start: Array) -> tuple[Elevation, ...]:
+    found = _elevations(figure, ("knee_flexion", "hip_flexion", "hip_abduction"), KNEE_WEIGHT, KNEE_MOST)
+    return tuple(with_values(knee, rest=_beyond(start, knee)[0]) for knee in found)
+
+
+def _elevations(figure: Figure, parts: tuple[str, str, str], weight: float, most: float) -> tuple[Elevation, ...]:
     found = []
     for side in ("left", "right"):
-        names = [f"{side}_{part}" for part in ("clavicle_elevation", "shoulder_flexion", "shoulder_abduction")]
+        names = [f"{side}_{part}" for part in parts]
         if all(name in figure.joints for name in names):
-            joints = [figure.model.joints[figure.joint_id(name)] for name in names]
-            a, b, c = joints
-            found.append(Girdle((a.idx_q, b.idx_q, c.idx_q), (a.idx_v, b.idx_v, c.idx_v)))
+            a, b, c = (figure.model.joints[figure.joint_id(name)] for name in names)
+            found.append(Elevation((a.idx_q, b.idx_q, c.idx_q), (a.idx_v, b.idx_v, c.idx_v), weight, most))
     return tuple(found)
 
 
@@ -151,14 +180,14 @@ def _lumbar(figure: Figure, start: Array) -> Lumbar | None:
     return with_values(part, rest=_bent(start, part)[0])
 
 
-def _beyond(q: Array, girdle: Girdle) -> tuple[float, tuple[float, float, float]]:
-    """Elevation of a clavicle beyond its share [rad], and its slopes by clavicle, flexion and abduction."""
-    clavicle, flexion, abduction = (float(q[place]) for place in girdle.idx_q)
+def _beyond(q: Array, part: Elevation) -> tuple[float, tuple[float, float, float]]:
+    """Angle of a joint beyond its share [rad], and its slopes by the joint, flexion and abduction."""
+    angle, flexion, abduction = (float(q[place]) for place in part.idx_q)
     height = math.cos(flexion) * math.cos(abduction)
-    return clavicle - CLAVICLE_RISE * (1.0 - height), (
+    return angle - part.most * (1.0 - height) - part.rest, (
         1.0,
-        -CLAVICLE_RISE * math.sin(flexion) * math.cos(abduction),
-        -CLAVICLE_RISE * math.cos(flexion) * math.sin(abduction),
+        -part.most * math.sin(flexion) * math.cos(abduction),
+        -part.most * math.cos(flexion) * math.sin(abduction),
     )
 
 

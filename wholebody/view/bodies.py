@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.view import drawing, style
 from wholebody.view.scene_graph import Keyframe, SceneGraph
-from wholebody.view.skin import Skin, Skinned, path_of
+from wholebody.view.skin import Skin, Skinned
 from wholebody.view.style import Color
 from wholebody.view.surface import surface_of
+from wholebody.view.viewed_assembly import ViewedAssembly
 from wholebody.view.viewed_scene import ViewedScene
 
 
@@ -45,6 +46,24 @@ class Body:
         return style.tinted(self.color, state, amount)
 
 
+class Dressed(NamedTuple):
+    """A figure whose surface is drawn in place of its pieces.
+
+    Attributes:
+        prefix: of its segments among the owners of pieces, and of its joints in the model.
+        root: node of the surface, below the figure's or a ghost's.
+        skin: the surface.
+        nodes: node of each joint of the surface.
+        color: of the whole surface; each patch's own if None.
+    """
+
+    prefix: str
+    root: str
+    skin: Skin
+    nodes: Mapping[str, str]
+    color: Color | None
+
+
 class Bodies:
     """All pieces of a scene in the scene graph, in the order of its geometry model."""
 
@@ -72,14 +91,31 @@ class Bodies:
             self.all.append(Body(carrier, f"{carrier}/{node(piece.name)}", int(piece.parentJoint), thing, color, plate))
         self.carriers = {body.carrier: body.joint for body in self.all}
         self.pieces = pieces
-        surface = None if pieces else surface_of(scene.figure)
-        self._skin = Skin(surface, scene.figure) if surface is not None else None
-        self._nodes: dict[str, str] = {}
-        for joint in self._skin.joints if self._skin is not None else ():
-            self._nodes[joint] = f"{style.FIGURE_NODE}/{node(joint)}"
-            self.carriers[self._nodes[joint]] = int(scene.model.getJointId(joint))
-        self._patches: list[Skinned] = []
-        self._things = [index for index, body in enumerate(self.all) if body.thing is not None]
+        self._dressed = () if pieces else tuple(self._dress())
+        self._owned = frozenset(
+            owner
+            for owner in scene.piece_owner
+            for figure in self._dressed
+            if (owner.startswith(figure.prefix) if figure.prefix else owner not in numbers)
+        )
+        self._patches: list[tuple[str, Skinned]] = []
+        shown = enumerate(self.all)
+        self._things = [index for index, body in shown if body.thing is not None and not self._hidden(index)]
+
+    def _dress(self) -> Iterator[Dressed]:
+        """The figures that have a surface; their joints' nodes join the carriers."""
+        scene = self.scene
+        figures = scene.figures if isinstance(scene, ViewedAssembly) else {"": (scene.figure, None)}
+        for name, (figure, color) in figures.items():
+            surface = surface_of(figure)
+            if surface is None:
+                continue
+            skin, prefix = Skin(surface, figure), f"{name}/" if name else ""
+            folder = f"{style.FIGURE_NODE}/{node(name)}" if name else style.FIGURE_NODE
+            nodes = {joint: f"{folder}/{node(joint)}" for joint in skin.joints}
+            for joint, path in nodes.items():
+                self.carriers[path] = int(self.scene.model.getJointId(f"{prefix}{joint}"))
+            yield Dressed(prefix, f"{folder}/body", skin, nodes, color)
 
     def _thing_color(self, thing: str, number: int, piece: Any) -> Color:
         given = getattr(self.scene.objects[thing], "color", None)
@@ -96,10 +132,14 @@ class Bodies:
         """Put every piece in the scene graph, in place of earlier ones."""
         graph.remove(style.FIGURE_NODE)
         graph.remove(style.OBJECT_NODE)
-        if self._skin is not None:
-            self._patches = self._skin.build(graph, path_of(""), self._nodes, None)
-        for body, piece in zip(self.all, self.scene.geometry.geometryObjects, strict=True):
-            if self._hidden(body):
+        self._patches = [
+            (f"{figure.prefix}{patch.segment}", patch)
+            for figure in self._dressed
+            for patch in figure.skin.build(graph, figure.root, figure.nodes, figure.color)
+        ]
+        for index, piece in enumerate(self.scene.geometry.geometryObjects):
+            body = self.all[index]
+            if self._hidden(index):
                 continue
             graph.put(body.path, drawing.piece(piece.geometry, body.path, body.color))
             graph.place(body.path, piece.placement.homogeneous)
@@ -116,18 +156,18 @@ class Bodies:
         grid[:3, 3] += 0.0015 * grid[:3, 2]  # m: above the floor, otherwise the two flicker
         graph.place("/Grid", grid)
 
-    def _hidden(self, body: Body) -> bool:
+    def _hidden(self, index: int) -> bool:
         """Whether a piece is not drawn, because the surface of its body is."""
-        return self._skin is not None and body.thing is None
+        return self.scene.piece_owner[index] in self._owned
 
     def paint(self, keyframe: Keyframe, index: int, state: Color) -> None:
         """Give a piece the colour of a state, or the patches of the surface on its segment."""
         body = self.all[index]
-        if not self._hidden(body):
+        if not self._hidden(index):
             keyframe.colors[body.path] = body.state_color(state)
             return
-        for patch in self._patches:
-            if patch.segment == self.scene.piece_owner[index]:
+        for owner, patch in self._patches:
+            if owner == self.scene.piece_owner[index]:
                 keyframe.colors[patch.path] = style.tinted(patch.color, state, style.PAINT)
 
     def pose(self, keyframe: Keyframe, data: Any) -> None:
@@ -137,21 +177,23 @@ class Bodies:
         pieces = self.scene.geometry.geometryObjects
         for index in self._things:
             keyframe.transforms[self.all[index].path] = pieces[index].placement.homogeneous
-        for body in self.all:
-            if not self._hidden(body):
+        for index, body in enumerate(self.all):
+            if not self._hidden(index):
                 keyframe.colors[body.path] = body.color
-        for patch in self._patches:
+        for _, patch in self._patches:
             keyframe.colors[patch.path] = patch.color
 
     def ghost(self, graph: SceneGraph, number: int, data: Any, color: Color) -> None:
         """Draw the figure and what it carries once more, transparent, at the posture of `data`."""
         root = f"{style.GHOST_NODE}/{number}"
-        if self._skin is not None:
-            self._skin.build(graph, path_of(root), {joint: root + path for joint, path in self._nodes.items()}, color)
-            for path in self._nodes.values():
+        for figure in self._dressed:
+            nodes = {joint: root + path for joint, path in figure.nodes.items()}
+            figure.skin.build(graph, root + figure.root, nodes, color)
+            for path in figure.nodes.values():
                 graph.place(f"{root}{path}", data.oMi[self.carriers[path]].homogeneous)
-        for body, piece in zip(self.all, self.scene.geometry.geometryObjects, strict=True):
-            if (body.joint == 0 and body.thing is not None) or self._hidden(body):
+        for index, piece in enumerate(self.scene.geometry.geometryObjects):
+            body = self.all[index]
+            if (body.joint == 0 and body.thing is not None) or self._hidden(index):
                 continue
             path = f"{root}{body.path}"
             graph.put(path, drawing.piece(piece.geometry, path, color))
@@ -190,9 +232,9 @@ class Bodies:
             owner = self.scene.piece_owner[index] if body.thing is None and colors else ""
             if owner in colors and body.path in keyframe.colors:
                 keyframe.colors[body.path] = colors[owner]
-        for patch in self._patches:
-            if patch.segment in colors:
-                keyframe.colors[patch.path] = colors[patch.segment]
+        for owner, patch in self._patches:
+            if owner in colors:
+                keyframe.colors[patch.path] = colors[owner]
 
     def _box(self, index: int, data: Any) -> Array:
         """Corners (8, 3) in the world of the box around a piece."""

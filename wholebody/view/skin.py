@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.view import commands, style
+from wholebody.view import commands
 from wholebody.view.scene_graph import SceneGraph
 from wholebody.view.style import Color
 from wholebody.view.surface import Surface
@@ -82,8 +82,3 @@ class Skin:
             graph.do(commands.set_skin(path, root, patch, shown, UNIT))
             drawn.append(Skinned(path, patch.segment, shown))
         return drawn
-
-
-def path_of(root: str) -> str:
-    """Node of the surface below the figure's or a ghost's."""
-    return f"{root}{style.FIGURE_NODE}/body"

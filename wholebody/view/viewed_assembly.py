@@ -20,7 +20,11 @@ class _Colored:
 class ViewedAssembly:
     """The bodies and things that an assembly has now.
 
-    A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn.
+    A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn. People are
+    drawn with their surface, as in a scene.
+
+    Attributes:
+        figures: each figure by name, and the color that it was given.
     """
 
     figure = None
@@ -31,6 +35,7 @@ class ViewedAssembly:
         self._scene = assembly.scene
         self.model, self.geometry = self._scene.model, self._scene.geometry
         self.piece_owner = self._scene.piece_owner
+        self.figures = {name: (figure, assembly.colors.get(name)) for name, figure in assembly.figures.items()}
         self.objects = MappingProxyType({name: _Colored(_color(assembly, name)) for name in self.piece_owner})
 
     def contacts(self, q: Array, within: float = 0.05) -> Contacts:

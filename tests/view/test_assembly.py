@@ -1,0 +1,64 @@
+"""People of an assembly are drawn with their surface, things of it as they are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from PIL import Image
+
+import wholebody as wb
+from wholebody.view import Viewer, style
+from wholebody.view.bodies import Bodies
+from wholebody.view.scene_graph import Keyframe
+from wholebody.view.viewed_assembly import ViewedAssembly
+
+
+@pytest.fixture(scope="module")
+def assembly() -> wb.Assembly:
+    figure = wb.load("human")
+    beside = figure.posture("a_pose")
+    beside[1] = 0.9
+    made = wb.Assembly().figure("anna", figure).figure("ben", figure, beside, color=(0.0, 1.0, 0.0, 1.0))
+    return made.body("ball", shape=wb.Sphere(0.1), at=(0.6, 0.0, 1.0))
+
+
+def test_the_surface_follows_each_figures_own_joints(assembly: wb.Assembly) -> None:
+    viewed = ViewedAssembly(assembly)
+    bodies = Bodies(viewed, (), False)
+    data = viewed.model.createData()
+    pin.forwardKinematics(viewed.model, data, assembly.q)
+    keyframe = Keyframe()
+    bodies.pose(keyframe, data)
+    for name, figure in assembly.figures.items():
+        at = wb.Scene(figure).state(assembly.posture(name))
+        for joint in ("left_elbow_pronation", "right_knee_flexion", "root_joint"):
+            shown = keyframe.transforms[f"{style.FIGURE_NODE}/{name}/{joint}"]
+            assert np.abs(shown - at.data.oMi[figure.model.getJointId(joint)].homogeneous).max() < 1e-9
+
+
+@pytest.mark.parametrize("pieces", [False, True])
+def test_pieces_are_drawn_only_where_they_are_asked_for(assembly: wb.Assembly, pieces: bool) -> None:
+    bodies = Bodies(ViewedAssembly(assembly), (), pieces)
+    data = bodies.scene.model.createData()
+    pin.forwardKinematics(bodies.scene.model, data, assembly.q)
+    keyframe = Keyframe()
+    bodies.pose(keyframe, data)
+    drawn = [body for body in bodies.all if body.path in keyframe.colors]
+    people = [body for body in drawn if body.thing != "ball"]
+    assert len(drawn) - len(people) == 1
+    assert len(people) == (2 * len(assembly.figures["anna"].geometry.geometryObjects) if pieces else 0)
+
+
+@pytest.mark.browser
+def test_a_picture_shows_clothes_and_the_color_that_was_given(
+    assembly: wb.Assembly, chromium: str, tmp_path: Path
+) -> None:
+    with Viewer(assembly, contact_distance=-1.0) as viewer:
+        viewer.show(assembly.q)
+        values = np.asarray(Image.open(viewer.picture(tmp_path / "x.png", (400, 300))).convert("RGB")).astype(int)
+    red, green, blue = (values[..., k] for k in range(3))
+    assert ((blue > green + 25) & (green > red + 15)).sum() > 300  # anna's shirt
+    assert ((green > red + 60) & (green > blue + 60)).sum() > 800  # ben
