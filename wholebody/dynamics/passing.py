@@ -12,7 +12,7 @@ from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.geometry.proximity import Contacts
 
 PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
-MOST_LOOKS = 64  # distances of one pair on the way; what would need more is doubtful
+MOST_LOOKS = 64  # places of one pair on the way; what would need more is doubtful
 DOUBTS = 50  # pairs that are looked at on their way, at most
 
 
@@ -36,7 +36,7 @@ def passed(
     """Whether pieces can have been deeper than `PASSING` in each other on the way.
 
     A direction that has kept a pair apart all the time settles most pairs (`passing_kernel`). Others are looked at on
-    their way, so often that they cannot come into each other in between.
+    their way in the same manner, at as many places as that takes.
 
     Args:
         state: where the bodies are after the step.
@@ -75,26 +75,42 @@ def passed(
 def _met(
     state: BodiesState, before: Before, first: int, second: int, placements: Array, angle: Array, fall: float
 ) -> bool:
-    """Whether two pieces can have met: distances at points of the way, between which they move by less."""
+    """Whether two pieces can have met: the way in parts, along each of which the direction at its start parts them."""
     pieces = state.pieces
-    a, b = int(pieces.body[first]), int(pieces.body[second])
+    pair = (first, second)
+    a, b = (int(pieces.body[k]) for k in pair)
     shift = state.position - before.kept[0]
-    way = float(np.linalg.norm(shift[b] - shift[a]))
-    way += float(angle[a] * pieces.levers[a] + angle[b] * pieces.levers[b]) + fall
     turns = [pin.log3(state.rotation[k] @ before.kept[1][k].T) for k in (a, b)]
-    shapes = [pieces.table.geometry.geometryObjects[k].geometry for k in (first, second)]
+    shapes = [pieces.table.geometry.geometryObjects[k].geometry for k in pair]
+    sag = 0.125 * float(angle[a] ** 2 * pieces.levers[a] + angle[b] ** 2 * pieces.levers[b]) + fall
+    placed = placements.copy()
+
+    def place(at: float) -> None:
+        for piece, body, turn in zip(pair, (a, b), turns, strict=True):
+            rotation, start = pin.exp3(at * turn), placements[piece]
+            placed[piece, :3] = start[:3] @ rotation.T
+            placed[piece, 3] = rotation @ (start[3] - before.kept[0][body]) + before.kept[0][body] + at * shift[body]
+
+    def height(piece: int, direction: Array, sign: float) -> float:
+        return float(passing_kernel.highest(piece, placed, direction, sign, *pieces.heights))
+
     request, at, looks = coal.DistanceRequest(), 0.0, 0
     while at < 1.0:
-        placed = []
-        for piece, body, turn in zip((first, second), (a, b), turns, strict=True):
-            rotation, start = pin.exp3(at * turn), placements[piece]
-            place = rotation @ (start[3] - before.kept[0][body]) + before.kept[0][body] + at * shift[body]
-            placed.append(coal.Transform3s(rotation @ start[:3].T, place))
-        distance = float(
-            coal.distance(shapes[0], placed[0], shapes[1], placed[1], request, coal.DistanceResult())
-        )  # fmt: skip
-        looks += 1
-        if distance < -0.5 * PASSING or looks > MOST_LOOKS:
+        place(at)
+        result = coal.DistanceResult()
+        poses = [coal.Transform3s(placed[k, :3].T, placed[k, 3]) for k in pair]
+        distance = coal.distance(shapes[0], poses[0], shapes[1], poses[1], request, result)
+        if distance < -PASSING:
             return True
-        at += (max(distance, 0.0) + 0.5 * PASSING) / max(way, 1e-12)
+        normal, part = np.array(result.normal), 1.0 - at
+        while True:
+            place(at + part)
+            end = -height(second, normal, -1.0) - height(first, normal, 1.0)
+            looks += 1
+            if looks > MOST_LOOKS:
+                return True
+            if min(distance, end) - part * part * sag > -PASSING:
+                break
+            part *= 0.5
+        at += part
     return False

@@ -3,8 +3,8 @@
 A frame is advanced in steps of at most `SUBSTEP`. A step ends early at the next impact; there the impacts are resolved
 one by one (`impact_kernel`), and the motion goes on. In a step all contacts together have one program (`step_program`)
 that keeps every gap at `SKIN` or more at its end; then the bodies move (`motion_kernel`). A step after which
-pieces are in each other, or may have passed through each other on the way, is made again with half the time. After
-too many stops in a frame the impacts of a step become part of its program.
+pieces are in each other is made again with the points where they are; if that does not help, or pieces may have passed
+through each other on the way, with half the time. After too many stops in a frame the impacts of a step become part of its program.
 """
 
 from __future__ import annotations
@@ -44,12 +44,13 @@ GRAVITY = (0.0, 0.0, -9.81)  # m/s2
 SUBSTEP = 1.0 / 240.0  # s: longest step; smaller is more accurate and slower
 LONGEST = 10.0  # s: of a frame, which is 2,400 steps
 SHORTEST = 1e-6  # s: of a step that ends with an impact
-INSIDE = 1e-4  # m: a step that leaves pieces deeper in each other is made again with half the time
+INSIDE = 1e-4  # m: a step that leaves pieces deeper in each other is made again
 LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
 HALVINGS = 6  # of a step, at most
-CAREFUL = 2  # of them before pieces are parted by displacements
+FORESEEN = 2  # times that a step is made again with the points where it led too deep, before it is halved
 MARGIN = 2e-3  # m: pairs are looked at from this much farther than bodies come in a step
-STOPS = 8  # early ends of steps in a frame, at most
+STOPS = 8  # early ends of steps in a frame, at most ...
+FEW = 25  # ... while so many bodies move; fewer with more of them: each stop costs a step of all bodies
 DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
 FASTEST = 1e3  # m/s2: of gravity
 STRONGEST = 1e6  # N s
@@ -200,7 +201,7 @@ class RigidBodies:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
             state.give(number, before, after, dt)
         count = int(np.ceil(dt / SUBSTEP - 1e-9))
-        record = FrameRecord(STOPS, np.zeros((len(self.names), 3)))
+        record = FrameRecord(self._stops(), np.zeros((len(self.names), 3)))
         self._look(dt / count)
         for number in range(count):
             end = dt * (number + 1) / count
@@ -216,6 +217,10 @@ class RigidBodies:
 
     # ---- a step
 
+    def _stops(self) -> int:
+        """Early ends of steps that a frame may have."""
+        return STOPS * FEW // max(FEW, int(self.state.moving.sum()))
+
     def _step(self, time: float, record: FrameRecord) -> None:
         """Advance by at most a time: to its end, to the next impact, or to where a shorter step leads."""
         state = self.state
@@ -223,25 +228,33 @@ class RigidBodies:
         program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
         events, ended = program.resolve_impacts()
         self._record(events, program, record)
-        program.look(self._falling)
+        falling = self._falling
+        program.look(falling)
         together = record.stops <= 0 or not ended
-        first = float(program.hits.min(initial=np.inf))
-        if not together and first < time:
-            time, record.stops = max(first, SHORTEST), record.stops - 1
+        time, stopped = self._until_impact(program, time, together)
         before, start, weight = Before(state, self._near, self._margin), self._old, float(np.linalg.norm(self.gravity))
-        for halving in range(HALVINGS + 1):
+        halvings, foreseen = 0, 0
+        while True:
             self._move(program, time, together, start, before.kept)
             impulse = program.world_impulse()
             record.steps += 1
             least = self._look(SUBSTEP)
-            if halving == HALVINGS:
+            if halvings == HALVINGS:
                 break
-            if least >= (LEAST_GAP if halving < CAREFUL else -INSIDE):
-                ways = self._ways(time)
-                if not passed(state, before, self._near, self._margin, ways, time, weight):
-                    break
+            if least >= -INSIDE and not passed(state, before, self._near, self._margin, self._ways(time), time, weight):
+                break
+            start, met = program.remembered(time), least < -INSIDE and foreseen < FORESEEN
+            if met:
+                program.meet(self._finder.points(self._near.nearer(LEAST_GAP)), time)
+                foreseen += 1
             state.restore(before.kept)
-            start, time = program.remembered(time), 0.5 * time
+            if met:
+                program.look(falling)
+                time, again = self._until_impact(program, time, together)
+                stopped |= again
+            else:
+                halvings, time = halvings + 1, 0.5 * time
+        record.stops -= stopped
         record.time += time
         self._old = program.remembered(time)
         self._joints.keep(state, state.twist, state.moving)
@@ -253,6 +266,12 @@ class RigidBodies:
         if least < LEAST_GAP:
             least = self._part(least)
         record.deepest = max(record.deepest, -least)
+
+    @staticmethod
+    def _until_impact(program: StepProgram, time: float, together: bool) -> tuple[float, bool]:
+        """The time to the first impact if that comes before a time and is not part of the program, and whether so."""
+        first = float(program.hits.min(initial=np.inf))
+        return (time, False) if together or first >= time else (max(first, SHORTEST), True)
 
     def _move(
         self, program: StepProgram, time: float, together: bool, start: Impulses, kept: tuple[Array, Array, Array]

@@ -17,7 +17,7 @@ SKIN = 5e-5  # m: gap at which bodies rest: coal's distances stay positive, its 
 TOUCH = 1e-5  # m: a gap larger than SKIN by this still touches
 SLOW = 0.02  # m/s: slower approaches are no impacts; 20 um of fall
 TOLERANCE = 1e-4  # m/s: of the program of a step; 0.4 um of its way
-MOST, VISITS = 1000, 40_000  # sweeps of it, and points times sweeps: more is exacter and slower
+MOST, VISITS = 1000, 20_000  # sweeps of it, and points times sweeps: more is exacter and slower
 SAME_POINT = 0.01  # m: contact points nearer than this, in the body, are the same from step to step
 MOST_EVENTS = 1000  # at one stop
 RELAXED = 1e-9  # m/s: by which a step that ends with an impact may overshoot
@@ -116,6 +116,33 @@ class StepProgram:
             own = (laid.jacobian[count:], laid.answer[count:], laid.mobility[count:], laid.held)
             joints.lay(state, movable, JointRows(*own))
         return laid
+
+    def meet(self, points: ContactPoints, time: float) -> None:
+        """Add contact points as they are after a step of this time, which led to overlap that no point foresaw.
+
+        Their gaps become those that lead there with the velocities after the step.
+        """
+        late = StepProgram(self.state, points, self.gravity, self.joints)
+        late.look(~self.pushed())
+        gap = points.gap - time * late.speed + 0.5 * late._pull * time**2
+        count, own, laid = len(self.points.gap), late._laid, self._laid
+        self._local = np.concatenate([self._local, late._local])
+        self._restitution = np.concatenate([self._restitution, late._restitution])
+        self._friction = np.concatenate([self._friction, late._friction])
+        self._touching = np.concatenate([self._touching, gap <= SKIN + TOUCH])
+        joined = (np.concatenate(both) for both in zip(self.points, with_values(points, gap=gap), strict=True))
+        self.points = ContactPoints(*joined)
+        new, place = len(gap), np.full(len(gap), count)
+        bodies, jacobian, answer, mobility = (
+            np.insert(one, place, other[:new], axis=0)
+            for one, other in (
+                (laid.bodies, own.bodies), (laid.jacobian, own.jacobian), (laid.answer, own.answer),
+                (laid.mobility, own.mobility),
+            )
+        )  # fmt: skip
+        axes = np.concatenate([laid.axes, own.axes])
+        self._laid = _Laid(bodies, axes, jacobian, answer, mobility, laid.held)
+        self.impulse = np.zeros((len(bodies), 3))
 
     def resolve_impacts(self) -> tuple[Array, bool]:
         """Resolve the impacts of points that touch: events as in `impact_kernel.resolve`, and whether none is left.

@@ -52,10 +52,16 @@ class Contacts(NamedTuple):
 
     def nearest_first(self) -> Contacts:
         """The same in the order of their distances."""
-        order = np.argsort(self.distance, kind="stable")
+        return self._rows(np.argsort(self.distance, kind="stable"))
+
+    def nearer(self, distance: float) -> Contacts:
+        """Those that are nearer than a distance, metres."""
+        return self._rows(np.flatnonzero(self.distance < distance))
+
+    def _rows(self, rows: Indices) -> Contacts:
         return Contacts(
-            self.pair[order], self.distance[order], self.normal[order], self.point_a[order], self.point_b[order],
-            self.number[order], self.placements,
+            self.pair[rows], self.distance[rows], self.normal[rows], self.point_a[rows], self.point_b[rows],
+            self.number[rows], self.placements,
         )  # fmt: skip
 
 
