@@ -246,9 +246,20 @@ class Replaced:
 
     q: np.ndarray
     name: str = "replaced"
+    said: str = ""
 
     def avoid(self, *asked: object) -> MethodResult:
-        return MethodResult(self.q)
+        return MethodResult(self.q, message=self.said)
+
+
+def test_a_free_clip_is_not_told_as_one_that_collides(planar_arm: Callable[..., Figure]) -> None:
+    """A method may be stricter than the judgement; what it says comes after what was found."""
+    clip, scene = arm_and_ball(planar_arm, 20)
+    scene.move("ball", at=(3.0, 0.0, 0.0))
+    found = wb.avoid(clip, scene, method=Replaced(clip.q, said="frame 3 could not be freed"))
+    assert found.report.solved
+    assert found.report.message.startswith("nothing collides")
+    assert found.report.message.endswith("replaced says: frame 3 could not be freed")
 
 
 @pytest.mark.parametrize(

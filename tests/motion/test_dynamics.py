@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.motion.load_change import LoadChange
+from wholebody.motion.load_change import LoadChange, standing_frames
 
 WHEEL = """<robot name="wheel"><link name="base"/>
 <link name="wheel"><inertial><mass value="2"/>
@@ -76,3 +76,24 @@ def test_a_recording_that_picks_up_stays_within_strength(shared_data: Path) -> N
     assert (loads.after.torque[:, 6:] <= upper[6:] * 1.02 + 1e-6).all()
     assert (loads.after.torque[:, 6:] >= lower[6:] * 1.02 - 1e-6).all()
     assert (loads.after.outside <= loads.before.outside + 2e-3).all()
+
+
+def test_a_recording_is_slowed_and_stays_within_strength(shared_data: Path) -> None:
+    """It crouches for a jump: the feet leave the ground between two frames of the slowed clip."""
+    human = wb.load("human")
+    clip = wb.read_clip(shared_data / "mocap" / "cmu_02_04.bvh", human).resampled(1.0 / 30.0)[:45]
+    found = wb.avoid(clip, dynamics=True, method=wb.Trajectory(stretch=1.5))
+    report = found.report
+    assert report.before.colliding
+    assert report.solved, report.message
+    assert 1.2 < report.stretch <= 1.5
+    assert len(found.clip) > len(clip)
+    assert isinstance(report.loads, LoadChange)
+    assert report.loads.after.largest_share < 0.8 * report.loads.before.largest_share
+
+
+def test_a_foot_stands_between_two_frames_in_which_it_stands() -> None:
+    feet = np.array([2, 2, 1, 0, 0, 1, 1])
+    places = np.array([0.0, 0.6, 1.1, 1.9, 2.0, 2.1, 2.9, 4.2, 4.9, 5.0, 5.4, 5.6])
+    found = standing_frames(places, feet)
+    np.testing.assert_array_equal(found, [0, 1, 2, 2, 2, 3, 3, 4, 4, 5, 5, 6])

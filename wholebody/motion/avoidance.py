@@ -241,7 +241,10 @@ def _report(
         left.append("loads are beyond their bounds")
     if not (solved or left):
         left = ["something collides between two frames that collide"]
-    message = "; ".join(left) if left else "nothing collides, in the frames and between them, to 0.1 mm"
+    message = "; ".join(left)
+    if solved:
+        said = f"; {method} says: {result.message}" if result.message else ""
+        message = f"nothing collides, in the frames and between them, to 0.1 mm{said}"
     if result.times is not None:
         message += f"; slowed from {before.duration:.2f} to {after.duration:.2f} s, by {result.stretch:.3g} at most"
         fast = now.speeds[0] if now.speeds else None

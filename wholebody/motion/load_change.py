@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Mask
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.frame_terms import FrameTerms
+from wholebody.motion.frame_terms import FrameTerms, between
 from wholebody.motion.inverse_dynamics import InverseDynamics, Stand
 from wholebody.motion.strength import Strength
 from wholebody.motion.torques import CUTOFF, Torques, clip_torques, smoothed
@@ -91,8 +92,8 @@ def load_change(
 ) -> LoadChange:  # fmt: skip
     """Compare the loads of two clips. The feet of both stand in the same places, those that are held beside them too.
 
-    The clip before is filtered, as recordings are noisy. What was changed is no recording, and filtering would hide how
-    fast it changes; so it is taken as it is, on top of the filtered clip. A slowed clip is filtered as a whole.
+    The clip before is filtered, as recordings are noisy; a slowed clip, when it is slowed. What was changed is no
+    recording; see `on_filtered`.
 
     Args:
         before: the clip as it was.
@@ -103,20 +104,50 @@ def load_change(
         terms: what was held, of the clip before.
     """
     places = np.arange(len(before), dtype=np.float64) if times is None else times / before.dt
-    nearest = np.clip(np.rint(places).astype(int), 0, len(before) - 1)
-    marks = {foot: each[nearest] for foot, each in stands.items()}
+    frames = standing_frames(places, np.sum([np.zeros(len(before)), *stands.values()], axis=0))
+    marks = {foot: each[frames] for foot, each in stands.items()}
     dynamics = InverseDynamics(before.figure, tuple(stands), FRICTION)
     steady = smoothed(before, CUTOFF)
     _, soles = soles_of(dynamics, steady.q, stands, terms)
     old = clip_torques(steady, stands, strength, FRICTION, None)
-    changed = smoothed(after, CUTOFF)
-    if times is None:
-        model, frames = before.figure.model, zip(steady.q, before.q, after.q, strict=True)
-        changed = after.with_q(
-            [pin.integrate(model, base, pin.difference(model, was, now)) for base, was, now in frames]
-        )
-    new = clip_torques(changed, marks, strength, FRICTION, None, [soles[frame] for frame in nearest])
+    original = before.q if times is None else between(before.figure.model, before.q, places)
+    changed = after.with_q(on_filtered(before.figure, original, after.q, before.dt))
+    new = clip_torques(changed, marks, strength, FRICTION, None, [soles[frame] for frame in frames.tolist()])
     return LoadChange(old, new, places)
+
+
+def on_filtered(figure: Figure, original: Array, changed: Array, dt: float) -> Array:
+    """(n, nq) postures whose loads are those of changed postures of a recording.
+
+    Differences of a recording amplify its noise, so it is filtered. Filtering what was changed would hide how fast it
+    changes; so the change is taken as it is, on top of the filtered recording.
+
+    Args:
+        figure: of the postures.
+        original: (n, nq) of the recording.
+        changed: (n, nq) made of them.
+        dt: seconds from frame to frame.
+    """
+    model, steady = figure.model, smoothed(Clip(figure, original, dt), CUTOFF).q
+    each = zip(steady, original, changed, strict=True)
+    return np.array([pin.integrate(model, base, pin.difference(model, was, now)) for base, was, now in each])
+
+
+def standing_frames(places: Array, feet: Array) -> Indices:
+    """(m,) frames of a clip whose standing feet are those at places between its frames.
+
+    A foot stands from the first frame in which it stands to the last one. So it stands between two frames if it stands
+    in both: a foot that leaves the ground after a frame bears nothing a quarter of a frame later. So of the two frames
+    it is the one in which fewer feet stand, or else the nearer one.
+
+    Args:
+        places: (m,) in frames.
+        feet: (n,) how many feet stand in each frame.
+    """
+    near, below, above = (np.clip(to(places).astype(int), 0, len(feet) - 1) for to in (np.rint, np.floor, np.ceil))
+    fewer = np.where(feet[below] < feet[above], below, above)
+    found: Indices = np.where(feet[below] == feet[above], near, fewer)
+    return found
 
 
 def soles_of(

@@ -15,6 +15,7 @@ from wholebody.linearisation import Linearisation, Passing
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.step_program import (
     AGAIN,
+    CURVED,
     DAMPING,
     LITTLE,
     RADIUS,
@@ -61,6 +62,7 @@ class Plain:
         shift, damping = np.zeros(len(rows.soft_error)), 0.0
         if self.before is not None and np.array_equal(self.before[0], at.q):
             shift = rows.soft_error - self.before[1]
+            shift[goals:] = np.clip(shift[goals:], -CURVED, CURVED)
             if not np.abs(shift[:goals]).max(initial=0.0) < RESTING:
                 shift[:goals] = 0.0
             damping = DAMPING * min(1.0, self.before[2] / error)

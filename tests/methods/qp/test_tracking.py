@@ -119,3 +119,22 @@ def test_compiled_loops_are_not_given_sizes_that_do_not_fit(field: str) -> None:
     broken = replace(whole, **{field: getattr(whole, field)[:-1]})
     with pytest.raises(ValueError, match="other sizes"):
         solve_from(broken, lacking(whole), 50)
+
+
+@pytest.mark.parametrize("jump", [(0.05, 0.0, -0.08), (0.0, 0.0, 0.1), (0.05, 0.05, 0.05)])
+def test_a_hold_comes_back_in_the_step_after_a_jump(jump: tuple[float, float, float]) -> None:
+    """A long step turns far and misses what is held. The next is short and turns little: it asks for what is missed."""
+    hand = wb.load("hand", side="left")
+    place, there = "left_middle_proximal", wb.Hold("left_little_distal")
+    at = wb.Scene(hand).state(hand.posture("relaxed")).frame(hand.frame_id(place)).translation
+    problem = wb.Problem(wb.Scene(hand), "relaxed", goals=[wb.Point(place, at)], constraints=[there])
+    tracker, q, missed = wb.QP().tracker(problem, 1.0), problem.start, [0.0]
+    held = there.resolve(problem.scene, problem.start)
+    for target in (at, at + jump, None):
+        if target is None:
+            target = problem.scene.state(q).frame(hand.frame_id(place)).translation
+        problem.retarget([wb.Point(place, target)])
+        q = tracker.step(q).q
+        missed.append(float(np.abs(held.value(problem.scene.state(q))).max()))
+    assert missed[-2] > 1e-3
+    assert missed[-1] < 0.3 * missed[-2]

@@ -36,6 +36,7 @@ RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before veloc
 DAMPING = 1.0  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at obstacles
 SETTLING = 0.5  # s: measures lessen by 1/e in it: longer = slower to settle, shorter = joints swing about the optimum
 RESTING = 1e-5  # m, rad: a goal missed by less than this, and more than foreseen, rests; less left of one is reached
+CURVED = 1e-4  # m, rad: by how much a step runs ahead of a hold as the last one was curved; more overshoots after jumps
 LITTLE = 0.01  # damping that makes no difference to how a step looks
 WORSE = 2.0  # times the damping of a program that its answer may ask for before it is solved again with that
 AGAIN = 2  # times that a program is solved again at most; with 1 a goal that is just blocked makes limbs jump
@@ -223,7 +224,8 @@ def numbers_of(scale: float, gain: float) -> Array:
 
     Returns:
         What `subproblem_kernel.program` takes (10), damping, what counts
-        as rest, weight of elastic rows, most rows of a contact, force of goals (4), limits of the working set.
+        as rest, weight of elastic rows, most rows of a contact, force of goals (4), limits of the working set
+        (6), how far what is held is run ahead of.
     """
     program = (
         scale,
@@ -237,7 +239,7 @@ def numbers_of(scale: float, gain: float) -> Array:
         ERROR_CLAMP * RADIUS,
     )
     own = (gain, DAMPING, RESTING, ELASTIC_WEIGHT, MOST_ROWS)
-    return np.array([*program, *own, *FORCE, *LIMITS])
+    return np.array([*program, *own, *FORCE, *LIMITS, CURVED])
 
 
 @lru_cache(maxsize=1)

@@ -112,6 +112,8 @@ def solve(
     error = max(np.sqrt(error), 1e-12)
     for r in range(m):
         shift[r] = soft_values[0, r] - before[last + r] if known else 0.0
+    for r in range(goals, m):  # what is held: a step much shorter than the last one is curved much less
+        shift[r] = min(max(shift[r], -numbers[24]), numbers[24])
     if known:
         damping = max(damping, numbers[10] * min(1.0, before[last + m] / error))
         # what a goal that rests is missed by, because the last step was curved; a goal that moves is not run ahead of

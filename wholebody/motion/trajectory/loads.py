@@ -19,9 +19,9 @@ import pinocchio as pin
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.motion.clip import Clip
-from wholebody.motion.frame_terms import FrameTerms
+from wholebody.motion.frame_terms import FrameTerms, between
 from wholebody.motion.inverse_dynamics import LIGHT, Derivatives, InverseDynamics, Loads, Stand, zero_moment_point
-from wholebody.motion.load_change import soles_of
+from wholebody.motion.load_change import on_filtered, soles_of, standing_frames
 from wholebody.motion.strength import Strength, torque_limits
 from wholebody.motion.torques import CUTOFF, smoothed
 from wholebody.motion.trajectory.chart import Chart
@@ -33,6 +33,9 @@ FRICTION = 0.8
 
 LENGTH = 0.1
 """Metres that stand for a whole strength: one hundredth of it is weighed like a millimetre of the support."""
+
+TOLERATED = 5e-4
+"""Metres, see `LENGTH`: what a frame whose postures are free may be beyond its bounds without being changed."""
 
 NEAR = 0.05
 """Metres: a load that is farther from its bound has no row; what passes unseen has one in the next step."""
@@ -63,17 +66,21 @@ class ClipLoads:
         base: (n, nq) the filtered postures.
     """
 
-    def __init__(self, clip: Clip, dynamics: InverseDynamics, stands: Sequence[Stand], bounds: LoadBounds) -> None:
+    def __init__(
+        self, clip: Clip, dynamics: InverseDynamics, stands: Sequence[Stand], bounds: LoadBounds,
+        changed: Array | None = None,
+    ) -> None:  # fmt: skip
         """Look at a clip.
 
         Args:
-            clip: the postures.
+            clip: the original postures.
             dynamics: of the figure.
             stands: where each frame stands.
             bounds: of the loads.
+            changed: (n, nq) postures made of them, whose loads are looked at; None for the original ones.
         """
-        self.figure, self.dt, self.bounds = clip.figure, clip.dt, bounds
-        self.base = smoothed(clip, CUTOFF).q
+        self.figure, self.dt, self.bounds, self._original = clip.figure, clip.dt, bounds, clip.q
+        self.base = on_filtered(clip.figure, clip.q, clip.q if changed is None else changed, clip.dt)
         self.dynamics, self.stands = dynamics, stands
 
     @classmethod
@@ -133,12 +140,20 @@ class ClipLoads:
             q: as many as before, or at other times of the clip.
             times: (m,) these times, seconds; None for those of the frames.
         """
-        clip = Clip(self.figure, q, self.dt)
         if times is None:
-            return ClipLoads(clip, self.dynamics, self.stands, self.bounds)
-        nearest = np.clip(np.rint(times / self.dt).astype(int), 0, len(self.base) - 1)
-        bounds = with_values(self.bounds, outside=tuple(self.bounds.outside[frame] for frame in nearest))
-        return ClipLoads(clip, self.dynamics, [self.stands[frame] for frame in nearest], bounds)
+            return ClipLoads(Clip(self.figure, self._original, self.dt), self.dynamics, self.stands, self.bounds, q)
+        clip = Clip(self.figure, between(self.figure.model, self._original, times / self.dt), self.dt)
+        feet = np.array([len(np.unique(stand.owner)) for stand in self.stands])
+        frames = standing_frames(times / self.dt, feet).tolist()
+        bounds = with_values(self.bounds, outside=tuple(self.bounds.outside[frame] for frame in frames))
+        return ClipLoads(clip, self.dynamics, [self.stands[frame] for frame in frames], bounds, q)
+
+    def beyond(self) -> Mask:
+        """(n,) frames whose loads are beyond their bounds by more than `TOLERATED`."""
+        rows, found = WindowLoads(self, 0, len(self.base)), np.zeros(len(self.base), dtype=bool)
+        for frame in rows.frames:
+            found[frame] = min(part.min(initial=0.0) for part in rows.gaps(frame)) < -TOLERATED
+        return found
 
     def timed(self, b: Array) -> TimedRows:
         """Rows of the loads of these postures, when they are passed at rates whose squares are b (n,) or about that.
@@ -216,6 +231,14 @@ class WindowLoads:
         near = (frame - 1, frame, frame + 1)
         found = [chart.posture(k, x[k]) if 0 <= k < len(chart) else base[self._first + k] for k in near]
         return found[0], found[1], found[2]
+
+    def gaps(self, frame: int) -> tuple[Array, Array]:
+        """Gaps to the bounds of a frame of the window without deviation; see `ClipLoads.gaps`."""
+        before, here, after = self.postures(frame, np.zeros((len(self._chart), self._loads.figure.model.nv)))
+        v, a = self._loads.motion(before, here, after)
+        number = self._first + frame
+        found = self._loads.dynamics.loads(here, v, a, self._loads.stands[number])
+        return self._loads.gaps(number, found)
 
     def rows(self, frame: int, x: Array) -> tuple[Array, tuple[Array, ...]]:
         """Gaps (r,) of what is near its bound, and derivatives (r, nv) for the frames before, at and after.

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody import checks
-from wholebody.arrays import Array
+from wholebody.arrays import Array, Mask
 from wholebody.checks import listed
 from wholebody.figures.state import State
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
@@ -101,20 +101,27 @@ class Trajectory:
             passed = between(scene.model, q, new.times / clip.dt)
             loads = None if loads is None else loads.of(passed, new.times)
             again = ClipRun(self, slower, workspace, solve, passed, 1.0, loads)
-            q, left = self._freed(again, slower, workspace, passed, watch)
+            beyond = None if loads is None else loads.beyond()
+            q, left = self._freed(again, slower, workspace, passed, watch, beyond)
         return MethodResult(
             q, run.posture_solves + again.posture_solves, run.programs + again.programs, _said(watch, [*missed, *left]),
             times=new.times, stretch=new.largest,
         )  # fmt: skip
 
     def _freed(
-        self, run: ClipRun, terms: FrameTerms, workspace: Workspace, reference: Array, watch: Watch
-    ) -> tuple[Array, list[str]]:
-        """Postures (n, nq) that are free, as near as can be to reference postures (n, nq), and what is missed."""
+        self, run: ClipRun, terms: FrameTerms, workspace: Workspace, reference: Array, watch: Watch,
+        beyond: Mask | None = None,
+    ) -> tuple[Array, list[str]]:  # fmt: skip
+        """Postures (n, nq) that are free, as near as can be to reference postures (n, nq), and what is missed.
+
+        Frames (n,) that are beyond something else are changed too.
+        """
         q: Array = np.array(reference)
         watch.tell(0.0, "looking for collisions")
         depths, wrong, gaps = faults(workspace, terms, reference, self.clearance)
         wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
+        if beyond is not None:
+            wrong |= beyond
         found = windows(wrong, max(3, round(self.margin / terms.dt)))
         warn_of_osqp(self.solver, sum(map(len, found)) * terms.scene.model.nv)
         total, done = max(1, sum(map(len, found))), 0
@@ -151,7 +158,8 @@ class Trajectory:
             window: that was not freed.
             freed: what was found for it.
             q: (n, nq) postures of the clip, with these.
-            depths, gaps: as for `ClipRun.window`.
+            depths: as for `ClipRun.window`.
+            gaps: as for `ClipRun.window`.
             cancelled: told the share done.
         """
         margin = max(3, round(self.margin / run.dt))
