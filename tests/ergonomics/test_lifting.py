@@ -33,6 +33,15 @@ def test_loading_punch_press_stock(height: float, limit: float, index: float) ->
     assert lift.multipliers["DM"] == pytest.approx(0.86, abs=0.006)
 
 
+def test_loading_bags_into_a_hopper() -> None:
+    """Example 3 of the manual: 40 lb, H 18 in, V 15 in, D 21 in, turned by 45 degrees, seldom, fair grip: 18.9 lb."""
+    lift = wb.Lift(18 * INCH, 15 * INCH, 21 * INCH, radians(45.0), coupling="fair", load=40 * POUND)
+    assert pounds(lift.limit) == pytest.approx(18.9, rel=0.045)
+    assert lift.index == pytest.approx(2.1, abs=0.2)
+    printed = {"HM": 0.56, "VM": 0.89, "DM": 0.91, "AM": 0.86, "FM": 1.0, "CM": 0.95}
+    assert lift.multipliers == pytest.approx(printed, abs=0.02)
+
+
 def test_the_ideal_lift_is_the_load_constant() -> None:
     lift = wb.Lift(0.25, 0.75, 0.25, load=11.5)
     assert lift.limit == pytest.approx(23.0)

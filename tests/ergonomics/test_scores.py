@@ -73,6 +73,72 @@ def test_rula_by_its_printed_tables(parts: tuple[int, ...], a: int, b: int, scor
     assert (found.arm, found.body, found.score) == (a, b, score)
 
 
+WORKSHEET_A = """
+12222333 22223333 23333344
+23333444 33333444 34444455
+33444455 34444455 44444555
+44444555 44444555 44455566
+55555667 56666777 66677778
+77777889 88888999 99999999
+"""  # upper arm by lower arm; in a number wrist and twist
+WORKSHEET_B = """
+132334556677 232345556777 333445566777 555667777788 777778888888 888888899999
+"""  # neck; in a number trunk and legs
+WORKSHEET_C = "1233455 2234455 3334456 3334566 4445677 4456677 5566777 5567777"
+
+
+def test_rula_tables_are_those_of_the_printed_worksheet() -> None:
+    """Written down anew, as the worksheet of Cornell University lays them out."""
+    for table, sheet in (
+        (rula_module.TABLE_A, WORKSHEET_A), (rula_module.TABLE_B, WORKSHEET_B), (rula_module.TABLE_C, WORKSHEET_C),
+    ):  # fmt: skip
+        assert flat(table) == [int(digit) for digit in "".join(sheet.split())]
+
+
+REBA_SHEET_A = """
+1234 1234 3356
+2345 3456 4567
+2456 4567 5678
+3567 5678 6789
+4678 6789 7899
+"""  # trunk by neck; in a number legs
+REBA_SHEET_B = "122 123 123 234 345 455 455 567 678 788 788 899"  # upper arm by lower arm; in a number wrist
+REBA_SHEET_C = """
+1 1 1 2 3 3 4 5 6 7 7 7
+1 2 2 3 4 4 5 6 6 7 7 8
+2 3 3 3 4 5 6 7 7 8 8 8
+3 4 4 4 5 6 7 8 8 9 9 9
+4 4 4 5 6 7 8 8 9 9 9 9
+6 6 6 7 8 8 9 9 10 10 10 10
+7 7 7 8 9 9 9 10 10 11 11 11
+8 8 8 9 10 10 10 10 10 11 11 11
+9 9 9 10 10 10 11 11 11 12 12 12
+10 10 10 11 11 11 11 12 12 12 12 12
+11 11 11 11 12 12 12 12 12 12 12 12
+12 12 12 12 12 12 12 12 12 12 12 12
+"""
+
+
+def test_reba_tables_are_those_of_the_printed_worksheet() -> None:
+    """Written down anew, as the employee assessment worksheet lays them out: table A by trunk, not by neck."""
+    by_trunk = np.array([[int(d) for d in word] for word in REBA_SHEET_A.split()]).reshape(5, 3, 4)
+    assert np.array_equal(np.array(reba_module.TABLE_A), by_trunk.transpose(1, 0, 2))
+    assert flat(reba_module.TABLE_B) == [int(digit) for digit in "".join(REBA_SHEET_B.split())]
+    assert flat(reba_module.TABLE_C) == [int(word) for word in REBA_SHEET_C.split()]
+
+
+def test_rula_by_examples_of_a_study() -> None:
+    """A published assessment of workers: trunk 5 (3, twisted and bent aside) and legs 1 give 6 of table B.
+
+    With the muscle score it is more than 7, the last column of table C.
+    """
+    for neck in (1, 2, 3):
+        assert wb.RulaParts(4, 3, 3, 1, neck, 5, 1).body == 6
+    static = wb.RulaParts(4, 3, 3, 1, 3, 5, 1, muscle=1)
+    assert (static.arm, static.score) == (5, 7)
+    assert static.action.endswith("at once")
+
+
 def test_reba_by_the_example_of_a_public_package() -> None:
     """rs9000/ergonomics prints two poses: neck 2, trunk 2, legs 2, upper arm 1, lower arm 2, wrist 3 and 2."""
     left, right = wb.RebaParts(2, 2, 2, 1, 2, 3), wb.RebaParts(2, 2, 2, 1, 2, 2)
@@ -86,6 +152,7 @@ def test_owas_by_an_example_of_a_lecture() -> None:
     """A. Freivalds (Pennsylvania State University): 2151 is a bent back, arms below, knees bent, less than 10 kg."""
     assert wb.Owas(2, 1, 5, 1).category == 3
     assert wb.Owas(1, 1, 2, 1).category == 1
+    assert wb.Owas(1, 2, 2, 1).category == 1  # the example of rs9000/ergonomics
     assert wb.Owas(4, 3, 4, 3).category == 4
     codes = itertools.product((1, 2, 3, 4), (1, 2, 3), range(1, 8), (1, 2, 3))
     assert {wb.Owas(*code).category for code in codes} == {1, 2, 3, 4}

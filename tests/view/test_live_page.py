@@ -7,14 +7,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import coal
 import numpy as np
 import pytest
 
 import wholebody as wb
 from wholebody.tracking.live import LiveDrag
 from wholebody.view.browser import Browser
-from wholebody.view.live_page import LivePage, triangles
+from wholebody.view.live_page import LivePage
 
 pytestmark = pytest.mark.browser
 EYE, TARGET = np.array((2.2, -1.6, 1.4)), np.array((0.0, 0.0, 0.9))
@@ -92,13 +91,3 @@ def test_mouse_drags_holds_undoes_and_saves(page: LivePage, tmp_path: Path) -> N
         press(browser, "undo")
         until(lambda: np.array_equal(drag.q, start))
         assert not browser.errors
-
-
-@pytest.mark.parametrize(
-    "shape", [coal.Box(0.1, 0.2, 0.3), coal.Sphere(0.1), coal.Capsule(0.1, 0.3), coal.Ellipsoid(0.1, 0.2, 0.3)]
-)
-def test_what_is_drawn_has_the_size_of_what_is_tested(shape: Any) -> None:
-    mesh = triangles(shape)
-    shape.computeLocalAABB()
-    np.testing.assert_allclose(mesh.bounds, (shape.aabb_local.min_, shape.aabb_local.max_), atol=1e-2)
-    assert mesh.is_watertight

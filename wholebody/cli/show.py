@@ -40,7 +40,9 @@ def add_to(commands: Commands) -> None:
     parser.add_argument("what", metavar="FIGURE|TASK|RESULT", help="what to show")
     parser.add_argument("--posture", metavar="NAME", help="name of a posture of the figure")
     parser.add_argument("--pieces", action="store_true", help="draw the pieces that contacts are measured with")
-    parser.add_argument("--save", type=Path, metavar="FILE", help="write FILE.html or FILE.png; open no browser")
+    parser.add_argument(
+        "--save", type=Path, metavar="FILE", help="write FILE.html, FILE.png or FILE.glb (glTF); open no browser"
+    )
     parser.add_argument(
         "--port", type=int, default=0, metavar="N", help="port of the live page (default: a free one from 7000)"
     )
@@ -57,8 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.errors import InputError
 
     save: Path | None = arguments.save
-    if save is not None and save.suffix.lower() not in (".html", ".png"):
-        raise InputError(f"--save: {save} ends in neither .html nor .png; give it one of them")
+    if save is not None and save.suffix.lower() not in (".html", ".png", ".glb"):
+        raise InputError(f"--save: {save} ends in none of .html, .png and .glb; give it one of them")
     if save is not None and (arguments.port or arguments.host != LOCAL):
         raise InputError("--port and --host are for the live page; leave them out beside --save")
     problem, q, view, title = _subject(arguments.what)
@@ -71,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
             viewer.open()
             viewer.wait(math.inf)
             viewer.wait_until_closed()
-        elif save.suffix.lower() == ".html":
+        elif save.suffix.lower() in (".html", ".glb"):
             print(f"wrote {viewer.save(save)}")
         else:
             print(f"wrote {viewer.picture(save)}")

@@ -7,6 +7,7 @@ Directions of segments are compared, as the joint coordinate systems of the Inte
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -26,6 +27,48 @@ SIDEWAYS = 0.2
 
 HORIZONTAL = 0.1
 """Horizontal part of a direction below which it points up or down."""
+
+
+class Scored(Protocol):
+    """Scores of one side."""
+
+    @property
+    def score(self) -> int:
+        """What they come to."""
+
+    @property
+    def action(self) -> str:
+        """What the paper says of it."""
+
+
+Parts = TypeVar("Parts", bound=Scored)
+
+
+@dataclass(frozen=True)
+class BothSides(Generic[Parts]):
+    """Scores of both sides, of which the worse one counts.
+
+    Attributes:
+        left, right: the parts of each side.
+    """
+
+    left: Parts
+    right: Parts
+
+    @property
+    def worse(self) -> str:
+        """The side with the greater score; "right" where they are equal."""
+        return "left" if self.left.score > self.right.score else "right"
+
+    @property
+    def score(self) -> int:
+        """The greater score of both sides."""
+        return max(self.left.score, self.right.score)
+
+    @property
+    def action(self) -> str:
+        """What the paper says of the greater score."""
+        return (self.left if self.worse == "left" else self.right).action
 
 
 @dataclass(frozen=True)

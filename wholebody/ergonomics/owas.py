@@ -1,7 +1,8 @@
 """OWAS, Ovako working posture analysing system: O. Karhu, P. Kansi, I. Kuorinka, Applied Ergonomics 8(4), 1977.
 
 The action categories are those of Karhu, Härkönen, Sorvali and Vepsäläinen, Applied Ergonomics 12(1), 1981, as
-handbooks tabulate them. The papers have pictures instead of angles; the constants say what is taken.
+handbooks tabulate them; where public tables differ in a cell, the value of most of them was taken. The papers have
+pictures instead of angles; the constants say what is taken.
 """
 
 from __future__ import annotations

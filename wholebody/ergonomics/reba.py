@@ -7,7 +7,7 @@ from math import radians
 
 from wholebody import checks
 from wholebody.arrays import Array
-from wholebody.ergonomics.angles import SIDES, BodyAngles, body_angles
+from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides, body_angles
 from wholebody.ergonomics.rula import ABDUCTED, DEVIATED, END_OF_TWIST, NEUTRAL, RAISED, lower_arm, position, turned
 from wholebody.ergonomics.work import COUPLINGS, Work, both_feet, check_work
 from wholebody.figures.figure import Figure
@@ -112,31 +112,8 @@ class RebaParts:
         return next(words for most, words in ACTIONS if self.score <= most)
 
 
-@dataclass(frozen=True)
-class Reba:
-    """REBA of both sides.
-
-    Attributes:
-        left, right: the parts with the arm and the leg of each side.
-    """
-
-    left: RebaParts
-    right: RebaParts
-
-    @property
-    def worse(self) -> str:
-        """The side with the greater score; "right" where they are equal."""
-        return "left" if self.left.score > self.right.score else "right"
-
-    @property
-    def score(self) -> int:
-        """The greater score of both sides."""
-        return max(self.left.score, self.right.score)
-
-    @property
-    def action(self) -> str:
-        """What the paper says of the greater score."""
-        return getattr(self, self.worse).action  # type: ignore[no-any-return]
+class Reba(BothSides[RebaParts]):
+    """REBA of both sides: the parts with the arm and the leg of each side."""
 
 
 def reba(figure: Figure, q: Array, work: Work | None = None) -> Reba:

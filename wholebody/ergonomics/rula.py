@@ -1,7 +1,8 @@
 """RULA, rapid upper limb assessment: L. McAtamney and E. N. Corlett, Applied Ergonomics 24(2), 1993, pages 91 to 99.
 
-The tables are those of the paper as the worksheets of A. Hedge (Cornell University) and ErgonomicsPlus print them.
-Where the paper has words instead of numbers ("twisted", "raised"), the constants say what is taken.
+The tables are those of the paper as the worksheets of A. Hedge (Cornell University) and ErgonomicsPlus print them. Nine
+public implementations were compared with table C; eight agree in every cell. Where the paper has words instead of
+numbers ("twisted", "raised"), the constants say what is taken.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from math import radians
 
 from wholebody import checks
 from wholebody.arrays import Array
-from wholebody.ergonomics.angles import SIDES, BodyAngles, SideAngles, body_angles
+from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides, SideAngles, body_angles
 from wholebody.ergonomics.work import Work, both_feet, check_work
 from wholebody.figures.figure import Figure
 
@@ -127,31 +128,8 @@ class RulaParts:
         return next(words for most, words in ACTIONS if self.score <= most)
 
 
-@dataclass(frozen=True)
-class Rula:
-    """RULA of both sides.
-
-    Attributes:
-        left, right: the parts of each side.
-    """
-
-    left: RulaParts
-    right: RulaParts
-
-    @property
-    def worse(self) -> str:
-        """The side with the greater score; "right" where they are equal."""
-        return "left" if self.left.score > self.right.score else "right"
-
-    @property
-    def score(self) -> int:
-        """The greater score of both sides."""
-        return max(self.left.score, self.right.score)
-
-    @property
-    def action(self) -> str:
-        """What the paper says of the greater score."""
-        return getattr(self, self.worse).action  # type: ignore[no-any-return]
+class Rula(BothSides[RulaParts]):
+    """RULA of both sides."""
 
 
 def rula(figure: Figure, q: Array, work: Work | None = None) -> Rula:

@@ -38,7 +38,7 @@ class Composition:
             see_through: names of things to draw transparent.
             names: whether to write the names of things beside them.
         """
-        self._scene, self._graph = scene, graph
+        self.scene, self._graph = scene, graph
         self._contact_distance, self._see_through, self._names = contact_distance, see_through, names
         self._state = State(scene.model)
         self.pieces = False
@@ -55,9 +55,9 @@ class Composition:
         Raises:
             InputError: there is none: the scene is of parts alone.
         """
-        if self._scene.figure is None:
+        if self.scene.figure is None:
             raise InputError("the scene has no figure, so it has no frames to show")
-        figure: Figure = self._scene.figure
+        figure: Figure = self.scene.figure
         return figure
 
     def frames(self, names: Iterable[str], length: float) -> None:
@@ -68,8 +68,8 @@ class Composition:
     def bodies(self) -> Bodies:
         """The body or pieces, and things; drawn when first needed, and again after things were added or removed."""
         drawn = self._bodies
-        if drawn is None or drawn.revision != self._scene.revision or drawn.pieces != self.pieces:
-            drawn = self._bodies = Bodies(self._scene, self._see_through, self.pieces)
+        if drawn is None or drawn.revision != self.scene.revision or drawn.pieces != self.pieces:
+            drawn = self._bodies = Bodies(self.scene, self._see_through, self.pieces)
             drawn.build(self._graph)
         return drawn
 
@@ -88,18 +88,18 @@ class Composition:
         bodies, state, keyframe = self.bodies, self._state.update(q), Keyframe()
         bodies.pose(keyframe, state.data)
         bodies.dye(keyframe, self.dyed)
-        contacts = self._scene.contacts(q, within=self._contact_distance)
+        contacts = self.scene.contacts(q, within=self._contact_distance)
         color_contacts(keyframe, bodies, contacts)
         mark_contacts(keyframe, bodies, contacts)
-        self._goals = Goals(self._scene, problem) if problem is not None else None
+        self._goals = Goals(self.scene, problem) if problem is not None else None
         if self._goals is not None:
             self._goals.mark(keyframe, state)
         if blockers:
             asked = float(problem.clearances.max(initial=0.0))
-            near = self._scene.contacts(q, within=asked + self._contact_distance)
-            mark_blockers(keyframe, self._scene, state, near, blockers)
+            near = self.scene.contacts(q, within=asked + self._contact_distance)
+            mark_blockers(keyframe, self.scene, state, near, blockers)
         mark_overlaps(keyframe, overlaps)
-        mark_frames(keyframe, self._scene, state, self._frames, self._axes)
+        mark_frames(keyframe, self.scene, state, self._frames, self._axes)
         if self._names:
             for path, (name, top) in bodies.tops(state.data).items():
                 matrix = np.eye(4)

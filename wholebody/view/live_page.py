@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
@@ -17,6 +16,7 @@ from wholebody.errors import MissingPackageError, WholebodyError
 from wholebody.methods import METHODS
 from wholebody.tracking.drag import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
+from wholebody.view.gltf import triangles
 
 SKIN, FREE, HELD, GRIP = (214, 180, 150), (70, 130, 220), (225, 90, 40), (90, 170, 90)
 STILL = 1e-5  # m, rad: what moves less is not sent
@@ -24,8 +24,6 @@ EYE = (2.2, -1.6, 0.6)  # m: of the camera, from the figure's centre of mass
 RADIUS = 0.04  # m: of a handle
 SETTLING = 90  # frames after the mouse lets go in which the figure still follows to where it let go
 THROUGH = 0.7  # opacity of the figure, so that the handles in it are seen
-GROUND = 6.0  # m: of the piece of a half-space that is drawn
-SECTIONS = (24, 24)  # of what is round
 
 
 class LivePage:
@@ -237,28 +235,3 @@ def _bytes(color: tuple[float, float, float, float] | None, number: int) -> tupl
 
     red, green, blue = (style.object_color(number) if color is None else color)[:3]
     return round(255 * red), round(255 * green), round(255 * blue)
-
-
-def triangles(shape: Any) -> Any:
-    """A trimesh of a coal shape, about the shape's own origin; a square of a half-space."""
-    import trimesh
-
-    if isinstance(shape, coal.Box):
-        return trimesh.creation.box(2.0 * np.array(shape.halfSide))
-    if isinstance(shape, coal.Sphere):
-        return trimesh.creation.icosphere(radius=shape.radius)
-    if isinstance(shape, coal.Capsule):
-        mesh = trimesh.creation.capsule(2.0 * shape.halfLength, shape.radius, count=SECTIONS)
-        mesh.apply_translation(-mesh.bounds.mean(axis=0))
-        return mesh
-    if isinstance(shape, coal.Ellipsoid):
-        mesh = trimesh.creation.icosphere()
-        mesh.apply_scale(np.array(shape.radii))
-        return mesh
-    if isinstance(shape, coal.Halfspace):
-        place = trimesh.geometry.align_vectors((0.0, 0.0, 1.0), np.array(shape.n))
-        mesh = trimesh.creation.box((GROUND, GROUND, 1e-3))
-        mesh.apply_transform(place)
-        mesh.apply_translation(np.array(shape.n) * (float(shape.d) - 1e-3))
-        return mesh
-    return trimesh.convex.convex_hull(np.array(shape.points()))

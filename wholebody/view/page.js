@@ -139,7 +139,23 @@
     viewer.set_object(parts(cmd.path), mesh);
   }
 
-  // Lifts labels that would cover each other, the lower ones first in place, by whole label heights.
+  // Boxes on the screen around wrists that are large enough for hands.
+  const HAND = 0.17, CLOSE = 0.5; // m; of half the screen's height, from which a hand is all that is looked at
+  function hands(up) {
+    const figure = viewer.scene_tree.children.figure, found = [];
+    const eye = new THREE.Vector3().setFromMatrixPosition(viewer.camera.matrixWorld);
+    for (const [name, node] of Object.entries(figure ? figure.children : {})) {
+      if (!name.includes("wrist")) continue;
+      const at = new THREE.Vector3().setFromMatrixPosition(node.object.matrixWorld);
+      const size = HAND / (eye.distanceTo(at) * up);
+      at.project(viewer.camera);
+      const box = { x: at.x, w: 2 * size / viewer.camera.aspect, bottom: at.y - size, h: 2 * size, hand: true };
+      if (size < CLOSE) found.push(box);
+    }
+    return found;
+  }
+
+  // Moves labels off hands, up or down, and lifts those that would cover each other, the lower ones first in place.
   function arrange() {
     const up = Math.tan(viewer.camera.fov * Math.PI / 360);
     viewer.camera.updateMatrixWorld();
@@ -154,14 +170,17 @@
       found.push({ sprite, x: at.x, y: at.y, w: sprite.scale.x / (up * viewer.camera.aspect), h: sprite.scale.y / up });
     }
     found.sort((a, b) => a.y - b.y);
-    const placed = [];
+    const placed = hands(up);
     for (const item of found) {
       let bottom = item.y + 0.4 * item.h;
       for (let hit = true, tries = 0; hit && tries < 12; tries++) {
-        hit = placed.find(p => Math.abs(p.x - item.x) < (p.w + item.w) / 2 && Math.abs(p.bottom - bottom) < item.h);
-        if (hit) bottom = hit.bottom + 1.05 * item.h;
+        hit = placed.find(p => Math.abs(p.x - item.x) < (p.w + item.w) / 2
+                               && p.bottom < bottom + item.h && bottom < p.bottom + p.h);
+        if (!hit) break;
+        const above = hit.bottom + hit.h + 0.05 * item.h, below = hit.bottom - 1.05 * item.h;
+        bottom = hit.hand && bottom - below < above - bottom ? below : above;
       }
-      placed.push({ x: item.x, w: item.w, bottom });
+      placed.push({ x: item.x, w: item.w, bottom, h: item.h });
       item.sprite.center.set(0.5, (item.y - bottom) / item.h);
     }
   }

@@ -26,6 +26,7 @@ from wholebody.problem import Problem
 from wholebody.view import style
 from wholebody.view.camera import look
 from wholebody.view.composition import Composition
+from wholebody.view.gltf import posture_glb
 from wholebody.view.movie import check_movie, frame_times, movie
 from wholebody.view.page import live_page, static_page
 from wholebody.view.scene_graph import SceneGraph
@@ -283,22 +284,23 @@ class Viewer:
         return self._live().wait_until_closed(_seconds(timeout))
 
     def sync(self, timeout: float = 10.0) -> bool:
-        """Wait up to `timeout` seconds until every open tab has drawn everything; return whether they have."""
+        """Wait up to `timeout` seconds until every open tab has drawn everything; return whether it has."""
         return self._live().sync(_seconds(timeout))
 
     # ---- files
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the scene as one HTML file that opens in any browser without a network, motion included.
+        """Write the scene as one HTML file that opens in any browser without a network; as glTF to a path FILE.glb.
 
-        Returns:
-            The path.
+        HTML has the motion, glTF pieces and things at the posture, or at the motion's beginning. Returns the path.
 
         Raises:
             InputError: nothing is shown yet, or the file cannot be written.
         """
-        place = checks.path(path, "path")
-        return write(place, static_page(self._commands(), self.title))
+        place, commands = checks.path(path, "path"), self._commands()
+        gltf = place.suffix.lower() == ".glb"
+        made = posture_glb(self._composition.scene, self._seen[0]) if gltf else static_page(commands, self.title)
+        return write(place, made)
 
     def _repr_html_(self) -> str:
         """The scene in a notebook: a frame with the page that `save` writes; a sentence if nothing is shown yet."""

@@ -5,7 +5,7 @@ trimesh writes the meshes and the nodes. Its postprocessors add keyframes of rot
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,16 +49,10 @@ def write(motion: Motion, path: Path) -> Path:
     figure = motion.figure
     if len(motion.q) * figure.model.njoints > MOST_KEYS:
         raise InputError(f"{motion.name}: {len(motion.q)} frames are too many for one glTF file; write parts of it")
-    names = [f"joint {name}" for name in figure.model.names]
     keys = _keys(figure, motion.q)
-    scene = trimesh.Scene(base_frame=WORLD)
-    upward = np.eye(4)
-    upward[:3, :3] = UP["y"].T
-    scene.graph.update(frame_to=names[0], frame_from=WORLD, matrix=upward)
-    for joint in range(1, figure.model.njoints):
-        at = np.eye(4)
-        at[:3, :3], at[:3, 3] = pin.Quaternion(keys[0][0, joint]).matrix(), keys[1][0, joint]
-        scene.graph.update(frame_to=names[joint], frame_from=names[figure.model.parents[joint]], matrix=at)
+    scene, names = joint_tree(
+        figure.model, [pin.XYZQUATToSE3(np.r_[at, turn]) for turn, at in zip(keys[0][0], keys[1][0], strict=True)]
+    )
     material = trimesh.visual.material.PBRMaterial(baseColorFactor=COLOR, roughnessFactor=0.8, metallicFactor=0.0)
     for piece in figure.geometry.geometryObjects:
         mesh = _mesh(trimesh, piece.geometry)
@@ -70,6 +64,26 @@ def write(motion: Motion, path: Path) -> Path:
             )  # fmt: skip
     animate = _Animation(motion, names, keys)
     return write_file(path, export_glb(scene, buffer_postprocessor=animate.buffers, tree_postprocessor=animate.tree))
+
+
+def joint_tree(model: Any, placements: Sequence[pin.SE3]) -> tuple[Any, list[str]]:
+    """A trimesh.Scene with one node a joint, y up, and the names of the nodes.
+
+    Args:
+        model: Pinocchio's model.
+        placements: of each joint in its parent.
+    """
+    import trimesh
+
+    names = [f"joint {name}" for name in model.names]
+    scene = trimesh.Scene(base_frame=WORLD)
+    upward = np.eye(4)
+    upward[:3, :3] = UP["y"].T
+    scene.graph.update(frame_to=names[0], frame_from=WORLD, matrix=upward)
+    for joint in range(1, model.njoints):
+        at = placements[joint].homogeneous
+        scene.graph.update(frame_to=names[joint], frame_from=names[model.parents[joint]], matrix=at)
+    return scene, names
 
 
 class _Animation:
