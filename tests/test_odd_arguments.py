@@ -238,8 +238,11 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "load", Call(lambda spec, **options: wb.load(spec, **options), {"spec": path / "arm.urdf"})
     for option, value in {"root": "fixed", "package_dirs": [path], "concavity": 0.5, "samples": 10, "seed": 0}.items():
         yield f"load({option})", Call(wb.load, {"spec": path / "arm.urdf", option: value})
-    for option, value in {"sex": "male", "stature": 1.7, "mass": 70.0, "detail": "spheres"}.items():
+    for option, value in {"sex": "male", "stature": 1.7, "mass": 70.0, "detail": "spheres", "age": 50.0}.items():
         yield f"load({option})", Call(lambda _option=option, **given: wb.load("human", **given), {option: value})
+    yield "load(proportions)", Call(lambda **given: wb.load("human", **given), {"proportions": {"span": 1.85}})
+    yield "finger_angles", Call(wb.finger_angles, {"shape": "fist", "side": "left"})
+    yield "load(hands)", Call(lambda **given: wb.load("human", **given), {"hands": "rigid"})
     yield "load(side)", Call(lambda **given: wb.load("hand", **given), {"side": "left", "stature": 1.7})
     yield "Figure.clamp", Call(arm.clamp, {"q": q})
     yield "Figure.describe", Call(arm.describe, {})

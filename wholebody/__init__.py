@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from wholebody.ergonomics.vision import FieldOfView, Sight, sight
     from wholebody.ergonomics.work import Work
     from wholebody.figures import Figure, load
+    from wholebody.figures.human_fingers import finger_angles
     from wholebody.geometry.shapes import (
         Box,
         Capsule,
@@ -235,6 +236,7 @@ __all__ = [
     "check_derivatives",
     "equipment",
     "ergonomics_of",
+    "finger_angles",
     "follow_path",
     "lift_between",
     "load",
@@ -264,6 +266,7 @@ _MODULES = {
     "wholebody.assessment": "Assessment assess",
     "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
+    "wholebody.figures.human_fingers": "finger_angles",
     "wholebody.geometry.shapes": "Box Capsule Cylinder Ellipsoid HalfSpace Hull Mesh Shape Sphere Torus",
     "wholebody.dynamics.coupling": "Spring",
     "wholebody.dynamics.world": "World",

@@ -67,6 +67,8 @@ def roots(targets: Array, places: Integers, q: Array, value: Array, jacobian: Ar
     [[A, B A], [0, A]] with A the transpose of J and B the derivative of v by the rotation (Chirikjian 2011, section
     10.6, in the form of Pinocchio's Jlog6).
     """
+    if not len(targets):
+        return
     own, change, left, bend = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     angle, way, along = np.empty(3), np.empty(3), np.empty(3)
     for e in range(len(targets)):
@@ -136,6 +138,8 @@ def rhythms(
     girdles: Array, girdle_places: Integers, lumbars: Array, lumbar_places: Integers, q: Array, measure: Array
 ) -> None:
     """See `tasks.Rhythm`."""
+    if not len(girdles) + len(lumbars):
+        return
     slopes, at = np.empty(5), np.empty(5, dtype=np.int64)
     for e in range(len(girdles)):
         flexion, abduction = q[girdle_places[e, 1]], q[girdle_places[e, 2]]
@@ -192,6 +196,8 @@ def heights(
     measure: Array,
 ) -> None:
     """See `tasks.PotentialEnergy`."""
+    if not len(tables):
+        return
     nv = measure.shape[1] - 1
     row = np.empty(nv)
     centre = np.empty(3)

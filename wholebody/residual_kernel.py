@@ -36,6 +36,8 @@ def _placed(joint: Array, part: Array, turn: Array, place: Array) -> None:
 @compiled(error_model="numpy")
 def residuals(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.residuals.PlacementResidual`."""
+    if not len(tables):
+        return
     turn, base_turn, relative, change = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     place, base_place, way, angle = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     left = np.empty((3, 3))
@@ -138,6 +140,8 @@ def inverse_left(angle: Array, left: Array) -> None:
 @compiled()
 def planes(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.Plane`."""
+    if not len(tables):
+        return
     place = np.empty(3)
     for e in range(len(tables)):
         row, joint = entries[e, 0], joints[entries[e, 1]]
@@ -156,6 +160,8 @@ def planes(tables: Array, entries: Integers, joints: Array, wrench: Array, value
 @compiled(error_model="numpy")
 def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.Axis`."""
+    if not len(tables):
+        return
     turn, axes, place, direction = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
     change, move = np.empty((2, 3)), np.empty((2, 3))
     for e in range(len(tables)):
@@ -214,6 +220,8 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
 @compiled(error_model="numpy")
 def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.ReachCones` and `figures.reach_cones.ReachCone.signed_angle`."""
+    if not len(tables):
+        return
     turn, world, local, outward = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
     for e in range(len(tables)):
         row, limb, reference = entries[e, 0], joints[entries[e, 1]], joints[entries[e, 2]]
@@ -237,6 +245,8 @@ def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench:
 @compiled(error_model="numpy")
 def twists(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.range_of_motion.TwistRow`."""
+    if not len(tables):
+        return
     limb, base, seen, along = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     for e in range(len(tables)):
         row = entries[e, 0]

@@ -98,7 +98,7 @@ def linearise(
     """
     nv = jacobian.shape[1]
     terms = len(value)
-    column = _integers(integers, layout, COLUMN)
+    column, bodies = _integers(integers, layout, COLUMN), _integers(integers, layout, BODY)
     jacobian[:terms] = 0.0
     wrench[:] = 0.0
     residuals(_floats(floats, layout, RESIDUAL), _integers(integers, layout, RESIDUAL), joints, wrench, value)
@@ -115,15 +115,15 @@ def linearise(
             against = entries[e, 2] if table in (RESIDUAL, CONE, TWIST) else 0
             count = 3 * (entries[e, 3] + entries[e, 4]) if table == RESIDUAL else rows
             for r in range(entries[e, 0], entries[e, 0] + count):
-                _row(wrench[r], entries[e, 1], against, columns, support, column, jacobian[r])
+                _row(wrench[r], entries[e, 1], against, columns, bodies, column, jacobian[r])
     for r in range(gaps):
         jacobian[terms + r] = 0.0
-        _row(gap_wrench[r], gap_joints[r, 1], gap_joints[r, 0], columns, support, column, jacobian[terms + r])
+        _row(gap_wrench[r], gap_joints[r, 1], gap_joints[r, 0], columns, bodies, column, jacobian[terms + r])
     centers = _floats(floats, layout, MASS_CENTER)
     if len(centers):
         _mass_centers(
-            centers, _integers(integers, layout, MASS_CENTER), _floats(floats, layout, BODY),
-            _integers(integers, layout, BODY), column, joints, columns, value, jacobian,
+            centers, _integers(integers, layout, MASS_CENTER), _floats(floats, layout, BODY), bodies, column, joints,
+            columns, value, jacobian,
         )  # fmt: skip
     coordinates(
         _floats(floats, layout, COORDINATE), _integers(integers, layout, COORDINATE), q, value, jacobian
@@ -158,13 +158,16 @@ def linearise(
 
 @compiled()
 def _row(
-    wrench: Array, joint: int, against: int, columns: Array, support: NDArray[np.int8], column: Integers, row: Array
+    wrench: Array, joint: int, against: int, columns: Array, bodies: Integers, column: Integers, row: Array
 ) -> None:
-    """Add to a row (nv,) the rates at which a wrench works on the motion of a joint relative to another."""
+    """Add to a row (nv,) the rates at which a wrench works on the motion of a joint relative to another.
+
+    Only the columns of joints between the two count: those of what carries both would cancel.
+    """
     a, b, c, d, e, f = wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5]
-    for k in range(len(columns)):
-        sign = support[joint, k] - support[against, k]
-        if sign != 0:
+    while joint != against:  # a joint's number is larger than its parent's
+        sign, at = (1.0, joint) if joint > against else (-1.0, against)
+        for k in range(bodies[at, 1], bodies[at, 1] + bodies[at, 2]):
             row[column[k, 0]] += sign * (
                 a * columns[k, 0]
                 + b * columns[k, 1]
@@ -173,6 +176,10 @@ def _row(
                 + e * columns[k, 4]
                 + f * columns[k, 5]
             )
+        if joint > against:
+            joint = bodies[at, 0]
+        else:
+            against = bodies[at, 0]
 
 
 @compiled(error_model="numpy")
@@ -203,17 +210,16 @@ def _mass_centers(
             moment[parents[j, 0], i] += moment[j, i]
     total = moment[0, 0]
     for e in range(len(tables)):
-        row = entries[e, 0]
-        a, b, c = tables[e, 0], tables[e, 1], tables[e, 2]
-        value[row] = (a * moment[0, 1] + b * moment[0, 2] + c * moment[0, 3]) / total - tables[e, 3]
-        for k in range(len(columns)):
-            j = column[k, 1]
-            mass, x, y, z = moment[j, 0], moment[j, 1], moment[j, 2], moment[j, 3]
-            jacobian[row, column[k, 0]] += (
-                a * (mass * columns[k, 0] + columns[k, 4] * z - columns[k, 5] * y)
-                + b * (mass * columns[k, 1] + columns[k, 5] * x - columns[k, 3] * z)
-                + c * (mass * columns[k, 2] + columns[k, 3] * y - columns[k, 4] * x)
-            ) / total
+        inner = tables[e, 0] * moment[0, 1] + tables[e, 1] * moment[0, 2] + tables[e, 2] * moment[0, 3]
+        value[entries[e, 0]] = inner / total - tables[e, 3]
+    for k in range(len(columns)):
+        j = column[k, 1]
+        mass, x, y, z = moment[j, 0] / total, moment[j, 1] / total, moment[j, 2] / total, moment[j, 3] / total
+        forth = mass * columns[k, 0] + columns[k, 4] * z - columns[k, 5] * y
+        left = mass * columns[k, 1] + columns[k, 5] * x - columns[k, 3] * z
+        up = mass * columns[k, 2] + columns[k, 3] * y - columns[k, 4] * x
+        for e in range(len(tables)):
+            jacobian[entries[e, 0], column[k, 0]] += tables[e, 0] * forth + tables[e, 1] * left + tables[e, 2] * up
 
 
 @compiled()

@@ -173,8 +173,14 @@ def make_plan(
         for q, v, low, high in zip(limits.idx_q, limits.idx_v, limits.lower, limits.upper, strict=True)
     ]
     parts[BODY] = [
-        ((int(model.parents[joint]),), np.array([model.inertias[joint].mass, *model.inertias[joint].lever]))
-        for joint in range(model.njoints)
+        ((parent, first, width), np.array([inertia.mass, *inertia.lever]))
+        for parent, first, width, inertia in zip(
+            model.parents.tolist(),
+            model.idx_vExtendeds.tolist(),
+            model.nvExtendeds.tolist(),
+            model.inertias,
+            strict=True,
+        )
     ]
     columns = extended_columns(model)
     places = np.arange(len(state.column_joint)) if columns is None else columns

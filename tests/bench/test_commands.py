@@ -9,6 +9,7 @@ import pytest
 
 from wholebody.bench import plot_style
 from wholebody.bench.adapters import STEPPING
+from wholebody.bench.person_cost import PersonCostRow
 from wholebody.bench.reaches import ReachRow
 from wholebody.bench.solve import MemoryRow, SolveRow
 from wholebody.bench.step import StepRow, StepTime
@@ -50,8 +51,12 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str]) ->
         assert row.tool != "placo" or row.ratio == row.ratio_p95 == 1.0
     _, times = read_rows(tmp_path / "out" / "step-times.csv", StepTime)
     assert len(times) == len(VARIANTS) * 2 * 2 * 6
+    _, costs = read_rows(tmp_path / "out" / "step-person.csv", PersonCostRow)
+    assert [row.what for row in costs] == [*(f"{reach} step" for reach in VARIANTS), "shelf solve"]
+    assert all(row.low <= row.ratio <= row.high for row in costs)
     page = (docs / "results.md").read_text()
     assert "| placo |" in page
+    assert "| shelf solve |" in page
     assert "assets/bench/step-times.svg" in page
     assert (docs / "assets" / "bench" / "step-times.svg").read_text().startswith("<?xml")
     assert (tmp_path / "out" / "step-distances.png").read_bytes().startswith(b"\x89PNG")

@@ -15,6 +15,7 @@ from wholebody.bench.motion.loads import WAYS, LoadRow
 from wholebody.bench.motion.measuring import CHECKED, MotionRow
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
+from wholebody.motion import avoidance
 from wholebody.motion.ready_equipment import dressed
 
 NAME = "sword cut"
@@ -74,6 +75,23 @@ def test_a_recording_that_cannot_be_read_is_told(tmp_path: Path) -> None:
     rows = measuring.run({"broken": tmp_path / "broken.bvh"}, ("nothing",), (CHECKED,), tmp_path / "out", {})
     assert rows[0].outcome == "no clip"
     assert "broken.bvh" in rows[0].said
+
+
+def test_a_clip_that_misses_what_is_held_is_not_free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing collides before or after, but a hand or a foot has left its place."""
+    figure = wb.load("human")
+    path = tmp_path / "still.npz"
+    wb.Clip(figure, np.array([figure.posture("standing")] * 8), 1 / 30, "still").write(path)
+    row, missed = MotionRow("still", "nothing", "trajectory"), 0.0
+
+    def avoid(*given: object, **more: object) -> avoidance.Avoided:
+        found = wb.avoid(*given, **more)  # type: ignore[arg-type]
+        return dataclasses.replace(found, report=dataclasses.replace(found.report, missed=missed))
+
+    monkeypatch.setattr(avoidance, "avoid", avoid)
+    assert measuring.measured(row, str(path)).outcome == "free"
+    missed = 5e-3
+    assert measuring.measured(row, str(path)).outcome == "left"
 
 
 def rows() -> list[MotionRow]:

@@ -168,6 +168,9 @@ def require_browser() -> None:
         (["show", "human", "--save", "a.gif"], [".html", ".png"]),
         (["show", "absent.json"], ["absent.json", "no such file"]),
         (["figure", "human", "--stature", "175"], ["175", "between"]),
+        (["figure", "human", "--age", "175"], ["175", "between 20 and 69"]),
+        (["figure", "human", "--proportion", "sitting_height"], ["'sitting_height'", "NAME=METRES"]),
+        (["figure", "human", "--proportion", "sitting=0.9"], ["sitting", "sitting_height"]),
         (["figure", "avatar", "--out", "a.urdf"], ["--out", "human"]),
         (["figure", "human", "--out", "a.txt"], [".urdf"]),
         (["demo", "shef"], ["no demo", "shelf"]),
@@ -257,6 +260,14 @@ def test_figure_describes_and_writes_what_can_be_loaded_again(
     model = pin.buildModelFromUrdf(str(out), pin.JointModelFreeFlyer())
     assert model.nv == 55
     assert pin.computeTotalMass(model) == pytest.approx(60.0, abs=1e-6)
+    options = ["--proportion", "sitting_height=0.92", "--proportion", "hand_length=0.19", "--age", "50"]
+    assert main(["figure", "human", "--sex", "female", *options, "--out", str(out)]) == 0
+    model = pin.buildModelFromUrdf(str(out), pin.JointModelFreeFlyer())
+    same = wb.load("human", sex="female", proportions={"sitting_height": 0.92, "hand_length": 0.19}, age=50).model
+    np.testing.assert_allclose(model.upperPositionLimit, same.upperPositionLimit)
+    for joint, placement in zip(list(model.names)[2:], list(model.jointPlacements)[2:], strict=True):
+        wanted = same.jointPlacements[same.getJointId(joint)]
+        np.testing.assert_allclose(placement.translation, wanted.translation, atol=1e-9)
 
 
 def test_demo_tasks_can_all_be_read(capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ import wholebody as wb
 from wholebody.cli import main
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import METHODS
-from wholebody.motion.avoider import AvoidProgress
+from wholebody.motion.avoider import AvoidProgress, MethodResult
 
 DT = 1 / 30
 BALL, RADIUS, LINK, WIDTH = np.array([0.95, 0.0]), 0.1, 0.5, 0.02
@@ -135,6 +137,23 @@ def test_a_thin_thing_passed_wholly_between_two_frames_is_not_passed(
     assert (height < -0.01).all()
 
 
+@pytest.mark.parametrize(("method", "back"), [("trajectory", True), ("trajectory", False), ("frames", False)])
+def test_a_thin_thing_passed_for_good_is_not_passed(planar_arm: Callable[..., Figure], method: str, back: bool) -> None:
+    """The arm goes through the plate between two frames, and comes back three seconds later or never."""
+    figure = planar_arm((LINK, LINK), radius=0.01)
+    scene = wb.Scene(figure)
+    scene.add(wb.Box((0.3, 0.002, 0.3)), name="plate", at=(0.75, 0.0, 0.0))
+    near = np.linspace(-0.8, -0.2, 90)
+    angle = np.concatenate([near, np.linspace(0.2, 0.6, 90), near[::-1] if back else []])
+    clip = wb.Clip(figure, np.stack([angle, np.full(len(angle), 0.3)], axis=1), DT)
+    found = wb.avoid(clip, scene, method=method)
+    assert found.report.before.dips == 1 + back
+    assert found.report.solved, found.report.message
+    first, second = found.clip.q[:, 0], found.clip.q.sum(axis=1)
+    height = LINK * np.sin(first) + (0.75 - LINK * np.cos(first)) * np.tan(second)  # of the forearm at the plate
+    assert (height < -0.01).all()
+
+
 def test_what_cannot_be_freed_is_said(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 30)
     for method in ("trajectory", "frames", "fade"):
@@ -219,6 +238,45 @@ def test_a_two_handed_grip_is_kept(human: Figure) -> None:
     found = wb.avoid(clip, constraints=[wb.Hold("left_hand", relative_to="right_hand")])
     assert found.report.solved, found.report.message
     assert found.report.missed < 1e-4
+
+
+@dataclass(frozen=True)
+class Replaced:
+    """A method that gives other postures, whatever is asked."""
+
+    q: np.ndarray
+    name: str = "replaced"
+
+    def avoid(self, *asked: object) -> MethodResult:
+        return MethodResult(self.q)
+
+
+@pytest.mark.parametrize(
+    ("term", "joints", "name"),
+    [
+        (wb.Hold("left_hand", relative_to="right_hand"), {"left_elbow_flexion": 0.8}, "Hold('left_hand')"),
+        (wb.Freeze("left_arm"), {"left_elbow_flexion": 0.8}, "Freeze('left_arm')"),
+        (wb.StanceFeet(), {"left_knee_flexion": 0.4}, "Hold('left_heel')"),
+    ],
+)
+def test_a_free_clip_that_misses_what_is_held_is_not_solved(
+    human: Figure, term: Any, joints: dict[str, float], name: str
+) -> None:
+    """Nothing collides in it; one frame of many misses what is held, and the message says what and when."""
+    q = np.array([human.with_joints(human.posture("standing"), {"left_elbow_flexion": 0.3})] * 12)
+    other = q.copy()
+    other[6] = human.with_joints(q[6], joints)
+    clip, scene = wb.Clip(human, q, DT), wb.Scene(human)
+    found = wb.avoid(clip, scene, method=Replaced(other), constraints=[term], hold_feet=False)
+    assert found.report.after.free
+    assert not found.report.solved
+    assert found.report.missed > 1e-2
+    assert f"{name} is missed by" in found.report.message
+    assert "at 0.20 s" in found.report.message
+    assert str(found.report).startswith("not free")
+    kept = wb.avoid(clip, scene, method=Replaced(q), constraints=[term], hold_feet=False)
+    assert kept.report.solved, kept.report.message
+    assert kept.report.missed < 1e-9
 
 
 def test_both_solvers_give_the_same_clip(planar_arm: Callable[..., Figure]) -> None:

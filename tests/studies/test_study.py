@@ -101,6 +101,25 @@ def test_people_differ_in_a_study_of_a_file(folder: Path) -> None:
     assert short.goal_error > tall.goal_error + 0.1  # both stretch towards it; the tall one comes nearer
 
 
+def test_a_person_takes_the_place_of_the_percentile_of_a_file(folder: Path) -> None:
+    small = TASK.replace('name = "human"', 'name = "human"\nsex = "female"\npercentile = 5')
+    (folder / "task.toml").write_text(small)
+    found = wb.study(folder / "task.toml", people=["F5", "M95"])
+    alone = wb.study(folder / "task.toml", targets=[(0.4, -0.2, 1.2)])
+    assert {one.outcome for one in found} == {"solved"}
+    np.testing.assert_allclose(found[0].q, alone[0].q, atol=1e-6)
+
+
+def test_people_of_a_study_have_proportions_of_their_own(folder: Path) -> None:
+    near, far = wb.study(
+        folder / "task.toml", people=[{"proportions": {"span": 1.75}}, {"proportions": {"span": 1.90}}],
+        targets=[(3.0, 0.0, 1.0)],
+    )  # fmt: skip
+    assert near.goal_error > far.goal_error + 0.02
+    with pytest.raises(wb.UnknownNameError, match="no dimension is called 'spam'"):
+        wb.study(folder / "task.toml", people=[{"proportions": {"spam": 1.75}}])
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -85,6 +85,13 @@ def test_a_scene_alone_and_a_result(tmp_path: Path) -> None:
     assert (result.status, result.message, result.method) == (solution.status, solution.message, solution.method)
 
 
+def test_proportions_and_age_are_written(tmp_path: Path) -> None:
+    figure = wb.load("human", percentile=75, proportions={"sitting_height": 0.95, "hand_length": 0.2}, age=50)
+    again = wb.read_task(wb.write_task(wb.Scene(figure), tmp_path / "scene.toml")).problem.scene.figure
+    assert again.describe().person == figure.describe().person
+    assert again.describe().person.age == 50.0
+
+
 def test_what_a_task_file_cannot_say_is_named(tmp_path: Path) -> None:
     figure = wb.load("human")
     with pytest.raises(wb.InputError, match="reduced"):

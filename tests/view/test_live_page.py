@@ -18,13 +18,11 @@ from wholebody.view.live_page import LivePage, triangles
 
 pytestmark = pytest.mark.browser
 EYE, TARGET = np.array((2.2, -1.6, 1.4)), np.array((0.0, 0.0, 0.9))
-SLOWEST = 0.5  # s: of two frames of the page
 SIZE = (760, 320)  # small: without a GPU a frame of a large page takes a second
 
 
 @pytest.fixture
 def page(tmp_path: Path) -> Iterator[LivePage]:
-    pytest.importorskip("viser")
     scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.4, 0.8, 0.04)), name="table", at=(0.6, 0.3, 0.75))
     drag = LiveDrag(wb.Problem(scene, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")]))
@@ -33,7 +31,7 @@ def page(tmp_path: Path) -> Iterator[LivePage]:
     made.stop()
 
 
-def until(true: Callable[[], Any], seconds: float = 90.0) -> Any:
+def until(true: Callable[[], Any], seconds: float = 150.0) -> Any:
     end = time.monotonic() + seconds
     while not (found := true()):
         assert time.monotonic() < end, "it did not happen in time"
@@ -65,10 +63,6 @@ def test_mouse_drags_holds_undoes_and_saves(page: LivePage, tmp_path: Path) -> N
         client.camera.position, client.camera.look_at = EYE, TARGET
         until(lambda: np.allclose(client.camera.position, EYE, atol=1e-3))
         time.sleep(3.0)  # the page fades in, and the pieces arrive
-        began = time.monotonic()
-        browser.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))")
-        if time.monotonic() - began > SLOWEST:
-            pytest.skip("the page is drawn too slowly here to be dragged: a frame without a GPU on a busy machine")
         before = drag.place("right_palm")
         x, y = pixel(before, client.camera.fov)
         browser.mouse("mouseMoved", x, y)
@@ -76,12 +70,15 @@ def test_mouse_drags_holds_undoes_and_saves(page: LivePage, tmp_path: Path) -> N
         for share in np.linspace(0.0, 1.0, 7)[1:]:
             browser.mouse("mouseMoved", x + 12 * share, y - 24 * share, pressed=True)
         until(lambda: drag.place("right_palm")[2] > before[2] + 0.05)
-        time.sleep(1.0)
         browser.mouse("mouseReleased", x + 12, y - 24)
-        until(lambda: drag.place("right_palm")[2] > before[2] + 0.05)
+
+        def away() -> float:  # pixels from the mouse
+            across, down = pixel(drag.place("right_palm"), client.camera.fov)
+            return float(np.hypot(across - x - 12, down - y + 24))
+
+        until(lambda: away() < 6 and not drag.taken)  # it goes on to where the mouse let it go
         assert np.linalg.norm(drag.place("left_sole") - drag.place_at(start, "left_sole")) < 2e-3
         seen = pixel(drag.place("right_palm"), client.camera.fov)
-        assert np.hypot(seen[0] - x - 12, seen[1] - y + 24) < 8  # it is under the mouse
 
         browser.mouse("mouseMoved", *seen)
         browser.mouse("mousePressed", *seen, pressed=True)

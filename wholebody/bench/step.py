@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -142,7 +143,7 @@ def _run(track: Track, name: str) -> _Run:
     steps = len(track.targets)
     wall, cpu = np.empty(steps), np.empty(steps)
     postures = np.empty((steps, track.scene.model.nq))
-    with _quiet():
+    with quiet():
         began = time.perf_counter()
         tool = make_tool(name, track)
         tool.step(track.targets[0])
@@ -158,7 +159,7 @@ def _run(track: Track, name: str) -> _Run:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """No garbage collection and no log lines while the clock runs."""
     gc.collect()
     gc.disable()
@@ -251,6 +252,7 @@ def goal_lines(rows: Sequence[StepRow]) -> list[str]:
 def step_report(
     rows: Sequence[StepRow], facts: Mapping[str, str], differences: Mapping[str, Sequence[str]],
     profile: Mapping[str, tuple[float, float]], refusals: Mapping[str, Mapping[str, str]] | None = None,
+    person: Sequence[Any] = (),
 ) -> str:  # fmt: skip
     """Tables of the tracking steps.
 
@@ -261,13 +263,14 @@ def step_report(
         profile: median of a whole step and of its linearisation, by reach [us].
         refusals: of reaches of other figures than the human: the sentences of tools that do not take them, by reach
             and tool; None for the reaches of the human.
+        person: rows of `person_cost`, what a person's defaults cost.
     """
     tools = dict.fromkeys(row.tool for row in rows)
     stated = [line for name in tools for line in differences.get(name, ())]
     goals = goal_lines(rows) if refusals is None else []
     return render(
         "step.md", rows=rows, facts=facts, stated=stated, profile=profile, goals=goals, track=setting,
-        refusals=refusals,
+        refusals=refusals, person=person,
     )  # fmt: skip
 
 
@@ -279,7 +282,7 @@ def taking(track: Track, tools: Sequence[str]) -> tuple[list[str], dict[str, str
     taken, refused = [], {}
     for name in tools:
         try:
-            with _quiet():
+            with quiet():
                 make_tool(name, track).step(track.targets[0])
             taken.append(name)
         except (InputError, RuntimeError, ValueError) as error:

@@ -16,6 +16,46 @@ class Commands(Protocol):
         """Add a command; the options are those of `argparse.ArgumentParser`, and `help`."""
 
 
+PERSON = ("sex", "stature", "mass", "percentile", "proportions", "age", "detail", "hands")
+"""Options of `wb.load` that `add_person` adds."""
+
+
+def add_person(parser: Any) -> None:
+    """Add the options of a person to a parser or a group of arguments; those that are not given are None."""
+    parser.add_argument("--sex", choices=("male", "female"), help="sex of a person (default: male)")
+    parser.add_argument("--stature", type=float, metavar="M", help="height of a person, m (default: median)")
+    parser.add_argument("--mass", type=float, metavar="KG", help="mass of a person, kg (default: from the stature)")
+    parser.add_argument("--percentile", type=float, metavar="P", help="of stature and mass if not given, 1 to 99")
+    parser.add_argument(
+        "--proportion", action="append", dest="proportions", metavar="NAME=M",
+        help="a dimension of a person, m, such as sitting_height=0.93; the others follow; repeated",
+    )  # fmt: skip
+    parser.add_argument("--age", type=float, metavar="YEARS", help="of a person, 20 to 69, for the ranges of motion")
+    parser.add_argument(
+        "--detail", choices=("spheres", "capsules", "hulls"), help="detail of the geometry (default: capsules)"
+    )
+    parser.add_argument("--hands", choices=("rigid", "fingers"), help="of a person: one segment each, or fingers")
+
+
+def person_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return the options of `wb.load` that were given.
+
+    Raises:
+        InputError: a proportion is not a name and a number.
+    """
+    given = {name: value for name in PERSON if (value := getattr(arguments, name)) is not None}
+    if "proportions" in given:
+        proportions = {}
+        for text in given["proportions"]:
+            name, _, size = text.partition("=")
+            try:
+                proportions[name] = float(size)
+            except ValueError:
+                raise InputError(f"--proportion is {text!r}; give NAME=METRES such as sitting_height=0.93") from None
+        given["proportions"] = proportions
+    return given
+
+
 def scene_names(arguments: argparse.Namespace, scenes: Mapping[str, str], command: str, *, files: bool) -> list[str]:
     """Names of the scenes to run; none if the list was asked for, which is printed.
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from wholebody.cli.arguments import Commands
+from wholebody.cli.arguments import Commands, add_person, person_options
 
 HELP = "describe a figure, or write a person as a URDF"
 DESCRIPTION = """\
@@ -16,7 +16,9 @@ EPILOG = """\
 examples:
   wholebody figure human --sex female --stature 1.62 --mass 60
   wholebody figure human --sex female --stature 1.62 --mass 60 --out small-woman.urdf
-  wholebody figure human --sex female --percentile 5
+  wholebody figure human --sex female --percentile 5 --age 60
+  wholebody figure human --stature 1.80 --proportion sitting_height=0.96
+  wholebody figure human --hands fingers --out with-fingers.urdf
   wholebody figure robot.urdf"""
 
 
@@ -25,13 +27,7 @@ def add_to(commands: Commands) -> None:
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("figure", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
     parser.add_argument("name", metavar="FIGURE", help="human, avatar, hand, or the path of a URDF")
-    parser.add_argument("--sex", choices=("male", "female"), help="sex of a person (default: male)")
-    parser.add_argument("--stature", type=float, metavar="M", help="height of a person, m (default: median)")
-    parser.add_argument("--mass", type=float, metavar="KG", help="mass of a person, kg (default: from the stature)")
-    parser.add_argument("--percentile", type=float, metavar="P", help="of stature and mass if not given, 1 to 99")
-    parser.add_argument(
-        "--detail", choices=("spheres", "capsules", "hulls"), help="detail of the geometry (default: capsules)"
-    )
+    add_person(parser)
     parser.add_argument("--out", type=Path, metavar="FILE.urdf", help="write a person's URDF to this file")
     parser.set_defaults(run=run)
 
@@ -43,10 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.cli.tables import show_figure
     from wholebody.figures import load
 
-    given: dict[str, Any] = {
-        name: getattr(arguments, name) for name in ("sex", "stature", "mass", "percentile", "detail")
-    }
-    options = {name: value for name, value in given.items() if value is not None}
+    options = person_options(arguments)
     if arguments.out is not None:
         return _write(arguments.name, options, arguments.out)
     show_figure(Console(), load(arguments.name, **options))
@@ -57,12 +50,14 @@ def _write(name: str, options: dict[str, Any], out: Path) -> int:
     from wholebody.errors import InputError
     from wholebody.figures.anthropometry import body
     from wholebody.figures.packaged_urdf import write_human
+    from wholebody.figures.proportions import proportioned
 
     if name != "human" or "detail" in options:
         raise InputError("--out writes the person in capsules; write: wholebody figure human --out FILE.urdf")
     if out.suffix != ".urdf":
         raise InputError(f"--out: {out} does not end in .urdf; give it that ending")
-    person = body(options.get("sex", "male"), options.get("stature"), options.get("mass"), options.get("percentile"))
-    write_human(out, person)
+    size = {name: value for name, value in options.items() if name not in ("proportions", "hands")}
+    person = proportioned(body(**size), options.get("proportions"))
+    write_human(out, person, options.get("hands", "rigid"))
     print(f"wrote {out}: {person.sex}, {person.stature:.3f} m, {person.mass:.1f} kg")
     return 0

@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from statistics import NormalDist
@@ -30,6 +30,9 @@ MASS_RANGE = (25.0, 250.0)
 
 BODY_MASS_INDEX_RANGE = (13.0, 50.0)
 """kg / m^2. Outside, no living person has this stature and mass; most likely a unit is wrong."""
+
+AGE_RANGE = (20.0, 69.0)
+"""Years of the adults whose ranges of motion were measured (table "age_ranges")."""
 
 _SEXES = {"male": "M", "female": "F"}
 
@@ -61,12 +64,14 @@ class Body:
         mass: kilograms.
         deviations: how much larger fitted sizes (see `fitted`) are than those of most people of this build: name and
             metres.
+        age: years, for the ranges of motion; None for those of all adults. The size does not depend on it.
     """
 
     sex: str
     stature: float
     mass: float
     deviations: tuple[tuple[str, float], ...] = ()
+    age: float | None = field(default=None, repr=False)
 
     @property
     def column(self) -> str:
@@ -149,7 +154,11 @@ class Body:
 
 
 def body(
-    sex: str = "male", stature: float | None = None, mass: float | None = None, percentile: float | None = None
+    sex: str = "male",
+    stature: float | None = None,
+    mass: float | None = None,
+    percentile: float | None = None,
+    age: float | None = None,
 ) -> Body:
     """Return a checked `Body`.
 
@@ -159,6 +168,7 @@ def body(
         mass: kilograms; if left out, the median of the sex, or the mass expected at the stature that was given.
         percentile: 1 to 99: stature and mass, unless one of them is given, are this percentile of the sex in ANSUR II,
             between the percentiles of the table on a line in the normal deviate.
+        age: years, 20 to 69, for the ranges of motion; those of all adults if left out.
 
     Raises:
         InputError: an unknown sex, a number out of the range of people, or a percentile of nothing.
@@ -185,7 +195,7 @@ def body(
         raise InputError(
             f"mass {weight:g} kg does not go with stature {height:g} m; give a mass between {low:.0f} and {high:.0f} kg"
         )
-    return Body(sex, height, weight)
+    return Body(sex, height, weight, age=None if age is None else number(age, "age", *AGE_RANGE, "years"))
 
 
 def _percentile(column: str, dimension: str, percentile: float) -> float:
@@ -197,7 +207,11 @@ def _percentile(column: str, dimension: str, percentile: float) -> float:
 
 def describe(person: Body) -> str:
     """Return one line on a person for the head of a file."""
-    return f"{person.sex}, stature {person.stature:g} m, mass {person.mass:g} kg; written by wholebody from its tables"
+    own = "" if person.age is None else f", {person.age:g} years"
+    if person.deviations:
+        own += ", proportions of their own"
+    size = f"stature {person.stature:g} m, mass {person.mass:g} kg"
+    return f"{person.sex}, {size}{own}; written by wholebody from its tables"
 
 
 def design_cases() -> Mapping[str, Body]:
@@ -223,7 +237,7 @@ def table(name: str) -> tuple[Row, ...]:
 
     Args:
         name: "joints", "segments", "radii_ansur", "percentiles", "design_cases", "spheres39", "sphere_exclusions",
-            "reach_cones", "hand", "fit" or "dimensions".
+            "reach_cones", "hand", "fit", "dimensions", "correlations" or "age_ranges".
 
     Raises:
         UnknownNameError: there is no such table.

@@ -7,7 +7,7 @@ the right. The root of the thumb is fixed at its resting placement, so that the 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from itertools import combinations
 
@@ -28,8 +28,8 @@ MESH = "meshes/ellipsoid.obj"
 
 FINGERS = {"thumb": ("pp", "dp"), **dict.fromkeys(("index", "middle", "ring", "little"), ("pp", "mp", "dp"))}
 _PART = {"pp": "proximal", "mp": "middle", "dp": "distal"}
-_JOINT = {"mcp_flex": "mcp_flexion", "mcp_abd": "mcp_abduction", "pip_flex": "pip_flexion", "dip_flex": "dip_flexion"}
-_JOINT["ip_flex"] = "ip_flexion"
+_JOINT = {f"{kind}_flex": f"{kind}_flexion" for kind in ("cmc", "mcp", "pip", "dip", "ip")}
+_JOINT |= {f"{kind}_abd": f"{kind}_abduction" for kind in ("cmc", "mcp")}
 
 _THUMB_RADIAL = math.radians(40.0)
 _THUMB_PALMAR = math.radians(30.0)
@@ -68,23 +68,23 @@ def hand_spec(side: str = "right", person: Body | None = None) -> BodySpec:
         raise InputError(f"side is {side!r}; give 'left' or 'right'")
     person = person or body()
     size = Dimensions(person)
-    palm = Solid(f"{side}_hand", f"{side}_hand", *_polyhedron(size, "palm"), (MESH, _radii(size, "palm")))
+    palm = Solid(f"{side}_hand", f"{side}_hand", *_polyhedron(size, "palm"), (MESH, part_radii(size, "palm")))
     solids, joints, virtual = [palm], [], []
     marks = [_palm_mark(size, side)]
     for finger, parts in FINGERS.items():
-        parent, origin = f"{side}_hand", _base(size, side, finger)
+        parent, origin = f"{side}_hand", finger_base(size, side, finger)
         for part in parts:
             key, segment = f"{finger}_{part}", f"{side}_{finger}_{_PART[part]}"
-            for joint in _joints(side, finger, key, parent, segment, origin):
+            for joint in finger_joints(side, finger, key, parent, segment, origin):
                 joints.append(joint)
                 virtual += [Link(joint.child)] if joint.child != segment else []
-            solids.append(Solid(segment, segment, *_polyhedron(size, key), (MESH, _radii(size, key))))
+            solids.append(Solid(segment, segment, *_polyhedron(size, key), (MESH, part_radii(size, key))))
             parent, origin = segment, place(z=-keyed_hand(key, "length") * size.hand_length)
-        marks.append(Landmark(f"{side}_{finger}_tip", parent, origin * pin.SE3(_palm_axes(side), np.zeros(3))))
+        marks.append(Landmark(f"{side}_{finger}_tip", parent, origin * pin.SE3(palm_axes(side), np.zeros(3))))
     return BodySpec(
         name=f"{side}_hand",
         title=f"{side} hand; {describe(person)}",
-        links=(*_links(size, solids), *virtual),
+        links=(*massive_links(size, {solid.segment: solid.mesh[1] for solid in solids if solid.mesh}), *virtual),
         joints=tuple(joints),
         landmarks=tuple(marks),
         solids=tuple(solids),
@@ -122,7 +122,8 @@ def hand_figure_of(person: Body, side: str) -> Figure:
     return Figure(spec.name, model, geometry_of(model, spec.solids, tested), "hulls", description)
 
 
-def _palm_axes(side: str) -> Array:
+def palm_axes(side: str) -> Array:
+    """Axes (3, 3) of a palm in the hand: along the fingers, towards the thumb, out of the palm."""
     sign = 1.0 if side == "left" else -1.0
     return np.column_stack([[0.0, 0.0, -1.0], [sign, 0.0, 0.0], [0.0, -sign, 0.0]])
 
@@ -130,10 +131,11 @@ def _palm_axes(side: str) -> Array:
 def _palm_mark(size: Dimensions, side: str) -> Landmark:
     out = size.palm_half_thickness if side == "right" else -size.palm_half_thickness
     half = 0.5 * keyed_hand("palm", "length") * size.hand_length
-    return Landmark(f"{side}_palm", f"{side}_hand", place(0.0, out, -half, _palm_axes(side)))
+    return Landmark(f"{side}_palm", f"{side}_hand", place(0.0, out, -half, palm_axes(side)))
 
 
-def _radii(size: Dimensions, part: str) -> tuple[float, float, float]:
+def part_radii(size: Dimensions, part: str) -> tuple[float, float, float]:
+    """Semi-axes of a part of the table "hand", metres."""
     return (
         keyed_hand(part, "width") * size.hand_breadth,
         keyed_hand(part, "depth") * size.hand_breadth,
@@ -142,17 +144,31 @@ def _radii(size: Dimensions, part: str) -> tuple[float, float, float]:
 
 
 def _polyhedron(size: Dimensions, part: str) -> tuple[object, pin.SE3]:
-    radii = _radii(size, part)
+    radii = part_radii(size, part)
     shape, center = hulls.ellipsoid(radii, part)
     return shape, place(z=-radii[2]) * center
 
 
-def _base(size: Dimensions, side: str, finger: str) -> pin.SE3:
-    """Placement of a finger's first joint in the hand: its knuckle, or the thumb's joint after the fixed metacarpal."""
-    lateral, distal = FINGER_BASES[finger]
-    knuckle = np.array([lateral * size.hand_breadth, 0.0, -distal * size.hand_length])
-    if finger != "thumb":
-        return pin.SE3(np.eye(3), knuckle)
+def finger_base(size: Dimensions, side: str, finger: str) -> pin.SE3:
+    """Placement of a finger's first joint in the hand: its knuckle, or the thumb's joint after the resting metacarpal.
+
+    Args:
+        size: of the hand's person.
+        side: "left" or "right".
+        finger: one of `FINGERS`.
+    """
+    if finger == "thumb":
+        return thumb_metacarpal(size, side) * place(z=-keyed_hand("thumb_mc", "length") * size.hand_length)
+    return pin.SE3(np.eye(3), _knuckle(size, finger))
+
+
+def thumb_metacarpal(size: Dimensions, side: str) -> pin.SE3:
+    """Placement of the resting thumb's metacarpal in the hand, at its joint with the wrist's bones.
+
+    Args:
+        size: of the hand's person.
+        side: "left" or "right".
+    """
     sign = 1.0 if side == "left" else -1.0
     radial, palmar = _THUMB_RADIAL, _THUMB_PALMAR
     along = np.array([math.sin(radial), -sign * math.sin(palmar), -math.cos(radial)])
@@ -161,17 +177,32 @@ def _base(size: Dimensions, side: str, finger: str) -> pin.SE3:
     bend = np.array([-0.8, -sign * 0.6, 0.0])
     bend -= along * (along @ bend)
     y = -sign * bend / np.linalg.norm(bend)
-    rotation = np.column_stack([np.cross(y, -along), y, -along])
-    return pin.SE3(rotation, knuckle + keyed_hand("thumb_mc", "length") * size.hand_length * along)
+    return pin.SE3(np.column_stack([np.cross(y, -along), y, -along]), _knuckle(size, "thumb"))
 
 
-def _joints(side: str, finger: str, key: str, parent: str, segment: str, origin: pin.SE3) -> Iterator[Joint]:
+def _knuckle(size: Dimensions, finger: str) -> Array:
+    lateral, distal = FINGER_BASES[finger]
+    return np.array([lateral * size.hand_breadth, 0.0, -distal * size.hand_length])
+
+
+def finger_joints(side: str, finger: str, key: str, parent: str, segment: str, origin: pin.SE3) -> Iterator[Joint]:
+    """The joints between a part of a finger and the part before it.
+
+    Args:
+        side: "left" or "right".
+        finger: one of `FINGERS`.
+        key: of the part in the table "hand".
+        parent: segment before it.
+        segment: of the part.
+        origin: placement of the first joint in the parent.
+    """
     sign = 1.0 if side == "left" else -1.0
     row = keyed("hand", "name")[key]
     kinds = [kind.strip() for kind in row["joints"].split(",")]
     ranges = [limits.strip().split("..") for limits in row["limits_deg"].split(";")]
     for kind, (low, high) in zip(kinds, ranges, strict=True):
-        # Flexion bends towards the palm; abduction leads away from the middle finger, that finger's own to the thumb.
+        # Flexion bends towards the palm; abduction leads away from the middle finger, that finger's own to the thumb,
+        # and the thumb's out of the palm.
         away = 1.0 if finger in ("ring", "little") else -1.0
         axis = (-sign, 0.0, 0.0) if kind.endswith("flex") else (0.0, away, 0.0)
         child = segment if kind == kinds[-1] else f"{segment}_v1"
@@ -180,16 +211,19 @@ def _joints(side: str, finger: str, key: str, parent: str, segment: str, origin:
         parent, origin = child, pin.SE3.Identity()
 
 
-def _links(size: Dimensions, solids: list[Solid]) -> Iterator[Link]:
-    """Links as solid ellipsoids whose mass is proportional to their volume."""
-    volumes = [float(np.prod(solid.mesh[1])) for solid in solids if solid.mesh is not None]
+def massive_links(size: Dimensions, radii: Mapping[str, tuple[float, float, float]]) -> Iterator[Link]:
+    """Links as solid ellipsoids whose mass is proportional to their volume; together they have the hand's mass.
+
+    Args:
+        size: of the hand's person.
+        radii: semi-axes of each segment's ellipsoid, which begins at the segment's origin and goes along -z.
+    """
+    volumes = {segment: math.prod(axes) for segment, axes in radii.items()}
     total = size.body.segment_mass("left_hand")
-    for solid, volume in zip(solids, volumes, strict=True):
-        assert solid.mesh is not None
-        a, b, c = solid.mesh[1]
-        mass = total * volume / sum(volumes)
+    for segment, (a, b, c) in radii.items():
+        mass = total * volumes[segment] / sum(volumes.values())
         inertia = (mass * (b * b + c * c) / 5.0, mass * (a * a + c * c) / 5.0, mass * (a * a + b * b) / 5.0)
-        yield Link(solid.segment, mass, (0.0, 0.0, -c), inertia)
+        yield Link(segment, mass, (0.0, 0.0, -c), inertia)
 
 
 def _pairs(solids: tuple[Solid, ...]) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:
@@ -215,19 +249,31 @@ def _posture(figure: Articulated, side: str, degrees: dict[str, float]) -> Array
     """Wrist above the origin, palm down, fingers forward, lowest part on z = 0."""
     from wholebody.figures.postures import lowest
 
-    values = {}
-    for finger, parts in FINGERS.items():
-        for part in parts:
-            row = keyed("hand", "name")[f"{finger}_{part}"]
-            for kind, neutral in zip(row["joints"].split(","), row["neutral_deg"].split(";"), strict=True):
-                joint = _JOINT[kind.strip()]
-                angle = degrees.get(f"{finger}_{joint}", degrees.get(joint, float(neutral)))
-                name = f"{side}_{finger}_{joint}"
-                if name in figure.joints:
-                    values[name] = math.radians(angle)
+    values = {
+        f"{side}_{joint}": math.radians(angle)
+        for joint, angle in finger_degrees(degrees).items()
+        if f"{side}_{joint}" in figure.joints
+    }
     q = figure.with_joints(pin.neutral(figure.model), values)
     if figure.root == "free":
         down = np.column_stack([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
-        q[3:7] = pin.Quaternion(down @ _palm_axes(side).T).coeffs()
+        q[3:7] = pin.Quaternion(down @ palm_axes(side).T).coeffs()
         q[2] = -lowest(figure, q)
     return q
+
+
+def finger_degrees(degrees: Mapping[str, float]) -> dict[str, float]:
+    """The angle of every joint of the fingers, without a side, degrees.
+
+    Args:
+        degrees: by joint ("index_pip_flexion") or by kind of joint ("pip_flexion"); the others are relaxed, as in the
+            table "hand".
+    """
+    found = {}
+    for finger, parts in FINGERS.items():
+        for part in ("mc", *parts) if finger == "thumb" else parts:
+            row = keyed("hand", "name")[f"{finger}_{part}"]
+            for kind, neutral in zip(row["joints"].split(","), row["neutral_deg"].split(";"), strict=True):
+                joint = _JOINT[kind.strip()]
+                found[f"{finger}_{joint}"] = degrees.get(f"{finger}_{joint}", degrees.get(joint, float(neutral)))
+    return found

@@ -8,12 +8,13 @@ direction means the same on both sides: flexion, abduction, inward rotation, ele
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from wholebody.errors import UnknownNameError
-from wholebody.figures import human_capsules, human_hulls, human_spheres
+from wholebody.checks import known
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures import human_capsules, human_fingers, human_hulls, human_spheres
 from wholebody.figures.anthropometry import Body, body, describe, table
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
 from wholebody.figures.dimensions import MIDDLE_TIP, Dimensions
@@ -25,17 +26,31 @@ DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
 }
 
 
-def human_spec(person: Body | None = None, detail: str = "capsules") -> BodySpec:
+OLDER = 45.0
+"""Years from which on the ranges of motion are those of older people: the bands of Soucie et al. (2011)."""
+
+
+def human_spec(person: Body | None = None, detail: str = "capsules", hands: str = "rigid") -> BodySpec:
     """Return the specification of a person.
 
     Args:
         person: from `wholebody.figures.anthropometry.body`; the median man if left out.
         detail: "spheres", "capsules" or "hulls": the collision pieces.
+        hands: "rigid": each is one segment; "fingers": each has twenty joints.
 
     Raises:
-        UnknownNameError: another detail.
+        UnknownNameError: another detail or other hands.
+        InputError: fingers in spheres.
     """
     person = person or body()
+    known(hands, human_fingers.HANDS, "kind of hands", "human")
+    if hands == "fingers" and detail == "spheres":
+        raise InputError("hands='fingers': the 39 spheres have none for fingers; give detail 'capsules' or 'hulls'")
+    spec = _spec(person, detail)
+    return human_fingers.with_fingers(spec, Dimensions(person), detail) if hands == "fingers" else spec
+
+
+def _spec(person: Body, detail: str) -> BodySpec:
     return BodySpec(
         name="human",
         title=describe(person),
@@ -77,11 +92,35 @@ def _joints(person: Body) -> tuple[Joint, ...]:
     for row in rows:
         x, y, z = person.origin(row["name"])
         a, b, c = (float(value) for value in row["axis"].split())
-        low, high = math.radians(float(row["lower_deg"])), math.radians(float(row["upper_deg"]))
+        low, high = (math.radians(limit) for limit in joint_limits(person, row))
         joints.append(
             Joint(row["name"], child[row["parent"]], row["child_segment"], place(x, y, z), (a, b, c), low, high)
         )
     return tuple(joints)
+
+
+def joint_limits(person: Body, row: Mapping[str, str]) -> tuple[float, float]:
+    """Return the least and greatest angle of a joint, degrees.
+
+    From 45 years on they are scaled by the means of people of 45 to 69 over those of 20 to 44 (Soucie et al. 2011),
+    where both are known; else they are at most the older people's mean. Younger people have the limits of the table
+    "joints".
+
+    Args:
+        person: whose age and sex it is.
+        row: the joint in the table "joints".
+    """
+    limits = {"lower": float(row["lower_deg"]), "upper": float(row["upper_deg"])}
+    if person.age is None or person.age < OLDER:
+        return limits["lower"], limits["upper"]
+    for change in table("age_ranges"):
+        if row["name"].endswith(f"_{change['joint']}"):
+            end = change["limit"]
+            young, old = (change[f"{person.column}_{band}"] for band in ("20_44", "45_69"))
+            size = abs(limits[end])
+            size = size * float(old) / float(young) if young else min(size, float(old))
+            limits[end] = math.copysign(size, limits[end])
+    return limits["lower"], limits["upper"]
 
 
 def landmarks(size: Dimensions) -> tuple[Landmark, ...]:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from wholebody.figures import postures
+from wholebody.figures import human_fingers, postures
 from wholebody.figures.anthropometry import Body, body, table
 from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
 from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone
 from wholebody.figures.figure import Figure
+from wholebody.figures.hand import FINGERS, finger_degrees
 from wholebody.figures.human import human_spec
 from wholebody.figures.human_pairs import body_pairs, collision_group, sphere_pairs
 from wholebody.figures.motion_ranges import human_ranges
+from wholebody.figures.proportions import proportioned
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.records import with_values
@@ -30,6 +33,9 @@ def human_figure(
     mass: float | None = None,
     detail: str = "capsules",
     percentile: float | None = None,
+    proportions: Mapping[str, float] | None = None,
+    age: float | None = None,
+    hands: str = "rigid",
 ) -> Figure:
     """Return the person.
 
@@ -39,13 +45,16 @@ def human_figure(
         mass: kilograms; the median, or what is expected at the stature that was given.
         detail: "spheres" (39, for whole motions), "capsules" (and boxes), "hulls" (convex polyhedra).
         percentile: 1 to 99, of the sex in ANSUR II, for stature and mass where they are left out.
+        proportions: metres by name of a dimension; the other dimensions follow as they go together in people.
+        age: years, 20 to 69: from 45 on some ranges of motion are smaller.
+        hands: "rigid", one segment each, or "fingers", twenty joints each.
 
     Raises:
-        InputError: an impossible body.
-        UnknownNameError: an unknown detail.
+        InputError: an impossible body, or fingers in spheres.
+        UnknownNameError: an unknown detail or dimension, or other hands.
     """
-    person = body(sex, stature, mass, percentile)
-    return figure_of(human_spec(person, detail), detail, person.sex)
+    person = proportioned(body(sex, stature, mass, percentile, age), proportions)
+    return figure_of(human_spec(person, detail, hands), detail, person.sex)
 
 
 def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
@@ -62,15 +71,24 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
     rigid = drop_rigid_pairs(geometry)
     joints = {joint.name for joint in spec.joints if joint.axis is not None}
     segments = tuple(link.name for link in spec.links if link.mass)
+    fingers = [name for name in human_fingers.finger_angles("relaxed") if name in joints]
+    held = finger_degrees({}) if fingers else {}
+    attitudes = {
+        name: postures.Attitude({**held, **attitude.degrees}, attitude.pitch)
+        for name, attitude in postures.HUMAN.items()
+    }
     description = Description(
         groups=human_groups(joints),
         chains=human_chains(joints),
         frames=tuple(mark.name for mark in spec.landmarks),
         segments=segments,
-        postures={name: partial(postures.stand, attitude=attitude) for name, attitude in postures.HUMAN.items()},
+        postures={name: partial(postures.stand, attitude=attitude) for name, attitude in attitudes.items()},
         cones=human_cones(),
         collision_groups={segment: collision_group(segment) for segment in segments},
-        effort={row["name"]: float(row["effort_weight"]) for row in table("joints")},
+        effort={
+            **{row["name"]: float(row["effort_weight"]) for row in table("joints")},
+            **dict.fromkeys(fingers, human_fingers.EFFORT),
+        },
         excluded=(*(ExcludedPair(*entry) for entry in excluded), *rigid),
         person=spec.person,
         ranges={} if sex is None else human_ranges(sex, joints),
@@ -88,6 +106,12 @@ def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
         for limb, parts in _LIMBS.items():
             starts = tuple(f"{side}_{part}_" for part in parts)
             groups[f"{side}_{limb}"] = tuple(name for name in names if name.startswith(starts))
+        for finger in FINGERS:
+            shaped = human_fingers.finger_angles("relaxed", side)
+            groups[f"{side}_{finger}"] = tuple(
+                name for name in shaped if name.startswith(f"{side}_{finger}_") and name in joints
+            )
+        groups[f"{side}_fingers"] = tuple(name for finger in FINGERS for name in groups[f"{side}_{finger}"])
     groups["arms"] = groups["left_arm"] + groups["right_arm"]
     groups["legs"] = groups["left_leg"] + groups["right_leg"]
     groups["upper_body"] = groups["spine"] + groups["arms"]
@@ -109,6 +133,7 @@ def human_chains(joints: set[str]) -> dict[str, Chain]:
         "left_leg": "left_toe_tip",
         "right_leg": "right_toe_tip",
     }
+    tips |= {f"{side}_{finger}": f"{side}_{finger}_tip" for side in ("left", "right") for finger in FINGERS}
     return {name: Chain(groups[name], tip) for name, tip in tips.items() if name in groups}
 
 
@@ -144,10 +169,13 @@ def avatar_figure(
     mass: float | None = None,
     detail: str = "capsules",
     percentile: float | None = None,
+    proportions: Mapping[str, float] | None = None,
+    age: float | None = None,
 ) -> Figure:
     """Return the avatar; arguments as for the person.
 
     Two arms and two legs of seven joints and a neck of three, on a rigid torso (Schmidl & Lin): the person with spine,
     shoulder girdle and upper neck fixed.
     """
-    return figure_of(avatar_spec(body(sex, stature, mass, percentile), detail), detail)
+    person = proportioned(body(sex, stature, mass, percentile, age), proportions)
+    return figure_of(avatar_spec(person, detail), detail)

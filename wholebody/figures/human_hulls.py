@@ -18,7 +18,7 @@ _TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "n
 def solids(size: Dimensions) -> tuple[Solid, ...]:
     """Return the pieces of a person, all of them convex polyhedra."""
     rest = [solid for solid in human_capsules.solids(size) if solid.name not in _TRUNK]
-    return (*_trunk(size), *(_hull_of(solid) for solid in rest))
+    return (*_trunk(size), *(hull_of(solid) for solid in rest))
 
 
 def _trunk(size: Dimensions) -> Iterator[Solid]:
@@ -34,8 +34,8 @@ def _solid(name: str, hull: tuple[Any, pin.SE3], x: float, z: float) -> Solid:
     return Solid(name, name.partition(":")[0], shape, place(x, 0.0, z) * center)
 
 
-def _hull_of(solid: Solid) -> Solid:
-    """Polyhedron of a box or a capsule, at the same place."""
+def hull_of(solid: Solid) -> Solid:
+    """Return the polyhedron of a box or a capsule, at the same place."""
     if type(solid.geometry).__name__ == "Box":
         x, y, z = (2.0 * float(half) for half in solid.geometry.halfSide)
         shape, center = hulls.box((x, y, z), solid.name)

@@ -6,6 +6,7 @@ from itertools import combinations
 
 from wholebody.figures.anthropometry import table
 from wholebody.figures.body_spec import Solid
+from wholebody.figures.human_fingers import finger_pair, is_finger
 from wholebody.figures.human_spheres import sphere_names
 
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")
@@ -77,6 +78,8 @@ def _reason(a: Solid, b: Solid) -> str | None:
     side_b, _, part_b = b.segment.partition("_")
     if side_a == side_b and frozenset((part_a, part_b)) in _NEXT:
         return _NEIGHBOURS
+    if side_a == side_b and (is_finger(part_a) or is_finger(part_b)):
+        return finger_pair(part_a, part_b)
     if part_b == "clavicle" and (part_a == "clavicle" or (a.segment in TRUNK and a.segment != "head")):
         return _SHOULDER
     if b.name.endswith("_upper_arm:0") and a.segment in TRUNK and a.segment != "head":
@@ -98,5 +101,5 @@ def collision_group(segment: str) -> str:
     """Group of a segment for self-collision: "torso_head", "left_arm", "right_arm", "left_leg" or "right_leg"."""
     side, _, part = segment.partition("_")
     if side in ("left", "right") and part != "clavicle":
-        return f"{side}_{'arm' if part in ('upper_arm', 'forearm', 'hand') else 'leg'}"
+        return f"{side}_{'arm' if part in ('upper_arm', 'forearm', 'hand') or is_finger(part) else 'leg'}"
     return "torso_head"

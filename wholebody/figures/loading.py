@@ -25,8 +25,12 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
     Args:
         spec: "human", "avatar", "hand", or the path of a URDF or MJCF file.
         **options: for "human" and "avatar": `sex` ("male", "female"), `stature` in metres, `mass` in kilograms,
-            `percentile` (1 to 99) for those of the two that are left out, and `detail` ("spheres", "capsules",
-            "hulls"); for "hand": `side` ("left", "right"), `sex`, `stature`, `mass`, `percentile`;
+            `percentile` (1 to 99) for those of the two that are left out, `proportions` such as ``{"sitting_height":
+            0.93}`` in metres (dimensions of ANSUR II, by the names of `docs/human.md`, and `hand_length`,
+            `hand_breadth`, `foot_length`; the others follow as they go together in people), `age` in years (20 to 69;
+            from 45 on some ranges of motion are smaller), and `detail` ("spheres", "capsules", "hulls");
+            for "human": `hands` ("rigid", "fingers");
+            for "hand": `side` ("left", "right"), `sex`, `stature`, `mass`, `percentile`;
             for a file: `root` ("fixed", "free"), `package_dirs`, folders for ``package://`` names, and `concavity`,
             a number or a mapping from link to number, which asks for the decomposition of meshes into convex pieces
             (0.01 is close, 1 is a hull); without it every mesh becomes its convex hull.
@@ -74,7 +78,7 @@ def _check_options(builder: Callable[..., Figure], options: dict[str, Any], wher
                 [value] if isinstance(value, (str, PathLike)) else listed(value, f"{where}: {option}", "['share']")
             )
             options[option] = [path(folder, f"{where}: {option}") for folder in folders]
-        elif option in ("detail", "side") or (option == "root" and value is not None):
+        elif option in ("detail", "side", "hands") or (option == "root" and value is not None):
             text(value, f"{where}: {option}")
         elif option == "samples":
             whole(value, f"{where}: {option}", 0, MOST_SAMPLES)

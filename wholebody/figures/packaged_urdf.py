@@ -52,14 +52,14 @@ def task_paths() -> dict[str, Path]:
     raise WholebodyError(f"there are no examples in or beside {package}; install wholebody again")
 
 
-def write_human(path: str | os.PathLike[str], person: Body) -> None:
-    """Write the URDF of a person, pieces as capsules and boxes."""
+def write_human(path: str | os.PathLike[str], person: Body, hands: str = "rigid") -> None:
+    """Write the URDF of a person, pieces as capsules and boxes; `hands` as for `human_spec`."""
     from wholebody.figures.body_spec import urdf_text
     from wholebody.figures.human import human_spec
     from wholebody.figures.human_figure import figure_of
     from wholebody.figures.urdf_extension import extension_text
 
-    spec = human_spec(person)
+    spec = human_spec(person, hands=hands)
     _write(Path(path), urdf_text(spec, extension_text(figure_of(spec, "capsules", person.sex))))
 
 

@@ -78,7 +78,7 @@ def stand(figure: Articulated, attitude: Attitude) -> Array:
             if joint in figure.joints:
                 values[joint] = math.radians(degrees)
     q = figure.clamp(figure.with_joints(q, values))
-    spread = [name for name in figure.joints if name.endswith("_abduction") and not name.startswith("neck")]
+    spread = [name for name in figure.joints if name.endswith(("shoulder_abduction", "hip_abduction"))]
     free = q
     for _ in range(_SPREAD_STEPS):
         close = _close_segments(figure, free)
@@ -100,9 +100,8 @@ def stand(figure: Articulated, attitude: Attitude) -> Array:
 def _moves(abduction: str, segment: str) -> bool:
     """Whether an abduction joint moves a segment outwards."""
     side, part, _ = abduction.split("_")
-    arm = ("upper_arm", "forearm", "hand")
     leg = ("thigh", "shank", "foot", "toes")
-    return segment.startswith(side) and segment.endswith(arm if part == "shoulder" else leg)
+    return segment.startswith(side) and segment.endswith(leg) == (part == "hip") and not segment.endswith("clavicle")
 
 
 def _close_segments(figure: Articulated, q: Array) -> set[str]:

@@ -56,6 +56,7 @@ class ReachCone:
         self.boundaries: Array = normals / lengths[:, None]
         self._slices = np.cross(self.visible, self.vertices)
         self._following = following
+        self._next = np.roll(np.arange(len(following)), -1)
         across = (np.cross(self.boundaries, self.vertices), np.cross(following, self.boundaries))
         self.planes: Array = np.vstack([self.boundaries, *across, self.vertices, self._slices])
 
@@ -105,7 +106,7 @@ class ReachCone:
         height, before, after, corner, side = (self.planes @ direction).reshape(5, count)
         within = (before >= 0.0) & (after >= 0.0)
         on_circle = np.sqrt(np.maximum(1.0 - height * height, 0.0))
-        nearness = np.where(within, on_circle, np.maximum(corner, np.roll(corner, -1)))
+        nearness = np.where(within, on_circle, np.maximum(corner, corner[self._next]))
         edge = int(nearness.argmax())
         following = (edge + 1) % count
         if within[edge] and on_circle[edge] > PARALLEL:
@@ -113,7 +114,7 @@ class ReachCone:
             nearest /= sqrt(nearest @ nearest)
         else:
             nearest = self.vertices[following if corner[following] > corner[edge] else edge]
-        wedge = np.flatnonzero((side >= 0.0) & (np.roll(side, -1) < 0.0))
+        wedge = np.flatnonzero((side >= 0.0) & (side[self._next] < 0.0))
         sign = 1.0 if height[wedge[0] if len(wedge) else 0] >= 0.0 else -1.0
         cosine = float(direction @ nearest)
         away = cosine * direction - nearest

@@ -217,11 +217,10 @@ def _report(
     was, now = check(before, scene, depth=COLLISION), check(after, scene, depth=COLLISION)
     times = before.times if result.times is None else result.times
     timed = terms if result.times is None else terms.at(times)
-    missed, at = 0.0, 0
-    if timed.holds:
-        state = scene.state(after.q[0])
-        misses = [timed.missed(frame, state.update(q)) for frame, q in enumerate(after.q)]
-        missed, at = max(misses), int(np.argmax(misses))
+    state = scene.state(after.q[0])
+    misses = [timed.worst(frame, state.update(q)) for frame, q in enumerate(after.q)]
+    at = max(range(len(misses)), key=lambda frame: misses[frame].by)
+    missed = misses[at].by
     beyond = limit_violation(scene.figure, after.q)
     left = [] if not result.message else [result.message]
     if now.colliding:
@@ -236,7 +235,7 @@ def _report(
     if beyond > ROUNDING:
         left.append(f"a joint limit is missed by {beyond:.3g} rad or m")
     if missed > HELD:
-        left.append(f"what is to hold is missed by {missed:.3g} m or rad, at {at * after.dt:.2f} s")
+        left.append(f"{misses[at].name} is missed by {missed:.3g} m or rad, at {at * after.dt:.2f} s")
     solved = now.free and beyond <= ROUNDING and missed <= HELD and (loads is None or loads.kept)
     if loads is not None and not loads.kept:
         left.append("loads are beyond their bounds")

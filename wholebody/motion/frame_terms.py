@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -27,6 +27,18 @@ from wholebody.tasks.checks import check_rows
 
 HeldTerm = Constraint | Goal
 Given = Constraint | Goal | Bound | StanceFeet
+
+
+class Miss(NamedTuple):
+    """By how much something that is held is missed.
+
+    Attributes:
+        by: metres or radians; 0 where it is met.
+        name: what is held, such as "Hold('left_palm')"; "" for nothing.
+    """
+
+    by: float
+    name: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +129,22 @@ class FrameTerms:
 
     def missed(self, frame: int, state: State) -> float:
         """By how much the state, of the posture of a frame, misses what is held there, metres and radians."""
-        worst = 0.0
-        for term in self.held(frame):
-            if isinstance(term, Goal):
-                worst = max(worst, float(np.abs(term.error(state)).max(initial=0.0)))
-            else:
-                value = np.atleast_1d(term.value(state))
-                worst = max(worst, float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0)))
-        return worst
+        return max((_miss(term, state) for term in self.held(frame)), default=0.0)
+
+    def worst(self, frame: int, state: State) -> Miss:
+        """What the state, of the posture of a frame, misses most of all that is held there, frozen joints included."""
+        found = [Miss(_miss(term, state), _label(term)) for term in self.held(frame)]
+        terms = [term for term in self.given if isinstance(term, Bound)]
+        if terms:
+            q = state.q.copy()
+            away = np.asarray(pin.difference(self.scene.model, self.q[frame], q))
+            state.update(self.q[frame])
+            for term in terms:
+                low, high = term.resolve(self.scene, self.q[frame]).bounds(state, None)
+                past = np.maximum(low - away, away - high)
+                found.append(Miss(float(past.max(initial=0.0)), _label(term)))
+            state.update(q)
+        return max(found, key=lambda each: each.by, default=Miss(0.0, ""))
 
     @property
     def holds(self) -> bool:
@@ -171,6 +191,20 @@ def _try(term: HeldTerm, scene: Scene, q: Array, where: str) -> None:
     resolved = term.resolve(scene, q)
     value = resolved.error(state) if isinstance(resolved, Goal) else resolved.value(state)
     check_rows(where, resolved, value, resolved.jacobian(state), state)
+
+
+def _miss(term: HeldTerm, state: State) -> float:
+    """By how much a state misses a term, metres and radians."""
+    if isinstance(term, Goal):
+        return float(np.abs(term.error(state)).max(initial=0.0))
+    value = np.atleast_1d(term.value(state))
+    return float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0))
+
+
+def _label(term: HeldTerm | Bound) -> str:
+    """A short name of a term: its class and its frame or joints."""
+    frame = getattr(term, "frame", None)
+    return f"{type(term).__name__}({frame!r})" if isinstance(frame, str) else repr(term)
 
 
 def between(model: pin.Model, q: Array, places: Array) -> Array:

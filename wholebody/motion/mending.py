@@ -38,7 +38,6 @@ RADIUS = 0.05  # rad, m: first trust region; postures are nearly free
 NEAR = 0.03  # m: pairs nearer than this have rows
 ROOM = 3e-4  # m: clearance that a motion that dips is first asked for beyond the others; it doubles
 MOST_ROOM = 5e-3  # m
-LONGEST = 2.0  # s that frames may be kept on one side of what the original motion passes
 SPREAD = 0.06  # s: how far a push at one frame spreads to its neighbours
 NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 
@@ -125,7 +124,7 @@ class Mender:
             return False
         if self._follower is None:
             self._follower = Follower(self._terms, self._clearance)
-        return keep_back(self._follower, self._workspace, q, gap, max(2, round(LONGEST / self._terms.dt)))
+        return keep_back(self._follower, self._workspace, q, gap, len(q))
 
     def _window(self, window: Window, q: Array) -> bool:
         """Mend one window of q (n, nq) in place; whether it is better than before."""

@@ -125,7 +125,7 @@ class Variant:
         person = self.person
         if isinstance(self.make, TaskFile):
             return self.make(person, self.target, self.layout)
-        figure = loaded(tuple(sorted(person.items()))) if isinstance(person, Mapping) else person
+        figure = loaded(_fixed(person)) if isinstance(person, Mapping) else person
         made: Problem = self.make(figure, self.target, self.layout)
         return made
 
@@ -133,7 +133,15 @@ class Variant:
 @cache
 def loaded(options: tuple[tuple[str, Any], ...]) -> Figure:
     """A person by options of `load`, made once a process."""
-    return load("human", **dict(options))
+    return load("human", **{name: dict(value) if name == "proportions" else value for name, value in options})
+
+
+def _fixed(person: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
+    """Options in a form that can be looked up."""
+    return tuple(
+        (name, tuple(sorted(value.items())) if isinstance(value, Mapping) else value)
+        for name, value in sorted(person.items())
+    )
 
 
 def _person(given: Any) -> Any:
@@ -150,7 +158,7 @@ def _person(given: Any) -> Any:
         return {"sex": body.sex, "stature": body.stature, "mass": body.mass}
     if isinstance(given, Mapping):
         try:
-            loaded(tuple(sorted(given.items())))  # wrong options are refused before anything is computed
+            loaded(_fixed(given))  # wrong options are refused before anything is computed
         except WholebodyError:
             raise
         except TypeError:

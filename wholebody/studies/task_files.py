@@ -17,6 +17,9 @@ from wholebody.taskfile.task import task_from
 TARGETED = ("point", "frame")
 """Types of goals whose target is a place."""
 
+SIZE = frozenset(("sex", "stature", "mass", "percentile", "proportions", "age"))
+"""Options of a figure that together say what person it is."""
+
 
 class TaskFile:
     """A task file of which variants are made; it can be sent to another process."""
@@ -85,8 +88,8 @@ class TaskFile:
             if name not in entry.keys:
                 raise UnknownNameError("option", name, entry.keys, "study: a person")
         kept = dict(entry.values)
-        if {"sex", "stature", "mass"} & person.keys():  # a stature of the file does not belong to another person
-            kept = {name: value for name, value in kept.items() if name not in ("sex", "stature", "mass")}
+        if SIZE & person.keys():  # a stature of the file does not belong to another person
+            kept = {name: value for name, value in kept.items() if name not in SIZE}
         return with_values(entry, values={**kept, **person})
 
     def _goal(self) -> int:

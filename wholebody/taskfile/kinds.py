@@ -253,6 +253,21 @@ class Joints(Kind):
             JOINT.names(name, figure, where.at(name))
 
 
+class Proportions(Kind):
+    """Dimensions of a person by name."""
+
+    @property
+    def words(self) -> str:
+        """Return how it is written."""
+        return "{ sitting_height = 0.93, ... }, m"
+
+    def read(self, value: Any, where: Where) -> dict[str, float]:
+        """Return the dimensions by name; the figure looks the names up."""
+        if not isinstance(value, dict) or not value:
+            raise where.fault(f"{shown(value)} is not a table of dimensions; write {{ sitting_height = 0.93 }}")
+        return {name: LENGTH.read(entry, where.at(name)) for name, entry in value.items()}
+
+
 @dataclass(frozen=True)
 class ThingJoints(Kind):
     """Joints that hold a thing to others or to the world."""

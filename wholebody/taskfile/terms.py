@@ -61,7 +61,11 @@ CONTACTS = {
         (
             Key("hand", kinds.Choice(("left", "right")), "the hand", True),
             Key("thing", _THING, "what is taken", True),
-            Key("kind", kinds.Choice(("palm", "power", "pinch")), "flat on a face, around a bar, or by the fingertips"),
+            Key(
+                "kind",
+                kinds.Choice(("palm", "power", "pinch", "fingertips")),
+                "on a face, around a bar, by two tips or all",
+            ),
             Key("side", DIRECTION, "where the face looks that a palm takes; to the hand's side if left out"),
             _weight("1/m^2, 1/rad^2"),
         ),

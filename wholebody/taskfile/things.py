@@ -12,11 +12,16 @@ _MASS = Key("mass", Number(25.0, 250.0, "kg"), "the usual mass for sex and statu
 _SEX = Key("sex", kinds.Choice(("male", "female")), "male if left out")
 _DETAIL = Key("detail", kinds.Choice(("spheres", "capsules", "hulls")), "of its geometry; capsules if left out")
 _PERCENTILE = Key("percentile", Number(1.0, 99.0), "of the sex in ANSUR II, for stature and mass if left out")
+_HANDS = Key("hands", kinds.Choice(("rigid", "fingers")), "one segment each, or fingers; rigid if left out")
 _BODY = (_SEX, _STATURE, _MASS, _PERCENTILE)
+_OWN = (
+    Key("proportions", kinds.Proportions(), "dimensions of ANSUR II that are met; the others follow"),
+    Key("age", Number(20.0, 69.0), "in years: from 45 on some ranges of motion are smaller"),
+)
 
 FIGURES = {
-    "human": Form("A person with 55 degrees of freedom.", (*_BODY, _DETAIL)),
-    "avatar": Form("A person with a stiff torso: arms, legs and neck.", (*_BODY, _DETAIL)),
+    "human": Form("A person with 55 degrees of freedom.", (*_BODY, *_OWN, _DETAIL, _HANDS)),
+    "avatar": Form("A person with a stiff torso: arms, legs and neck.", (*_BODY, *_OWN, _DETAIL)),
     "hand": Form("One hand.", (Key("side", kinds.Choice(("left", "right")), "right if left out"), *_BODY)),
     "urdf": Form(
         "Any URDF or MJCF, with its own collision geometry.",

@@ -83,9 +83,12 @@ def _figure(figure: Figure, target: Path) -> dict[str, Any]:
     named = {"name": spec} if spec in ("human", "avatar", "hand") else {"path": _beside(spec, target)}
     if options.get("package_dirs"):
         options = {**options, "package_dirs": [_beside(str(folder), target) for folder in options["package_dirs"]]}
-    known = {"sex", "stature", "mass", "detail", "side", "root", "package_dirs", "concavity"}
+    known = {
+        "sex", "stature", "mass", "percentile", "proportions", "age", "detail", "hands", "side", "root", "package_dirs",
+        "concavity",
+    }  # fmt: skip
     for option in options:
-        if option not in known or isinstance(options[option], dict):
+        if option not in known or (option == "concavity" and isinstance(options[option], dict)):
             raise InputError(f"write_task: the figure was loaded with {option}, which a task file cannot say")
     return {**named, **{name: value for name, value in options.items() if value is not None}}
 

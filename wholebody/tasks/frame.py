@@ -16,8 +16,31 @@ from wholebody.tasks.base import Goal, Surroundings, filled
 from wholebody.tasks.residuals import PlacementResidual
 
 
+class PlacementGoal(Goal):
+    """A goal whose error is a difference of placements: in position [m], then in orientation [rad], of those asked for.
+
+    Attributes:
+        residual: computes the error, with frames, joints and target; once resolved.
+    """
+
+    residual: PlacementResidual
+
+    @property
+    def angular(self) -> Mask:
+        """(m,) which rows are in radians: three of six, or of three all or none."""
+        return self.residual.angular
+
+    def error(self, state: State) -> Array:
+        """(m,) difference in position [m] and orientation [rad]."""
+        return self.residual.value(state)
+
+    def jacobian(self, state: State) -> Wrench:
+        """(m, 6) rows on the frame's joint, or between the joints of the two frames."""
+        return self.residual.wrench(state)
+
+
 @dataclass(frozen=True, eq=False)
-class Frame(Goal):
+class Frame(PlacementGoal):
     """Move a frame to a position and an orientation.
 
     The error is the position of the frame minus the target [m], then the rotation vector from the target's orientation
@@ -54,22 +77,9 @@ class Frame(Goal):
         place = inputs.find_place(scene, self.frame, "Frame")
         return filled(self, residual=PlacementResidual.build(place, self.resolved_target))
 
-    @property
-    def angular(self) -> Mask:
-        """(6,) the last three rows are in radians."""
-        return self.residual.angular
-
-    def error(self, state: State) -> Array:
-        """(6,) difference in position [m] and orientation [rad]."""
-        return self.residual.value(state)
-
-    def jacobian(self, state: State) -> Wrench:
-        """Six rows on the frame's joint."""
-        return self.residual.wrench(state)
-
 
 @dataclass(frozen=True, eq=False)
-class Orientation(Goal):
+class Orientation(PlacementGoal):
     """Turn a frame to an orientation; its position is free.
 
     The error is the rotation vector from the target to the frame, in world axes [rad].
@@ -102,16 +112,3 @@ class Orientation(Goal):
         """Find the frame."""
         place = inputs.find_place(scene, self.frame, "Orientation")
         return filled(self, residual=PlacementResidual.build(place, self.resolved_target, position=False))
-
-    @property
-    def angular(self) -> Mask:
-        """(3,) all rows are in radians."""
-        return self.residual.angular
-
-    def error(self, state: State) -> Array:
-        """(3,) difference in orientation [rad]."""
-        return self.residual.value(state)
-
-    def jacobian(self, state: State) -> Wrench:
-        """Three rows on the frame's joint."""
-        return self.residual.wrench(state)

@@ -18,10 +18,11 @@ from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Over, Part, owner_pairs, through
-from wholebody.tasks.surfaces import Face, Surface, carried_by, face, outermost, surface
+from wholebody.tasks.surfaces import Face, Surface, carried_by, face, joined, outermost, surface
 from wholebody.tasks.touch import check_apart, named
 
-KINDS = ("palm", "power", "pinch")
+KINDS = ("palm", "power", "pinch", "fingertips")
+FINGERS = ("thumb", "index", "middle", "ring", "little")
 MIDDLE = 0.8  # share of a face, about its middle, in which the palm may be
 ALONG = 0.8  # share of a handle, about its middle, that the hand may take
 
@@ -36,16 +37,17 @@ class Grasp(ContactTerm):
     - "palm": the flat hand lies on a face of the thing. The hand touches it, z looks into the face, and the palm is
       over the face, a tenth within its edges. The hand may turn about z.
     - "power": the hand is around a bar: the thing's longest axis lies along y and crosses the palm, and the hand
-      touches the thing.
+      touches the thing. Where the hand has fingers, the two outer parts of each touch it too.
     - "pinch": the fingertips touch the thing: thumb and index finger from two sides where the figure has both,
-      otherwise the tip of the index finger.
+      otherwise the tip of the index finger. Where the hand has fingers, their last parts touch it.
+    - "fingertips": the last parts of all five fingers touch the thing; the hand needs fingers.
 
     Use it as a goal or as a constraint. The clearance between hand and thing is zero.
 
     Attributes:
         hand: "left" or "right", or the hand's segment.
         thing: what is taken.
-        kind: "palm", "power" or "pinch".
+        kind: "palm", "power", "pinch" or "fingertips".
         side: (3,) for a palm, direction in the world in which the face looks; by default a left hand takes the face on
             the figure's left, a right hand that on its right.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
@@ -57,7 +59,7 @@ class Grasp(ContactTerm):
 
     hand: str
     thing: str
-    kind: Literal["palm", "power", "pinch"] = "palm"
+    kind: Literal["palm", "power", "pinch", "fingertips"] = "palm"
     _: KW_ONLY
     side: ArrayLike | None = None
     weight: float = 1.0
@@ -90,7 +92,7 @@ class Grasp(ContactTerm):
 
         Raises:
             UnknownNameError: the figure has no such palm or fingertip, or there is no such thing.
-            InputError: the thing is a frame, or is carried by the same hand.
+            InputError: the thing is a frame, is carried by the same hand, or needs fingers that are missing.
         """
         where = f"Grasp({shown(self.hand)}, {shown(self.thing)})"
         place = inputs.find_place(scene, self.frame, where)
@@ -105,6 +107,9 @@ class Grasp(ContactTerm):
             parts = self._palm(scene, place, hand, thing, state, where)
         elif self.kind == "power":
             parts = _power(place, hand, thing, state, where)
+            parts += [Gap(finger, thing) for finger in self._outer_parts(scene)]
+        elif self.kind == "fingertips":
+            parts = self._fingertips(scene, thing, where)
         else:
             parts = self._pinch(scene, thing, where)
         return filled(self, parts=tuple(parts), touches=owner_pairs(_fingers(scene, place.joint), thing.owners))
@@ -122,12 +127,37 @@ class Grasp(ContactTerm):
         return [Gap(hand, thing), facing, Over(place, taken, -MIDDLE * taken.half, MIDDLE * taken.half)]
 
     def _pinch(self, scene: Surroundings, thing: Surface, where: str) -> list[Part]:
+        ends = [f"{self._side}_{finger}_distal" for finger in ("index", "thumb")]
+        if set(ends) <= set(scene.figure.segments):
+            index, thumb = (surface(scene, end, where) for end in ends)
+            return [Gap(index, thing), Gap(thumb, thing), Opposite(index, thumb, thing)]
         tips = [surface(scene, f"{self._side}_index_tip", where)]
         try:
             tips.append(surface(scene, f"{self._side}_thumb_tip", where))
         except UnknownNameError:
             return [Gap(tips[0], thing)]
         return [*(Gap(tip, thing) for tip in tips), Opposite(tips[0], tips[1], thing)]
+
+    def _fingertips(self, scene: Surroundings, thing: Surface, where: str) -> list[Part]:
+        ends = [f"{self._side}_{finger}_distal" for finger in FINGERS]
+        if not set(ends) <= set(scene.figure.segments):
+            raise InputError(
+                f"{where}: kind 'fingertips' needs a hand with fingers; load the person with hands='fingers', "
+                "or take the thing by kind 'pinch'"
+            )
+        return [Gap(surface(scene, end, where), thing) for end in ends]
+
+    def _outer_parts(self, scene: Surroundings) -> list[Surface]:
+        """Of each finger of the hand, its two outer parts; none of a hand that is one segment."""
+        known = set(scene.figure.segments)
+        found = []
+        for finger in FINGERS:
+            kinds = ("proximal" if finger == "thumb" else "middle", "distal")
+            parts = [f"{self._side}_{finger}_{kind}" for kind in kinds]
+            owned = [part for part in parts if part in known]
+            if owned:
+                found.append(joined(scene, f"{self._side}_{finger}", owned))
+        return found
 
 
 class Opposite(NamedTuple):

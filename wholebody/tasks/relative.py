@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
-from wholebody.arrays import Array, Mask
+from wholebody.arrays import Array
 from wholebody.checks import flag, shown
-from wholebody.figures.state import State, Wrench
 from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Goal, Surroundings, filled
+from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.frame import PlacementGoal
 from wholebody.tasks.residuals import PlacementResidual, placement_between
 
 
 @dataclass(frozen=True, eq=False)
-class Relative(Goal):
+class Relative(PlacementGoal):
     """Move a frame to a placement relative to another frame of the figure, if possible.
 
     Use it for two hands on one object. If the relation must always hold, use `Hold` with `relative_to`. The error is
@@ -58,16 +58,3 @@ class Relative(Goal):
         base = inputs.find_base(scene, self.to, self.frame, "Relative")
         target = self._placement if self._placement is not None else placement_between(scene, start, place, base)
         return filled(self, residual=PlacementResidual.build(place, target, base, orientation=self.orientation))
-
-    @property
-    def angular(self) -> Mask:
-        """(m,) the last three of six rows are in radians."""
-        return self.residual.angular
-
-    def error(self, state: State) -> Array:
-        """(m,) difference in position [m] and orientation [rad]."""
-        return self.residual.value(state)
-
-    def jacobian(self, state: State) -> Wrench:
-        """Rows between the two joints."""
-        return self.residual.wrench(state)

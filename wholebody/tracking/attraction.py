@@ -25,10 +25,16 @@ class Attraction(Measure):
     def __init__(self, model: pin.Model, q: Array, weights: Array) -> None:
         """Attract to q (nq,) with weights (nv,), 1/rad^2 and 1/m^2."""
         self._distance = SquaredDistance.build(model, q, weights)
+        self._weights = self._distance.weights.copy()
 
     def toward(self, q: Array) -> None:
         """Attract to another posture (nq,)."""
         self._distance.reference[:] = q
+
+    def weigh(self, factors: Array) -> None:
+        """Multiply the weights of the beginning by factors (nv,), which are positive."""
+        np.multiply(self._weights, factors, out=self._distance.weights)
+        np.multiply(2.0, self._distance.weights, out=self._distance.curvature)
 
     def value(self, state: State) -> float:
         """The squared distance."""

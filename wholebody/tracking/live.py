@@ -62,6 +62,7 @@ class LiveDrag:
         handles: frame to the frame's index, of those that can be dragged.
         things: names of the things that can be dragged.
         held: frames that stay where they are.
+        taken: the handle that the mouse holds; "" for none.
         method: what follows the handles.
     """
 
@@ -91,7 +92,7 @@ class LiveDrag:
         self.held = {_handle_of(term, self.handles) for term in problem.constraints if _releasable(term, self.handles)}
         self.method: Method = method_for_motions(method)
         self._undo: list[tuple[Array, dict[str, pin.SE3]]] = []
-        self._taken = ""
+        self.taken = ""
         self._drag: Drag[Any] | None = None
         self._trouble = ""
         self._state = self.scene.state(self.q)
@@ -107,12 +108,12 @@ class LiveDrag:
         known(name, {*self.handles, *self.things}, "handle")
         self._undo.append((self.q.copy(), {name: self.scene.objects[name].placement for name in self.things}))
         del self._undo[:-MOST_UNDONE]
-        self._taken = name
+        self.taken = name
         self._restart()
 
     def let_go(self) -> None:
         """Let the handle go; the figure stays."""
-        self._taken, self._drag, self._trouble = "", None, ""
+        self.taken, self._drag, self._trouble = "", None, ""
 
     def move(self, place: Array) -> LiveFrame:
         """Move the handle that was taken to a place (3,), and make one frame.
@@ -122,19 +123,19 @@ class LiveDrag:
         Raises:
             InputError: no handle was taken, or the place is not three finite numbers.
         """
-        if not self._taken:
+        if not self.taken:
             raise InputError("no handle was taken; take one first")
         place = numbers(place, (3,), "the place of a handle")
         began = time.perf_counter()
         error = 0.0
         if self._drag is not None:
             try:
-                if self._taken in self.things:
+                if self.taken in self.things:
                     self._push(place)
                     frame = self._drag.to(self.place(next(iter(self.handles))))
                 else:
                     frame = self._drag.to(place)
-                    error = float(np.linalg.norm(self.place_at(frame.q, self._taken) - place))
+                    error = float(np.linalg.norm(self.place_at(frame.q, self.taken) - place))
                 self.q = np.array(frame.q)
             except InputError as trouble:
                 self._trouble = str(trouble)
@@ -148,7 +149,7 @@ class LiveDrag:
         """
         known(name, self.handles, "handle")
         self.held ^= {name}
-        if self._taken:
+        if self.taken:
             self._restart()
         return name in self.held
 
@@ -159,7 +160,7 @@ class LiveDrag:
             UnknownNameError: there is no such method.
         """
         self.method = method_for_motions(method)
-        if self._taken:
+        if self.taken:
             self._restart()
 
     def undo(self) -> bool:
@@ -190,7 +191,7 @@ class LiveDrag:
 
     def stated(self, goals: object = ()) -> Problem:
         """The problem with the present posture as its start, and the present holds."""
-        holds = [Hold(name) for name in self.handles if name in self.held and name != self._taken]
+        holds = [Hold(name) for name in self.handles if name in self.held and name != self.taken]
         measures = self.problem.measures if self.problem.measures_given else None
         return Problem(
             self.scene,
@@ -205,7 +206,7 @@ class LiveDrag:
     def _restart(self) -> None:
         """Begin to follow anew: holds, handle or method are others."""
         self._trouble = ""
-        followed = self._taken if self._taken in self.handles else next(iter(self.handles))
+        followed = self.taken if self.taken in self.handles else next(iter(self.handles))
         goals = [Point(followed, self.place(followed)), *self.problem.goals]
         try:
             self._drag = Drag(self.stated(goals), self.method)
@@ -213,17 +214,17 @@ class LiveDrag:
             self._drag, self._trouble = None, str(trouble)
 
     def _push(self, place: Array) -> None:
-        at = self.scene.objects[self._taken].placement
+        at = self.scene.objects[self.taken].placement
         way = place - at.translation
         length = float(np.linalg.norm(way))
         if length > FARTHEST_STEP:
             way *= FARTHEST_STEP / length
-        self.scene.move(self._taken, at=pin.SE3(at.rotation, at.translation + way), over=FRAME)
+        self.scene.move(self.taken, at=pin.SE3(at.rotation, at.translation + way), over=FRAME)
 
     def _report(self, error: float, seconds: float) -> LiveFrame:
         contacts = self.scene.contacts(self.q, within=NEAR)
         overlap = float(-contacts.distance.min(initial=0.0))
-        doing = f"dragging {self._taken}" if self._taken else "take a handle and drag it; click one to hold it"
+        doing = f"dragging {self.taken}" if self.taken else "take a handle and drag it; click one to hold it"
         status = f"{doing}, by {self.method.name}"
         if self._trouble:
             status = f"{status}: {self._trouble}"

@@ -14,6 +14,7 @@ from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
 from wholebody.tracking.attraction import Attraction, Pace
+from wholebody.tracking.entanglement import Entanglement
 from wholebody.tracking.overlap_strategy import Resolution
 
 CLEARANCE = 1e-3
@@ -54,7 +55,8 @@ class QPStrategy:
             touching: things that the figure may touch; from all others it keeps `CLEARANCE`.
         """
         self.scene, self.dt = scene, dt
-        self._pace = Pace(scene.model, pace(scene, dt))
+        most = pace(scene, dt)
+        self._pace = Pace(scene.model, most)
         self._attraction = Attraction(scene.model, start, weights(scene, rigid))
         cones = [ReachCones()] if scene.figure.cones else []
         mine = [*scene.figure.segments, *(name for name, thing in scene.objects.items() if thing.segment is not None)]
@@ -63,6 +65,7 @@ class QPStrategy:
             touching=[(part, name) for name in touching for part in mine],
         )  # fmt: skip
         self._tracker = QP().tracker(self.problem, dt)
+        self._entanglement = None if rigid else Entanglement(scene, self._tracker.workspace, most)
         self._into_cones = OverlapResolver(scene, scene.workspace()).into_cones if cones else np.array
 
     def resolve(self, shown: Array, tracked: Array) -> Resolution:
@@ -75,7 +78,10 @@ class QPStrategy:
         workspace = self._tracker.workspace
         proximity = workspace.proximity
         began, queried = time.perf_counter(), proximity.seconds
-        self._attraction.toward(self._into_cones(tracked))
+        tracked = self._into_cones(tracked)
+        self._attraction.toward(tracked)
+        if self._entanglement is not None:
+            self._attraction.weigh(self._entanglement.weights(shown, tracked))
         self._pace.begin(shown)
         q = shown
         candidates: list[Array] = []
@@ -88,6 +94,8 @@ class QPStrategy:
             if np.abs(step.displacement).max() < SETTLED or not step.rows:
                 break
         contacts = workspace.near(q, 1.01 * CLEARANCE)
+        if self._entanglement is not None:
+            self._entanglement.look(shown, q, tracked, contacts)
         pairs = int((contacts.distance < self.problem.clearances[contacts.number] + 0.01 * CLEARANCE).sum())
         queried = proximity.seconds - queried
         whole = time.perf_counter() - began

@@ -22,6 +22,7 @@ SKIN, FREE, HELD, GRIP = (214, 180, 150), (70, 130, 220), (225, 90, 40), (90, 17
 STILL = 1e-5  # m, rad: what moves less is not sent
 EYE = (2.2, -1.6, 0.6)  # m: of the camera, from the figure's centre of mass
 RADIUS = 0.04  # m: of a handle
+SETTLING = 90  # frames after the mouse lets go in which the figure still follows to where it let go
 THROUGH = 0.7  # opacity of the figure, so that the handles in it are seen
 GROUND = 6.0  # m: of the piece of a half-space that is drawn
 SECTIONS = (24, 24)  # of what is round
@@ -60,6 +61,7 @@ class LivePage:
         self._lock = threading.RLock()
         self._target: Any = None
         self._reached: Any = None
+        self._settling = 0  # frames that are left after the mouse let go
         self._sent: dict[int, Any] = {}
         self._stopped = threading.Event()
         self.server: Any = viser.ViserServer(host="127.0.0.1", port=port, label="wholebody drag", verbose=False)
@@ -118,13 +120,15 @@ class LivePage:
             nonlocal offset
             with self._lock:
                 if event.phase == "start":
+                    self._settling = 0
                     self.drag.take(name)
+                if self.drag.taken != name:
+                    return  # undone meanwhile
+                if event.phase == "start":
                     offset = self.drag.place(name) - np.array(event.start_position)
+                self._target = np.array(event.end_position) + offset
                 if event.phase == "end":
-                    self.drag.let_go()
-                    self._target = None
-                else:
-                    self._target = np.array(event.end_position) + offset
+                    self._settling = SETTLING
 
         async def clicked(_: Any) -> None:
             if name in self.drag.handles:
@@ -165,7 +169,7 @@ class LivePage:
     def _undo(self, _: Any) -> None:
         with self._lock:
             self.drag.undo()
-            self._target = None
+            self._target, self._settling = None, 0
             self._show(self.drag.report())
 
     def _write(self, _: Any) -> None:
@@ -184,13 +188,25 @@ class LivePage:
             began = time.perf_counter()
             with self._lock:
                 if self._target is not None and (self._target is not self._reached):
-                    target, before = self._target, self.drag.q
-                    frame = self.drag.move(target)
-                    self._show(frame)
-                    self.frames += 1
-                    if np.abs(frame.q - before).max() < STILL:
-                        self._reached = target  # nothing to send until the mouse moves on
+                    self._follow(self._target)
             self._stopped.wait(max(FRAME - (time.perf_counter() - began), 0.001))
+
+    def _follow(self, target: Any) -> None:
+        """Make one frame towards the place of the mouse."""
+        name, before = self.drag.taken, self.drag.q
+        place = self.drag.place(name)
+        frame = self.drag.move(target)
+        self.frames += 1
+        moved = max(np.abs(frame.q - before).max(), np.abs(self.drag.place(name) - place).max())
+        still = moved < STILL
+        if still:
+            self._reached = target  # nothing to send until the mouse moves on
+        if self._settling:
+            self._settling = 0 if still else self._settling - 1
+            if not self._settling:
+                self.drag.let_go()
+                self._target, frame = None, self.drag.report()
+        self._show(frame)
 
     def _show(self, frame: LiveFrame) -> None:
         scene = self.drag.scene

@@ -10,13 +10,13 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.adapters import Adapter, adapters, missing, names
+from wholebody.bench.adapters import ALL, Adapter, adapters, missing, names
 from wholebody.bench.adapters.base import FIRST_FIT
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.problem_sets.registry import SETS
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
-INSTALLED = adapters()
+INSTALLED = adapters([ALL])
 CUBE = 0.05 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 
 
@@ -136,7 +136,7 @@ def test_unknown_and_missing_adapters_are_named() -> None:
     assert [adapter.name for adapter in adapters(["newton", "newton/kkt"])] == [
         "newton/slack", "newton/barrier", "newton/kkt",
     ]  # fmt: skip
-    assert {adapter.name for adapter in adapters(starts=True)} | set(missing()) == set(names())
+    assert {adapter.name for adapter in adapters([ALL], starts=True)} | set(missing()) == set(names())
     for name, command in missing().items():
         assert command.startswith("pip install")
         with pytest.raises(MissingPackageError, match="pip install"):

@@ -89,8 +89,19 @@ def test_entrants_that_differ_in_starts_are_left_out_unless_they_are_asked_for()
     few, all_ = [adapter.name for adapter in adapters()], [adapter.name for adapter in adapters(starts=True)]
     assert "qp" in few
     assert not any(name.endswith(("/one_start", "/starts")) for name in few)
-    assert {"qp/one_start", "qp/starts", "ccd/starts", "dls/starts"} <= set(all_)
+    assert {"qp/one_start", "dls/starts"} <= set(all_)
     assert set(few) <= set(all_)
+    every = [adapter.name for adapter in adapters(["all"], starts=True)]
+    assert {"qp/starts", "ccd/starts", "newton/kkt"} <= set(every) - set(all_)
+    assert set(all_) <= set(every)
+
+
+def test_every_algorithm_takes_part_from_one_start_and_from_several() -> None:
+    names = {adapter.name for adapter in adapters(starts=True)}
+    for family in ("qp", "newton", "ccd", "dls", "placo", "pink", "mink"):
+        mine = {name for name in names if name.partition("/")[0] == family}
+        assert not mine or (len(mine) == 2 and sum("start" in name for name in mine) == 1)
+    assert len(names) <= 16
     assert [adapter.name for adapter in adapters(["newton"], starts=True)][-2:] == ["newton/one_start", "newton/starts"]
 
 

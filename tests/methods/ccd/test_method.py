@@ -82,8 +82,12 @@ def test_a_target_inside_a_thing_is_unreachable_and_nothing_is_violated(
     assert solution.assessment.goal_error > 0.1
 
 
-def test_a_start_inside_a_thing_is_left(human: wb.Figure, deepest: Callable[..., float]) -> None:
-    beside = _target(human, "right_palm", human.neutral) * pin.SE3(np.eye(3), np.array([0.1, 0.0, -0.05]))
+@pytest.mark.parametrize("offset", [(0.0, 0.0, 0.0), (0.0, 0.0, -0.06), (0.1, 0.0, -0.05)])
+def test_a_start_inside_a_thing_is_left(
+    human: wb.Figure, deepest: Callable[..., float], offset: tuple[float, float, float]
+) -> None:
+    """The hand is inside of a box, with and without the forearm, which cannot leave it before the hand."""
+    beside = _target(human, "right_palm", human.neutral) * pin.SE3(np.eye(3), np.array(offset))
     scene = wb.Scene(human).add(wb.Box((0.2, 0.2, 0.2)), name="box", at=beside)
     assert deepest(scene, human.neutral) > 0.05
     problem = wb.Problem(scene, goals=[wb.Point("left_index_tip", (0.3, 0.25, 1.0))])

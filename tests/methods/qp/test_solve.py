@@ -300,3 +300,15 @@ def test_a_start_whose_contacts_cancel_ends_outside(honest):
     assert solution.status == "unreachable"
     assert solution.assessment.penetration < 1e-5
     assert solution.assessment.goal_error < 0.1201  # pulled back by 12 cm, and no more
+
+
+@pytest.mark.parametrize("height", [0.44, 0.47])
+def test_a_person_who_stands_in_the_middle_of_a_chair_gets_out_of_it(height, honest):
+    """The seat is too high for soles that stand flat; no step from the standing legs leads out of the seat."""
+    scene = wb.Scene(wb.load("human"))
+    scene.add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.42, 0.5, 0.04)), name="seat", at=(-0.1, 0.0, height - 0.02))
+    scene.add(wb.Box((0.04, 0.5, 0.6)), name="back", at=(-0.33, 0.0, 0.8))
+    stands = wb.Stand(on="floor", balance=False)
+    problem = wb.Problem(scene, goals=[wb.Sit("seat", back="back")], constraints=[stands])
+    assert honest(problem, wb.solve(problem)).status == "unreachable"

@@ -2,10 +2,12 @@
 
 from wholebody.bench.adapters.base import Adapter, Budget, Tool
 from wholebody.bench.adapters.registry import (
+    ALL,
     STEPPING,
     adapters,
     chosen_tools,
     differences,
+    installed,
     installed_tools,
     make_tool,
     missing,
@@ -13,6 +15,7 @@ from wholebody.bench.adapters.registry import (
 )
 
 __all__ = [
+    "ALL",
     "STEPPING",
     "Adapter",
     "Budget",
@@ -20,6 +23,7 @@ __all__ = [
     "adapters",
     "chosen_tools",
     "differences",
+    "installed",
     "installed_tools",
     "make_tool",
     "missing",

@@ -22,6 +22,18 @@ SOLVERS = {"quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
 
 VARIANTS = (f"/{ONE}", f"/{FAMILY}")
 
+ALL = "all"
+"""In place of a name: every entrant that is installed."""
+
+USUAL = ("qp", "newton/slack", "ccd", "placo", "pink", "mink", "dls", "drake")
+"""Entrants where none is named: one of each algorithm. Their other settings take part by name, or with `ALL`."""
+
+USUAL_STARTS = (
+    *(f"{family}/{FAMILY}" for family in ("dls", "placo", "pink", "mink", "drake")),
+    *(f"{family}/{ONE}" for family in ("qp", "newton", "ccd")),
+)
+"""With those, every method takes part from one start and from several: qp, newton and ccd have several by default."""
+
 
 class _Row(NamedTuple):
     """How to build an adapter, the modules it needs, and the extra that installs them."""
@@ -35,11 +47,11 @@ class _Row(NamedTuple):
 
 
 def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[Adapter, ...]:
-    """The adapters of these names, in the order given; all installed ones where None.
+    """The adapters of these names, in the order given; where None, the installed ones of `USUAL`.
 
-    The name of a method with several adapters and none of that name, such as "newton", means all that are installed.
-    Entrants that differ from another in their starts alone, such as "qp/one_start" and "mink/starts", are among several
-    only if `starts` is true.
+    The name of a method with several adapters and none of that name, such as "newton", means all that are installed;
+    "all" means every entrant that is installed. Entrants that differ from another in their starts alone, such as
+    "qp/one_start" and "mink/starts", are among several only if `starts` is true.
 
     Raises:
         UnknownNameError: there is no such adapter.
@@ -47,19 +59,21 @@ def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[
     """
     rows = _rows()
     if names is None:
-        return tuple(
-            row.build() for name, row in rows.items() if row.installed() and (starts or not name.endswith(VARIANTS))
-        )
+        usual = (*USUAL, *(USUAL_STARTS if starts else ()))
+        return tuple(rows[name].build() for name in usual if rows[name].installed())
     families = {name.partition("/")[0] for name in rows}
     chosen: dict[str, None] = {}
     for name in names:
-        if name in rows:
+        if name == ALL:
+            several = (key for key in rows if rows[key].installed() and (starts or not key.endswith(VARIANTS)))
+            chosen.update(dict.fromkeys(several))
+        elif name in rows:
             chosen[name] = None
         elif name in families:
             family = (key for key in rows if key.startswith(f"{name}/") and (starts or not key.endswith(VARIANTS)))
             chosen.update(dict.fromkeys(key for key in family if rows[key].installed()))
         else:
-            raise UnknownNameError("method", name, {*rows, *families})
+            raise UnknownNameError("method", name, {*rows, *families, ALL})
     for name in chosen:
         if not rows[name].installed():
             raise MissingPackageError(f"{name} is not installed; install it with: {_command(rows[name])}")
@@ -69,6 +83,12 @@ def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[
 def names() -> tuple[str, ...]:
     """Names of all adapters, installed or not, in the order of reports."""
     return tuple(_rows())
+
+
+def installed(name: str) -> bool:
+    """Whether what an adapter needs is installed; false for a name that is none."""
+    row = _rows().get(name)
+    return row is not None and row.installed()
 
 
 def missing() -> Mapping[str, str]:
@@ -106,6 +126,7 @@ def _rows() -> dict[str, _Row]:
     rows["mink"] = _Row(partial(_outside, "mink"), *mink)
     rows["mink/hard"] = _Row(partial(_outside, "mink", "hard"), *mink)
     rows["drake"] = _Row(partial(_outside, "drake"), ("pydrake",), "drake")
+    rows["optik"] = _Row(partial(_outside, "optik"), ("optik",), "optik")
     for family in ("qp", "newton", "ccd"):
         rows[f"{family}/{ONE}"] = _Row(partial(one_start, family))
     for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake"):

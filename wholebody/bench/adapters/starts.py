@@ -106,9 +106,11 @@ def restarted(adapter: Adapter) -> Adapter:
         adapter,
         name=f"{family}/{FAMILY}",
         make=partial(_make, adapter),
+        loose=(),
         prepare=Restarted.prepare,
         setup=adapter.setup.replace("; one start,", "; from each start").removesuffix(".")
-        + f". Further starts within {SECONDS:g} s of processor time where there is no answer: joints moved at random "
+        + ". No other budgets than the default one. "
+        + f"Further starts within {SECONDS:g} s of processor time where there is no answer: joints moved at random "
         "within their limits, the root and what holds it excepted, free of overlap.",
     )
 

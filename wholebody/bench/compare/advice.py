@@ -7,13 +7,13 @@ from math import inf, isfinite, nan
 from typing import NamedTuple
 
 from wholebody.bench.compare import paired
-from wholebody.bench.compare.front import OURS
+from wholebody.bench.compare.front import OURS, Rival
 from wholebody.bench.compare.paired import named
 from wholebody.bench.compare.record import FLOOR
 from wholebody.bench.compare.results import EFFORT_FLOOR, Results, middle
 from wholebody.bench.compare.statistics import NOTHING, Interval, ratio
 from wholebody.bench.compare.summary import GOOD, Summary
-from wholebody.bench.report import words
+from wholebody.bench.report import upfirst, words
 
 
 class Choice(NamedTuple):
@@ -181,6 +181,46 @@ def _warning(standing: Standing, rows: Sequence[Summary]) -> list[str]:
         f"**`{standing.method}` alone is not enough:** of what it takes it solves at most {100 * best.success:.0f} % "
         f"({words(best.set)}) and in {words(standing.worst_set)} {100 * standing.worst_share:.0f} %{deep}."
     ]
+
+
+def targets(rows: Sequence[Summary], wall: Sequence[Rival], dependable: Sequence[Rival]) -> list[str]:
+    """What is asked of our default method, and what was found, with its interval; empty where it did not take part.
+
+    Args:
+        rows: the figures of all methods.
+        wall: who is on the front by the median.
+        dependable: the same by the time of nine problems in ten.
+    """
+    mine = [row for row in rows if row.method == OURS and row.refused < row.cases]
+    if not mine:
+        return []
+    verdicts = {
+        "reached": [row for row in mine if row.success_low >= GOOD],
+        "reached, with an interval that goes lower": [row for row in mine if row.success >= GOOD > row.success_low],
+        "missed, with an interval that goes higher": [row for row in mine if row.success < GOOD <= row.success_high],
+        "missed": [row for row in mine if row.success_high < GOOD],
+    }
+    found = "; ".join(
+        f"{verdict}: "
+        + ", ".join(
+            f"{words(row.set)} {100 * row.success:.1f} % [{100 * row.success_low:.1f}, {100 * row.success_high:.1f}] "
+            f"of {row.cases}"
+            for row in listed
+        )
+        for verdict, listed in verdicts.items()
+        if listed
+    )
+    said = [f"`{OURS}` solves at least {100 * GOOD:.0f} % of every set. {upfirst(found)}."]
+    if wall:
+        ahead = sorted({rival.method for rival in wall if not rival.on_front and rival.method})
+        said.append(
+            f"No other method is both faster and as accurate in any chart. `{OURS}` is on the front of "
+            f"{sum(rival.on_front for rival in wall)} of {len(wall)} charts, and of "
+            f"{sum(rival.on_front for rival in dependable)} of {len(dependable)} by the time in which nine problems in "
+            f"ten are solved"
+            + (f"; ahead of it in a chart: {', '.join(f'`{name}`' for name in ahead)}." if ahead else ".")
+        )
+    return said
 
 
 def error(value: float) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from wholebody.bench.compare.advice import advice, choices, effort, error, reference, slowness, standings
+from wholebody.bench.compare.advice import advice, choices, effort, error, reference, slowness, standings, targets
 from wholebody.bench.compare.charts import draw_all, groups
 from wholebody.bench.compare.front import MOST, OURS, Rival, fronts
 from wholebody.bench.compare.lock import NAME as LOCK
@@ -105,7 +105,7 @@ def as_markdown(given: Material, whole: bool, charts: str) -> str:
     return render(
         "compare.md",
         given=given, whole=whole, charts=charts, advice=advice(results, given.rows),
-        picked=choices(results, given.rows),
+        picked=choices(results, given.rows), targets=targets(given.rows, wall, dependable),
         plain=_plain,
         ranked=standings(results, given.rows), reference=reference(results), error=error, effort=effort,
         slowness=slowness, rival=_rival, chart=_chart,

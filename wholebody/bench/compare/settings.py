@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 from wholebody.bench.adapters.base import FIRST_FIT, Adapter, Budget
@@ -34,7 +35,7 @@ class Settings:
     adapters: tuple[Adapter, ...]
     cases: int = 200
     sweep: int = 40
-    levels: int = 99
+    levels: int = 6
     seed: int = 0
     cap: float = 20.0
     minutes: float = 25.0
@@ -48,6 +49,9 @@ class Settings:
         for name, least in (("cases", 1), ("sweep", 0), ("levels", 1), ("seed", 0)):
             if getattr(self, name) < least:
                 raise InputError(f"{name} is {getattr(self, name)}; give {least} or more")
+        for name in ("cap", "minutes"):
+            if not (0.0 < getattr(self, name) < inf):
+                raise InputError(f"{name} is {getattr(self, name)}; give a number above 0")
         if not self.sets or not self.adapters:
             raise InputError("a comparison needs a problem set and a method; name at least one of each")
 

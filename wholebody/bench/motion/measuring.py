@@ -29,6 +29,7 @@ SLOWEST = 60.0  # s for a second of motion, after which a method is ended
 MIDDLE = 7  # frames, around a collision, with which everything is compiled or read back first
 
 LIMIT = 1e-6  # rad, m: by which a limit may be missed
+HELD = 1e-3  # m, rad: by which what is held may be missed
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,8 @@ class MotionRow:
         clip, equipment, method: what was asked.
         frames: of the clip.
         duration: of the clip, seconds.
-        outcome: "free", "left" where something overlaps still, or why there is no clip.
+        outcome: "free"; "left" where something overlaps still, or a limit or what is held is missed; or why there is no
+            clip.
         seconds: CPU time of the method, or of the check.
         check_ms: CPU time of a check of the answer, for each frame.
         before, after: frames in collision.
@@ -174,7 +176,7 @@ def _freed(row: MotionRow, clip: Clip, found: ClipCheck, scene: Any) -> MotionRo
     began = time.process_time()
     found = check(freed.clip, scene)
     row = replace(row, check_ms=1e3 * (time.process_time() - began) / len(clip))
-    return _judged(row, clip, freed.clip, found)
+    return _judged(row, clip, freed.clip, found, report.missed)
 
 
 def _colliding(clip: Clip, found: ClipCheck) -> Clip:
@@ -183,14 +185,15 @@ def _colliding(clip: Clip, found: ClipCheck) -> Clip:
     return clip[first : first + MIDDLE]
 
 
-def _judged(row: MotionRow, before: Clip, after: Clip, found: ClipCheck) -> MotionRow:
+def _judged(row: MotionRow, before: Clip, after: Clip, found: ClipCheck, missed: float = 0.0) -> MotionRow:
     from wholebody.motion import measures
 
     apart, hands = measures.deviation(before, after), WEAPON.get(row.clip)
     excess = max((abs(each.value - each.limit) for each in found.limits), default=0.0)
+    held = excess <= LIMIT and missed <= HELD
     return replace(
         row,
-        outcome="free" if found.free and (excess <= LIMIT or row.method == CHECKED) else "left",
+        outcome="free" if found.free and (held or row.method == CHECKED) else "left",
         after=found.colliding,
         dips=found.dips,
         deepest_mm=1e3 * found.deepest,

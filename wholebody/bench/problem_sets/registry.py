@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from wholebody.bench.problem_sets import balance, closed_loop, drag, passage, reaching, robot_arm, robots, self_contact
+from wholebody.bench.problem_sets import (
+    balance,
+    closed_loop,
+    drag,
+    held_out,
+    passage,
+    reaching,
+    robot_arm,
+    robots,
+    self_contact,
+)
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.errors import UnknownNameError
 
@@ -16,8 +26,21 @@ _ALL = (
 SETS: Mapping[str, ProblemSet] = MappingProxyType({each.name: each for each in _ALL})
 """By name, as they are listed in reports."""
 
-NAMED: Mapping[str, ProblemSet] = MappingProxyType({robots.SET.name: robots.SET})
-"""Sets that take part where they are named: they need files that are not a part of this package."""
+NAMED: Mapping[str, ProblemSet] = MappingProxyType(
+    {each.name: each for each in (held_out.UNIFORM, held_out.PEOPLE_SET, held_out.CLUTTER, robots.SET)}
+)
+"""Sets that take part where they are named: distributions that nothing was tuned on, of which the robots need files
+that are not a part of this package."""
+
+TUNED_ON: Mapping[str, str] = MappingProxyType(
+    {
+        held_out.UNIFORM.name: reaching.SEVERAL.name,
+        held_out.PEOPLE_SET.name: reaching.CLUTTER.name,
+        held_out.CLUTTER.name: reaching.CLUTTER.name,
+        robots.SET.name: robot_arm.SET.name,
+    }
+)
+"""Sets of `NAMED` -> the set of the same question that constants were tuned on."""
 
 CASES = 200
 """Problems of a set, if nothing else is asked for."""

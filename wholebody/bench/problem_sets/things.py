@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import coal
@@ -78,16 +78,18 @@ def add_things(
     room: float,
     rng: np.random.Generator,
     space: tuple[Sequence[float], Sequence[float]] = SPACE,
+    make: Callable[[int, np.random.Generator], tuple[str, wb.Shape]] | None = None,
 ) -> None:
     """Put random things into a box of space, in any orientation, clear of what is taken up; they may cross each other.
+
+    `make` gives the kind and the shape of a thing by its number; `household_thing` where it is left out.
 
     Raises:
         InputError: no place was found for one of them.
     """
     for number in range(count):
-        kind = KINDS[number % len(KINDS)]
         for _ in range(TRIES):
-            shape = random_shape(kind, rng)
+            kind, shape = (make or household_thing)(number, rng)
             turn = rng.normal(size=4)
             at = (*rng.uniform(*space), *(turn / np.linalg.norm(turn)))
             if taken.clear_of(shape, at, room):
@@ -95,6 +97,12 @@ def add_things(
         else:
             raise InputError(f"no place is left for thing {number} of {count}; ask for fewer of them or less room")
         scene.add(shape, name=f"{kind} {number}", at=at)
+
+
+def household_thing(number: int, rng: np.random.Generator) -> tuple[str, wb.Shape]:
+    """The kinds of `KINDS` in turn."""
+    kind = KINDS[number % len(KINDS)]
+    return kind, random_shape(kind, rng)
 
 
 def random_shape(kind: str, rng: np.random.Generator) -> wb.Shape:

@@ -44,14 +44,14 @@ def add_to(commands: Commands) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Ask, judge, and write it down; 0 whatever the verdicts are."""
-    from wholebody.bench.adapters import adapters
+    from wholebody.bench.adapters import ALL, adapters
     from wholebody.bench.machine import machine
     from wholebody.bench.stability import catalogue, page
     from wholebody.bench.tables import write_rows, write_text
 
     check_count(arguments.jobs, "--jobs")
     _check_page(arguments)
-    asked = adapters(arguments.methods)
+    asked = adapters(arguments.methods or [ALL])
     chosen = catalogue.cases(arguments.cases or (catalogue.QUICK if arguments.quick else None))
     facts = machine()
     result = _asked(chosen, asked, arguments.jobs)

@@ -7,6 +7,8 @@ import argparse
 from wholebody.cli.arguments import Commands
 from wholebody.cli.bench.publishing import add_common, check_count, publish
 
+PAIRS_OF_RUNS = 15  # with a person's defaults and without: their ratio then has an interval of some 3 %
+
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
@@ -29,6 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.adapters import chosen_tools, differences
     from wholebody.bench.figure_track import figure_tracks
     from wholebody.bench.machine import machine
+    from wholebody.bench.person_cost import person_costs
     from wholebody.bench.step import (
         goal_lines,
         least_distances,
@@ -40,6 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     from wholebody.bench.tables import write_rows
     from wholebody.bench.track import VARIANTS, track
+    from wholebody.cli.demo import packaged_tasks
 
     tools = chosen_tools(arguments.tools)
     repeats, steps = (1, 40) if arguments.quick else (arguments.repeats, arguments.steps)
@@ -60,7 +64,12 @@ def run(arguments: argparse.Namespace) -> int:
         if "wholebody" in taken:
             shares[course.name] = linearise_us(course)
     stated = {name: differences(name) for name in tools}
-    report = step_report(rows, facts, stated, shares, refusals if figures else None)
+    costs = []
+    if not figures:
+        humans = [track(name, steps) for name in VARIANTS]
+        costs = person_costs(humans, packaged_tasks()["shelf"], PAIRS_OF_RUNS if repeats > 1 else 2)
+        write_rows(arguments.out / "step-person.csv", facts, costs)
+    report = step_report(rows, facts, stated, shares, refusals if figures else None, costs)
     name = "step-figures" if figures else "step"
     write_rows(arguments.out / f"{name}.csv", facts, rows)
     write_rows(arguments.out / f"{name}-times.csv", facts, times)

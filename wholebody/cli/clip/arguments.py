@@ -6,9 +6,9 @@ import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import Commands
+from wholebody.cli.arguments import Commands, add_person, person_options
 
 if TYPE_CHECKING:
     from wholebody.figures import Figure
@@ -32,11 +32,7 @@ def add_command(
     figure.add_argument(
         "--figure", default="human", metavar="FIGURE", help="human (default), avatar, hand, or the path of a URDF"
     )
-    figure.add_argument("--sex", choices=("male", "female"), help="sex of a person (default: male)")
-    figure.add_argument("--stature", type=float, metavar="M", help="height of a person, m (default: median)")
-    figure.add_argument("--mass", type=float, metavar="KG", help="mass of a person, kg (default: from the stature)")
-    figure.add_argument("--percentile", type=float, metavar="P", help="of stature and mass if not given, 1 to 99")
-    figure.add_argument("--detail", choices=("spheres", "capsules", "hulls"), help="geometry (default: capsules)")
+    add_person(figure)
     return parser
 
 
@@ -98,10 +94,7 @@ def figure_of(arguments: argparse.Namespace) -> Figure:
     """
     from wholebody.figures import load
 
-    given: dict[str, Any] = {
-        name: getattr(arguments, name) for name in ("sex", "stature", "mass", "percentile", "detail")
-    }
-    return load(arguments.figure, **{name: value for name, value in given.items() if value is not None})
+    return load(arguments.figure, **person_options(arguments))
 
 
 def clip_of(arguments: argparse.Namespace) -> Clip:

@@ -18,7 +18,7 @@ from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP, LocalSolution
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.starts import Minima, restarts, throughout
+from wholebody.methods.starts import Minima, named_postures, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import TraceEntry
@@ -194,6 +194,7 @@ class Search:
             return
         if not _held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
+            self._leave_from_named_postures()
         if self._out_of_reach:
             self._come_near()
         elif self.best.violation.worst > tolerance:
@@ -206,6 +207,16 @@ class Search:
             if _held(local, tolerance) and local.violation.left <= best.violation.left + tolerance:
                 self._best = local
 
+    def _leave_from_named_postures(self) -> None:
+        """Where nothing leads out of what the best posture is inside of, begin at the figure's other postures."""
+        if _held(self.best, self.settings.tolerance) or self.contradictions:
+            return
+        for q in named_postures(self.problem, self.lineariser.state, self.problem.start):
+            if not self.control.over:
+                local = self._feasibility(self.lineariser, self._at_most(PROBE_PROGRAMS), "probe").once(q)
+                self.spent += local.iterations
+                self._accept(local, "from another posture")
+
     def _proven(self) -> bool:
         """Whether the best posture is known to be as near to the goals as any."""
         left = self.best.violation.left
@@ -215,7 +226,7 @@ class Search:
         """Whether the goals are out of reach: from a posture (nq,) and other starts, even through everything.
 
         Where several descents without contacts, from postures all over the limits, come to rest at the same distance
-        and none comes nearer, it is the nearest that limits and constraints allow. LocalSolution minima differ.
+        and none comes nearer, it is the nearest that limits and constraints allow. Local minima differ.
         """
         if self._out_of_reach is not None or not (self.problem.goals and self.problem.scene.model.nv):
             return bool(self._out_of_reach)

@@ -113,9 +113,12 @@ class Subproblem:
         lower, upper, weight = [], [], []
         state.update(problem.start)
         for constraint in problem.constraints:
-            size = np.atleast_1d(constraint.value(state)).shape
-            lower.append(np.broadcast_to(constraint.lower, size))
-            upper.append(np.broadcast_to(constraint.upper, size))
+            low, high = np.atleast_1d(constraint.lower), np.atleast_1d(constraint.upper)
+            size = max(len(low), len(high))
+            if size == 1:  # one bound may be that of many rows
+                size = np.size(constraint.value(state))
+            lower.append(np.broadcast_to(low, size))
+            upper.append(np.broadcast_to(high, size))
         for goal in problem.goals:
             weight.append(np.full(np.atleast_1d(goal.error(state)).shape, goal.weight))
         self._lower = np.concatenate(lower) if lower else np.zeros(0)

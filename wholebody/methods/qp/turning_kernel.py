@@ -81,7 +81,7 @@ def bent(
             for i in range(len(step)):
                 ahead += elastic[r, i] * step[i]
             room[c] = min(room[c], ahead)
-    worst = 0.0
+    worst, vectors = 0.0, np.empty((5, 3))
     for c in range(len(distance)):
         nearer, way = np.inf, np.inf
         round_piece = point[pair[c, 0]] or point[pair[c, 1]]
@@ -91,7 +91,7 @@ def bent(
             if round_piece and not point[p]:
                 continue
             gone, bend = _seen_from(
-                placement[p, 3], reach[p], twist[joint[p]], change[joint[p]], twist[carrier], change[carrier]
+                placement[p, 3], reach[p], twist[joint[p]], change[joint[p]], twist[carrier], change[carrier], vectors
             )
             if bend < nearer:
                 nearer, way = bend, gone
@@ -107,14 +107,14 @@ def bent(
 
 @compiled()
 def _seen_from(
-    place: Array, reach: float, own: Array, own_change: Array, carrier: Array, carrier_change: Array
+    place: Array, reach: float, own: Array, own_change: Array, carrier: Array, carrier_change: Array, vectors: Array
 ) -> tuple[float, float]:
     """Longest way of the points of a piece as seen from another body, and by how much it can bow.
 
     `place` (3,) is the piece's and `reach` its points' distance from there; twists (6,) at the world's origin and their
-    changes are those of the piece's body and of the body from which it is seen.
+    changes are those of the piece's body and of the body from which it is seen. `vectors` (5, 3) is room.
     """
-    speed, bow, spin = np.empty(3), np.empty(3), np.empty(3)
+    speed, bow, spin, own_speed, carrier_speed = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
     turn_square, speed_square, bow_square, spin_square = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -125,7 +125,6 @@ def _seen_from(
         spin[i] = (
             own_change[3 + i] - carrier_change[3 + i] - carrier[3 + j] * own[3 + k] + carrier[3 + k] * own[3 + j]
         )  # fmt: skip
-    own_speed, carrier_speed = np.empty(3), np.empty(3)
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         own_speed[i] = own[i] + own[3 + j] * place[k] - own[3 + k] * place[j]

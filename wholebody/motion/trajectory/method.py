@@ -21,8 +21,8 @@ from wholebody.motion.strength import Strength
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP, banded_solver, warn_of_osqp
 from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
-from wholebody.motion.trajectory.window_run import ClipRun
-from wholebody.motion.windows import windows
+from wholebody.motion.trajectory.window_run import ClipRun, Freed
+from wholebody.motion.windows import Window, windows
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
 
@@ -117,18 +117,51 @@ class Trajectory:
         wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
         found = windows(wrong, max(3, round(self.margin / terms.dt)))
         warn_of_osqp(self.solver, sum(map(len, found)) * terms.scene.model.nv)
-        total, done, missed = max(1, sum(map(len, found))), 0, []
-        for window in found:
+        total, done = max(1, sum(map(len, found))), 0
+        missed: dict[Window, str] = {}
+        while found:
+            window = found.pop(0)
             begun, note = done, f"frames {window.first} to {window.end - 1}"
             cancelled = self._teller(watch, begun / total, len(window) / total, note)
             freed = run.window(window, depths, gaps, cancelled)
             q[window.first : window.end] = freed.q
+            if freed.missed and not watch.ended:
+                window, freed = self._kept_back(run, window, freed, q, depths, gaps, cancelled)
+                q[window.first : window.end] = freed.q
+                found = [other for other in found if not window.first <= other.first < window.end]
+                missed = {other: said for other, said in missed.items() if not window.first <= other.first < window.end}
             if watch.ended:
                 break
             if freed.missed:
-                missed.append(f"{note}: {freed.missed}")
+                missed[window] = f"frames {window.first} to {window.end - 1}: {freed.missed}"
             done += len(window)
-        return q, missed
+        return q, list(missed.values())
+
+    def _kept_back(
+        self, run: ClipRun, window: Window, freed: Freed, q: Array, depths: Array, gaps: list[int],
+        cancelled: Callable[[float], bool],
+    ) -> tuple[Window, Freed]:  # fmt: skip
+        """A window that was not freed once more, on one side of what it passes for good.
+
+        A limb that passes through a thin thing and comes back much later, or never, has to stay where it is until then.
+        So the window is made as long as that, whatever windows lie in it.
+
+        Args:
+            run: of the clip.
+            window: that was not freed.
+            freed: what was found for it.
+            q: (n, nq) postures of the clip, with these.
+            depths, gaps: as for `ClipRun.window`.
+            cancelled: told the share done.
+        """
+        margin = max(3, round(self.margin / run.dt))
+        for kept, changed in run.kept_back(window, q):
+            changed[window.first : window.end] = True
+            wider = next(one for one in windows(changed, margin) if one.first <= window.first < one.end)
+            again = run.window(wider, depths, gaps, cancelled, kept[wider.first : wider.end])
+            if not again.missed:
+                return wider, again
+        return window, freed
 
     def _timing(
         self, q: Array, terms: FrameTerms, state: State, solve: Callable[[BandedQP], Answer], loads: ClipLoads | None

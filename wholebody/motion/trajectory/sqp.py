@@ -101,8 +101,8 @@ class WindowProgram:
         """More places to look at."""
         self.nodes = sorted({*self.nodes, *nodes})
 
-    def run(self, x: Array, cancel: Cancel, radius: float = RADIUS) -> Found:
-        """Iterate from deviations x (n, nv), with a first trust region of this radius."""
+    def run(self, x: Array, cancel: Cancel, radius: float = RADIUS, largest: float = LARGEST) -> Found:
+        """Iterate from deviations x (n, nv), with a first trust region of a radius, and a largest one."""
         here = self._at(x)
         penalty = PENALTY
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
@@ -132,7 +132,7 @@ class WindowProgram:
                 multipliers = [self._shifted(old, one) for old, one in zip(multipliers, there.rows, strict=True)]
                 if there.worst > MET and there.total > HALVED * here.total and longest < 0.9 * radius:
                     penalty = min(RAISE * penalty, HIGHEST)
-                radius = min(2.0 * radius, LARGEST) if longest > 0.9 * radius else radius
+                radius = min(2.0 * radius, largest) if longest > 0.9 * radius else radius
                 here = there
                 counts = counts | more | self._counts(here)
                 if here.worst <= MET and small and not (more & ~counts).any():

@@ -7,8 +7,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.motion.dips import dips, sampled_dips
+from wholebody.arrays import Array, Mask
+from wholebody.motion.dips import dipping, dips, sampled_dips
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.chart import Chart
@@ -16,7 +16,7 @@ from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import Looking, Node
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
-from wholebody.motion.trajectory.sqp import MET, RADIUS, WindowProgram
+from wholebody.motion.trajectory.sqp import LARGEST, MET, RADIUS, WindowProgram
 from wholebody.motion.trajectory.starts import Carried
 from wholebody.motion.windows import Window
 from wholebody.workspace import Workspace
@@ -108,7 +108,33 @@ class ClipRun:
         """How many postures were solved for on their own."""
         return self._carried.posture_solves
 
-    def window(self, window: Window, depths: Array, gaps: Iterable[int], cancel: Callable[[float], bool]) -> Freed:
+    @property
+    def dt(self) -> float:
+        """Seconds from frame to frame."""
+        return self._terms.dt
+
+    def kept_back(self, window: Window, q: Array) -> Iterable[tuple[Array, Mask]]:
+        """Postures of the clip that stay on one side of what motions of a window pass, for as long as it takes.
+
+        Args:
+            window: which frames.
+            q: (n, nq) postures of the clip.
+
+        Returns:
+            (n, nq) postures, and which of them (n,) are kept back: of the reference, and of q; none where that is not
+            found.
+        """
+        for begun in (self._reference, q):
+            gaps = dipping(self._workspace, begun, range(window.first, window.end - 1))
+            kept = self._carried.beside(Window(0, len(q)), begun, gaps, self._workspace)
+            changed: Mask = (kept != begun).any(axis=1)
+            if changed.any():
+                yield kept, changed
+
+    def window(
+        self, window: Window, depths: Array, gaps: Iterable[int], cancel: Callable[[float], bool],
+        begun: Array | None = None,
+    ) -> Freed:  # fmt: skip
         """Free one window.
 
         Args:
@@ -116,6 +142,7 @@ class ClipRun:
             depths: (frames of the clip,) how deep each original posture is.
             gaps: frames of the clip whose original motion to the next one dips.
             cancel: told the share done; true ends the attempt, and the window stays as it was.
+            begun: (frames of the window, nq) postures to begin with; None for the original ones, and others after them.
         """
         terms = self._terms
         chart = Chart(self._workspace.model, np.array(self._reference[window.first : window.end]))
@@ -127,8 +154,12 @@ class ClipRun:
         looking = Looking(self._workspace, chart, held, self._settings.clearance, loads)
         always = {gap - window.first for gap in gaps}
         best: _Attempt | None = None
-        for start in self._starts(window, chart, limits, depths, always):
-            attempt = self._attempt(start, chart, looking, objective, limits, always, cancel)
+        if begun is None:
+            starts = self._starts(window, chart, limits, depths, always)
+        else:
+            starts = [_deviations(chart, begun, limits)]
+        for start in starts:
+            attempt = self._attempt(start, chart, looking, objective, limits, always, cancel, begun is not None)
             if attempt is None:
                 return Freed(chart.original, "")
             best = attempt if best is None or attempt.rank < best.rank else best
@@ -155,23 +186,21 @@ class ClipRun:
             return  # nothing can move
         if always:
             q = self._carried.beside(window, chart.original, always, self._workspace)
-            x = np.array([chart.deviation(frame, posture) for frame, posture in enumerate(q)])
+            x = _deviations(chart, q, limits)
             if x.any():
-                yield np.clip(x, limits.lower, limits.upper)
+                yield x
         deepest = window.first + int(np.argmax(depths[window.first : window.end]))
         for middle in dict.fromkeys((deepest, window.first, window.end - 1)):
-            q = self._carried.outwards(window, middle)
-            x = np.array([chart.deviation(frame, posture) for frame, posture in enumerate(q)])
-            yield np.clip(x, limits.lower, limits.upper)
+            yield _deviations(chart, self._carried.outwards(window, middle), limits)
 
     def _attempt(
         self, x: Array, chart: Chart, looking: Looking, objective: Objective, limits: Limits, always: set[int],
-        cancel: Callable[[float], bool],
+        cancel: Callable[[float], bool], careful: bool,
     ) -> _Attempt | None:  # fmt: skip
         program = WindowProgram(looking, objective, limits, self._solve, self._settings.iterations)
-        found, radius = None, RADIUS
+        found, radius, largest = None, NEARLY if careful else RADIUS, NEARLY if careful else LARGEST
         for _ in range(ROUNDS):
-            found = program.run(x, lambda count, worst: cancel(count / self._settings.iterations), radius)
+            found = program.run(x, lambda count, worst: cancel(count / self._settings.iterations), radius, largest)
             radius = NEARLY
             self._programs += found.programs
             if found.cancelled:
@@ -180,17 +209,17 @@ class ClipRun:
             q = chart.postures(x)
             gaps = [gap for gap in range(len(x) - 1) if gap in always or x[gap : gap + 2].any()]
             swept = dips(self._workspace, q, gaps)
-            dipping = [(gap, share + side) for gap, share in swept.items() for side in SIDES]
-            if dipping and found.met:
-                dipping += sampled_dips(self._workspace, q, gaps)
-            if not dipping or not found.met:
-                return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), found.objective)
+            near = [(gap, share + side) for gap, share in swept.items() for side in SIDES]
+            if near and found.met:
+                near += sampled_dips(self._workspace, q, gaps)
+            if not near or not found.met:
+                return _Attempt(x, found.worst, len({gap for gap, _ in near}), found.objective)
             before = len(program.nodes)
-            program.add([Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in dipping])
+            program.add([Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in near])
             if len(program.nodes) == before:
                 break
         assert found is not None
-        return _Attempt(x, found.worst, len({gap for gap, _ in dipping}), found.objective)
+        return _Attempt(x, found.worst, len({gap for gap, _ in near}), found.objective)
 
     def _limits(self, window: Window, chart: Chart, seams: tuple[bool, bool]) -> Limits:
         """Bounds on deviations and on their changes; at a seam nothing moves."""
@@ -211,3 +240,10 @@ class ClipRun:
                 lower[frame], upper[frame] = 0.0, 0.0
         # where the original is faster than a limit, it may stay as fast
         return Limits(lower, upper, np.minimum(slowest, steps) - steps, np.maximum(fastest, steps) - steps)
+
+
+def _deviations(chart: Chart, q: Array, limits: Limits) -> Array:
+    """(n, nv) deviations of postures (n, nq), within limits."""
+    x = np.array([chart.deviation(frame, posture) for frame, posture in enumerate(q)])
+    found: Array = np.clip(x, limits.lower, limits.upper)
+    return found

@@ -99,9 +99,9 @@ class ChainResolver:
         inside = [guard.keep() for guard in self._guards]
         return all(inside)
 
-    def find(self, overlaps: Sequence[Overlap]) -> Link | None:
-        """The overlapping link nearest to the root; see `LinkFinder.find`."""
-        return self._finder.find(overlaps)
+    def find(self, overlaps: Sequence[Overlap], deepest_first: bool = False) -> Link | None:
+        """The overlapping link to be moved; see `LinkFinder.find`."""
+        return self._finder.find(overlaps, deepest_first)
 
     def push(self, link: Link, margin: float = MARGIN) -> tuple[int, ...]:
         """Move the link out of the obstacle by `margin` metres; returns the nodes that moved. Call `read` first."""

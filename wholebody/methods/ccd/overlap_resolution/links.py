@@ -76,8 +76,13 @@ class LinkFinder:
         self._paths = [frozenset(path) for path in limbs.paths]
         self._masks: dict[tuple[tuple[int, ...], str], tuple[list[int], NDArray[np.bool_]]] = {}
 
-    def find(self, overlaps: Sequence[Overlap]) -> Link | None:
-        """The overlapping link nearest to the root; None if the chain's joints can change no overlap."""
+    def find(self, overlaps: Sequence[Overlap], deepest_first: bool = False) -> Link | None:
+        """The overlapping link nearest to the root, or the one deepest inside; None if no joint can change an overlap.
+
+        Args:
+            overlaps: of the figure, at the placements of the last query.
+            deepest_first: whether the depth decides.
+        """
         links: dict[int, list[tuple[Overlap, bool, tuple[int, ...]]]] = {}
         for overlap in overlaps:
             found = self._side(overlap)
@@ -85,7 +90,7 @@ class LinkFinder:
                 links.setdefault(found[0], []).append((overlap, found[1], found[2]))
         if not links:
             return None
-        node = min(links)
+        node = max(links, key=lambda k: max(item[0].depth for item in links[k])) if deepest_first else min(links)
         deepest = max(links[node], key=lambda item: item[0].depth)
         same = [(overlap, is_a) for overlap, is_a, nodes in links[node] if nodes == deepest[2]]
         points = [overlap.point_a if is_a else overlap.point_b for overlap, is_a in same]

@@ -147,6 +147,7 @@ class OverlapResolver:
         q = q.copy()
         overlaps = self.query(q)
         names = list(self.chains)
+        deepest_first = False
         for _ in range(PASSES):
             if not overlaps:
                 break
@@ -154,16 +155,18 @@ class OverlapResolver:
             for k in rng.permutation(len(names)).tolist():
                 if self.counts.work > most_work or self.control.over:
                     break
-                overlaps = self._leave(self.chains[names[k]], q, overlaps)
+                overlaps = self._leave(self.chains[names[k]], q, overlaps, deepest_first)
             if overlaps and self.deepest > GAIN * before:
-                break
+                if deepest_first or not self.exact:
+                    break
+                deepest_first = True  # a forearm that cannot leave keeps the hand from its turn
         return q, overlaps
 
-    def _leave(self, chain: ChainResolver, q: Array, overlaps: list[Overlap]) -> list[Overlap]:
+    def _leave(self, chain: ChainResolver, q: Array, overlaps: list[Overlap], deepest_first: bool) -> list[Overlap]:
         """Move one chain out of its overlaps, with a new goal every time; q is changed in place."""
         worst, node = np.inf, -1
         for _ in range(GOALS):
-            link = chain.find(overlaps)
+            link = chain.find(overlaps, deepest_first)
             if link is None or (link.node == node and link.depth > SLOW * worst):
                 break
             worst, node = link.depth, link.node

@@ -1,0 +1,169 @@
+"""People of their own proportions and of an age."""
+
+import math
+
+import numpy as np
+import pytest
+
+from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures import load
+from wholebody.figures.anthropometry import body, table
+from wholebody.figures.measuring import measure
+from wholebody.figures.proportions import dimension_names, residual_covariance
+
+
+def placements(figure):
+    return [np.asarray(placement.homogeneous) for placement in figure.model.jointPlacements]
+
+
+@pytest.mark.parametrize(
+    ("size", "proportions"),
+    [
+        ({}, {"sitting_height": 0.93}),
+        ({"sex": "female", "stature": 1.55}, {"sitting_height": 0.87, "hip_breadth_sitting": 0.37}),
+        ({"percentile": 95}, {"span": 1.90, "knee_height_sitting": 0.60}),
+        ({"stature": 1.80}, {"thumb_tip_reach": 0.88, "bideltoid_breadth": 0.54, "thigh_clearance": 0.20}),
+        ({"sex": "female"}, {"eye_below_vertex": 0.12}),
+    ],
+)
+def test_stated_dimensions_are_measured_on_the_figure(size, proportions):
+    usual, found = measure(load("human", **size)), measure(load("human", proportions=proportions, **size))
+    for name, value in proportions.items():
+        assert found[name] == pytest.approx(value, abs=0.001), name
+        assert abs(usual[name] - value) > 0.003, name
+
+
+def test_hands_and_feet_have_the_stated_sizes():
+    figure = load("human", proportions={"hand_length": 0.205, "foot_length": 0.285})
+    place = {name: figure.model.frames[figure.model.getFrameId(name)].placement.translation for name in figure.frames}
+    assert place["left_middle_tip"][2] == pytest.approx(-0.991 * 0.205, abs=1e-9)
+    data = figure.model.createData()
+    import pinocchio as pin
+
+    pin.framesForwardKinematics(figure.model, data, pin.neutral(figure.model))
+    ends = [data.oMf[figure.model.getFrameId(f"left_{name}")].translation[0] for name in ("toe_tip", "heel")]
+    assert ends[0] - ends[1] == pytest.approx(0.285, abs=0.012)  # the toe tip's frame lies within the toes
+
+
+def test_the_others_follow_as_they_go_together_in_people():
+    # A long trunk at the same stature means short legs and arms: all correlations of residuals are negative there.
+    usual, found = measure(load("human")), measure(load("human", proportions={"sitting_height": 0.96}))
+    assert found["eye_height_sitting"] - usual["eye_height_sitting"] == pytest.approx(0.037, abs=0.008)
+    for name in ("buttock_knee_length", "popliteal_height", "knee_height_sitting", "span"):
+        assert found[name] < usual[name] - 0.005, name
+
+
+def test_the_conditional_mean_is_the_regression_of_the_covariance():
+    from wholebody.figures.proportions import likely_change
+
+    names, covariance = dimension_names(), residual_covariance("M")
+    rng = np.random.default_rng(7)
+    people = rng.multivariate_normal(np.zeros(len(names)), covariance, size=200_000, method="svd")
+    which = [names.index("span"), names.index("sitting_height")]
+    slopes = np.linalg.lstsq(people[:, which], people, rcond=None)[0]
+    change = np.array([0.04, -0.02])
+    assert likely_change(body(), which, change) == pytest.approx(change @ slopes, abs=5e-4)
+
+
+def test_given_stature_and_mass_the_spreads_are_those_of_all_men():
+    # Of 4082 men: 22, 31 and 48 mm; the correlations are those of 60 of them, with a standard error of 10 %.
+    spread = dict(zip(dimension_names(), np.sqrt(np.diag(residual_covariance("M"))), strict=True))
+    for name, wanted in (("sitting_height", 0.022), ("thumb_tip_reach", 0.031), ("span", 0.048)):
+        assert spread[name] == pytest.approx(wanted, rel=0.25), name
+
+
+def test_correlations_are_a_correlation_matrix():
+    rows = table("correlations")
+    matrix = np.array([[float(row[other["name"]]) for other in rows] for row in rows])
+    assert np.array_equal(matrix, matrix.T)
+    assert np.all(np.diag(matrix) == 1.0)
+    assert np.linalg.eigvalsh(matrix).min() > 0.0
+
+
+@pytest.mark.parametrize("options", [{}, {"proportions": {}}, {"proportions": None}, {"age": 30}])
+def test_without_proportions_the_body_is_the_same(options):
+    old, new = load("human", sex="female"), load("human", sex="female", **options)
+    assert np.array_equal(placements(old), placements(new))
+    assert np.array_equal(old.model.lowerPositionLimit, new.model.lowerPositionLimit)
+    assert np.array_equal(old.model.upperPositionLimit, new.model.upperPositionLimit)
+    assert old.describe().person.deviations == new.describe().person.deviations == ()
+
+
+def test_a_usual_dimension_changes_nothing():
+    usual = measure(load("human"))
+    found = measure(load("human", proportions={"sitting_height": usual["sitting_height"]}))
+    assert found == pytest.approx(usual, abs=2e-4)
+
+
+def test_the_avatar_has_the_proportions_of_its_person():
+    avatar = load("avatar", proportions={"sitting_height": 0.96})
+    assert avatar.describe().person == load("human", proportions={"sitting_height": 0.96}).describe().person
+
+
+@pytest.mark.parametrize(
+    ("proportions", "error", "words"),
+    [
+        ({"sitting_height": 1.2}, InputError, r"12\.\d standard deviations from that of men of 1.755 m"),
+        ({"sitting_height": 93}, InputError, "sitting_height is 93; give a number between 0 and 3 m"),
+        ({"sitting_height": math.nan}, InputError, "sitting_height is nan"),
+        ({"sitting_height": 0.97, "eye_height_sitting": 0.79}, InputError, "do not go together"),
+        ({"siting_height": 0.93}, UnknownNameError, "sitting_height"),
+        (0.93, InputError, "give metres by dimension"),
+    ],
+)
+def test_impossible_proportions_are_one_sentence(proportions, error, words):
+    with pytest.raises(error, match=words) as caught:
+        load("human", proportions=proportions)
+    assert "\n" not in str(caught.value)
+
+
+# ---- age
+
+SOUCIE = {  # degrees: men and women, 20 to 44 and 45 to 69
+    ("shoulder_flexion", "upper"): (168.8, 164.0, 172.0, 168.1),
+    ("elbow_flexion", "upper"): (144.6, 143.5, 150.0, 148.3),
+    ("knee_flexion", "upper"): (137.7, 132.9, 141.9, 137.8),
+    ("ankle_dorsiflexion", "upper"): (12.7, 11.9, 13.8, 11.6),
+    ("elbow_pronation", "lower"): (85.0, 82.4, 90.6, 87.2),
+}
+
+
+@pytest.mark.parametrize("sex", ["male", "female"])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_older_people_have_the_published_share_of_the_ranges(sex, side):
+    young, old = load("human", sex=sex), load("human", sex=sex, age=65)
+    for (joint, end), means in SOUCIE.items():
+        share = means[1] / means[0] if sex == "male" else means[3] / means[2]
+        limits = [getattr(figure.model, f"{end}PositionLimit") for figure in (young, old)]
+        at = young.model.joints[young.model.getJointId(f"{side}_{joint}")].idx_q
+        assert limits[1][at] / limits[0][at] == pytest.approx(share, rel=1e-9), joint
+    at = young.model.joints[young.model.getJointId(f"{side}_hip_flexion")].idx_q
+    assert math.degrees(old.model.lowerPositionLimit[at]) == pytest.approx(-13.5 if sex == "male" else -16.7)
+
+
+def test_other_ranges_and_sizes_do_not_depend_on_age():
+    young, old = load("human"), load("human", age=69)
+    changed = {
+        name.split("_", 1)[1]
+        for name, joint in zip(young.model.names, young.model.joints, strict=True)
+        if joint.nq == 1
+        and (
+            young.model.lowerPositionLimit[joint.idx_q] != old.model.lowerPositionLimit[joint.idx_q]
+            or young.model.upperPositionLimit[joint.idx_q] != old.model.upperPositionLimit[joint.idx_q]
+        )
+    }
+    assert changed == {row["joint"] for row in table("age_ranges")}
+    assert np.array_equal(placements(young), placements(old))
+
+
+@pytest.mark.parametrize("age", [19, 70, math.nan, "old"])
+def test_ages_without_published_ranges_are_refused(age):
+    with pytest.raises(InputError, match="age is"):
+        load("human", age=age)
+
+
+def test_a_posture_of_older_people_is_within_their_limits():
+    figure = load("human", age=60)
+    for name in figure.postures:
+        q = figure.posture(name)
+        assert np.array_equal(figure.clamp(q), q), name

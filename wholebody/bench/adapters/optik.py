@@ -1,0 +1,176 @@
+"""optik: random restarts of a bounded quasi-Newton method (SLSQP) on the error of one frame at the end of a chain."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, ClassVar
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.arrays import Array
+from wholebody.bench.adapters.base import Adapter
+from wholebody.errors import InputError
+from wholebody.files import Scratch
+from wholebody.methods.base import SolvingTracker, UnsupportedTermError, named_terms, refusal
+from wholebody.methods.conclusion import Ending, concluded
+from wholebody.methods.control import Control, Progress
+from wholebody.methods.differential import TOOL
+from wholebody.problem import Problem
+from wholebody.solution import Solution, TraceEntry
+
+SHARE = 0.5  # of the tolerance, whose square is optik's bound of the squared error
+LONGEST = 1.0  # s: of its restarts
+
+
+def optik_adapter() -> Adapter:
+    """The entrant: `Robot.ik` of optik."""
+    return Adapter(
+        name="optik",
+        make=Optik,
+        prepare=Optik.prepare,
+        loose=tuple((tolerance, None) for tolerance in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),
+        setup="optik's Robot.ik in the mode 'speed', on one thread, with its own random restarts for at most "
+        f"{LONGEST:g} s, and a squared error of the square of {SHARE:g} of the tolerance. Writing and reading its "
+        "chain is set-up.",
+        differences=(
+            "optik knows no contacts and no measures: it takes the first posture that it finds",
+            "optik places one frame, in position and orientation, by the chain that carries it: fixed roots, turning "
+            "and sliding joints",
+        ),
+    )
+
+
+class Optik:
+    """optik as a method.
+
+    Attributes:
+        tolerance: metres and radians to which the goal is met.
+    """
+
+    name = "optik"
+    kinds: ClassVar[tuple[type, ...]] = (wb.Displacement, wb.Effort, wb.Frame)
+
+    def __init__(self, tolerance: float, iterations: int | None = None) -> None:
+        """Take a budget; optik has no count of iterations."""
+        if not 1e-10 <= tolerance <= 0.1:
+            raise InputError(f"tolerance is {tolerance}; give metres from 1e-10 to 0.1")
+        self.tolerance = tolerance
+        self._built: tuple[tuple[int, int], _Chain] | None = None
+
+    def accepts(self, problem: Problem) -> str | None:
+        """None where optik can express all terms; else the sentence that names those that it cannot."""
+        return refusal(self.name, self._unsupported(problem))
+
+    def prepare(self, problem: Problem) -> None:
+        """Write and read the chain.
+
+        Raises:
+            InputError: optik cannot express the problem, or its scene changed after it was stated.
+        """
+        problem.check_fresh()
+        refused = self._unsupported(problem)
+        if refused:
+            raise UnsupportedTermError(self.name, refused)
+        (goal,) = problem.goals
+        key = id(problem.scene.model), int(goal.residual.place.frame)  # type: ignore[attr-defined]
+        if self._built is None or self._built[0] != key:
+            self._built = key, _Chain(problem.scene.model, key[1])
+
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
+        """Find a posture.
+
+        Raises:
+            InputError: optik cannot express the problem, or its scene changed after it was stated.
+        """
+        began = time.perf_counter()
+        self.prepare(problem)
+        assert self._built is not None
+        start = problem.scene.figure.clamp(problem.start)
+        (goal,) = problem.goals
+        with problem.borrow(), Control(None, progress) as control:
+            found = self._built[1].solved(start, goal.resolved_target, self.tolerance)  # type: ignore[attr-defined]
+            q = start if found is None else problem.scene.figure.clamp(found)
+            entry = TraceEntry(0.0, 0.0, 0.0, 0.0)
+            control.tell(entry)
+        failure = "optik found no posture in its time" if found is None else ""
+        ending = Ending(q, True, 1, (entry,), "by its restarts", "time", failure)
+        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+
+    def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
+        """What follows the goals of a problem by solving every step anew."""
+        return SolvingTracker(self, problem, dt)
+
+    def _unsupported(self, problem: Problem) -> list[str]:
+        refused = [where for where, term in named_terms(problem) if not isinstance(term, self.kinds)]
+        if refused:
+            return refused
+        if len(problem.goals) != 1:
+            return ["several goals"]
+        model = problem.scene.model
+        (goal,) = problem.goals
+        chain = list(model.supports[goal.residual.place.joint])[1:]  # type: ignore[attr-defined]
+        kinds = [model.joints[joint].shortname() for joint in chain]
+        if not chain or not all(kind.startswith(("JointModelR", "JointModelP")) for kind in kinds):
+            return ["a free root" if problem.scene.figure.root == "free" else "a joint of several axes"]
+        if any(model.joints[joint].nq != 1 for joint in chain):
+            return ["a joint without limits"]
+        return []
+
+
+class _Chain:
+    """The chain of a frame in optik, written as URDF."""
+
+    def __init__(self, model: pin.Model, frame: int) -> None:
+        import optik
+
+        joints = list(model.supports[model.frames[frame].parentJoint])[1:]
+        self._places = np.array([model.joints[joint].idx_q for joint in joints])
+        root = ElementTree.Element("robot", name="chain")
+        ElementTree.SubElement(root, "link", name="link 0")
+        for number, joint in enumerate(joints, 1):
+            ElementTree.SubElement(root, "link", name=f"link {number}")
+            _write_joint(root, model, joint, number)
+        with Scratch() as folder:
+            path = folder / "chain.urdf"
+            path.write_bytes(ElementTree.tostring(root))
+            self._robot = optik.Robot.from_urdf_file(str(path), "link 0", f"link {len(joints)}")
+        self._robot.set_parallelism(1)
+        self._tip = model.frames[frame].placement.homogeneous
+
+    def solved(self, q: Array, target: pin.SE3, tolerance: float) -> Array | None:
+        """A posture (nq,) whose frame is at a target; None if none is found."""
+        import optik
+
+        settings = optik.SolverConfig(solution_mode="speed", max_time=LONGEST, tol_f=(SHARE * tolerance) ** 2)
+        with TOOL:
+            answer: Any = self._robot.ik(settings, target.homogeneous, q[self._places], self._tip)
+        if answer is None:
+            return None
+        found: Array = q.copy()
+        found[self._places] = answer[0]
+        return found
+
+
+def _write_joint(root: ElementTree.Element, model: pin.Model, index: int, number: int) -> None:
+    """Write a joint of one axis between two links of the chain."""
+    joint = model.joints[index]
+    data = joint.createData()
+    joint.calc(data, pin.neutral(model))
+    motion = np.array(data.S).ravel()
+    slides = joint.shortname().startswith("JointModelP")
+    place = model.jointPlacements[index]
+    made = ElementTree.SubElement(root, "joint", name=f"joint {number}", type="prismatic" if slides else "revolute")
+    ElementTree.SubElement(made, "parent", link=f"link {number - 1}")
+    ElementTree.SubElement(made, "child", link=f"link {number}")
+    turn = pin.rpy.matrixToRpy(place.rotation)
+    ElementTree.SubElement(made, "origin", xyz=_text(place.translation), rpy=_text(turn))
+    ElementTree.SubElement(made, "axis", xyz=_text(motion[:3] if slides else motion[3:]))
+    low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+    ElementTree.SubElement(made, "limit", lower=repr(float(low)), upper=repr(float(high)), effort="1", velocity="1")
+
+
+def _text(values: Array) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,212 @@
+"""Hands with fingers: the person's hand as a palm, a thumb of three parts and four fingers of three.
+
+Twenty joints a hand. Lengths, thicknesses and limits are those of the table "hand", as in `wholebody.figures.hand`;
+here the thumb's metacarpal moves too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import coal
+import pinocchio as pin
+
+from wholebody.checks import known
+from wholebody.errors import InputError
+from wholebody.figures.body_spec import BodySpec, Landmark, Link, Solid, place
+from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
+from wholebody.figures.hand import (
+    FINGERS,
+    finger_base,
+    finger_degrees,
+    finger_joints,
+    massive_links,
+    palm_axes,
+    part_radii,
+    thumb_metacarpal,
+)
+from wholebody.figures.human_hulls import hull_of
+
+HANDS = ("rigid", "fingers")
+"""What a person's hands can be: one segment each, or palms with fingers."""
+
+SEGMENTS = {"mc": "metacarpal", "pp": "proximal", "mp": "middle", "dp": "distal"}
+
+EFFORT = 0.2
+"""Weight of a finger's joint in a person's effort, beside 1 of the arm's. ESTIMATE: fingers move before an arm."""
+
+_CLOSED = {
+    "mcp_flexion": 85.0,
+    "index_mcp_flexion": 80.0,
+    "pip_flexion": 95.0,
+    "dip_flexion": 50.0,
+    "thumb_cmc_flexion": 12.0,
+    "thumb_cmc_abduction": 25.0,
+    "thumb_mcp_flexion": 30.0,
+    "ip_flexion": 25.0,
+}
+_STRAIGHT = {"mcp_flexion": 0.0, "pip_flexion": 0.0, "dip_flexion": 0.0, "ip_flexion": 0.0}
+
+# Degrees by joint or by kind of joint; what is not named is relaxed.
+SHAPES: dict[str, dict[str, float]] = {
+    "relaxed": {},
+    "flat": _STRAIGHT,
+    "fist": _CLOSED,
+    "pinch": {
+        "index_mcp_flexion": 50.0,
+        "index_mcp_abduction": 10.0,
+        "index_pip_flexion": 52.0,
+        "index_dip_flexion": 20.0,
+        "thumb_cmc_flexion": 6.0,
+        "thumb_cmc_abduction": 29.0,
+        "thumb_mcp_flexion": 24.0,
+        "thumb_ip_flexion": 21.0,
+    },
+    "pointing": {
+        **_CLOSED,
+        "index_mcp_flexion": 0.0,
+        "index_pip_flexion": 0.0,
+        "index_dip_flexion": 0.0,
+    },
+}
+"""Named shapes of a hand."""
+
+
+class _Part(NamedTuple):
+    """One part of a finger: its key in the table, segment, and placement of its first joint in the part before it."""
+
+    key: str
+    segment: str
+    parent: str
+    origin: pin.SE3
+
+
+def finger_angles(shape: str, side: str | None = None) -> dict[str, float]:
+    """Return the angle of every joint of the fingers in a shape of the hand, radians.
+
+    Use it with a person whose hands have fingers: ``figure.with_joints(q, wb.finger_angles("fist", "right"))``.
+
+    Args:
+        shape: "relaxed", "flat", "fist", "pinch" or "pointing".
+        side: "left" or "right"; both hands if left out.
+
+    Raises:
+        UnknownNameError: another shape.
+        InputError: another side.
+    """
+    degrees = SHAPES[known(shape, SHAPES, "shape of a hand", "finger_angles")]
+    if side not in (None, "left", "right"):
+        raise InputError(f"finger_angles: side is {side!r}; give 'left' or 'right', or leave it out for both")
+    sides = ("left", "right") if side is None else (side,)
+    return {
+        f"{which}_{joint}": math.radians(angle) for which in sides for joint, angle in finger_degrees(degrees).items()
+    }
+
+
+def with_fingers(spec: BodySpec, size: Dimensions, detail: str) -> BodySpec:
+    """Return a person's specification with fingers in the place of hands of one segment.
+
+    Args:
+        spec: of the person.
+        size: of the same person.
+        detail: "capsules" or "hulls": the collision pieces.
+    """
+    links: list[Link] = [link for link in spec.links if link.name not in ("left_hand", "right_hand")]
+    joints, marks, solids = list(spec.joints), list(spec.landmarks), list(spec.solids)
+    for side in ("left", "right"):
+        parts = list(_parts(size, side))
+        added = [
+            joint
+            for part in parts
+            for joint in finger_joints(
+                side, part.segment.split("_")[1], part.key, part.parent, part.segment, part.origin
+            )
+        ]
+        joints += added
+        segments = {part.segment for part in parts}
+        links += massive_links(
+            size,
+            {f"{side}_hand": part_radii(size, "palm"), **{part.segment: part_radii(size, part.key) for part in parts}},
+        )
+        links += [Link(joint.child) for joint in added if joint.child not in segments]
+        tips = {mark.name: mark for mark in _tips(size, side)}
+        marks = [tips.pop(mark.name, mark) for mark in marks]
+        marks += tips.values()
+        solids = [solid for solid in solids if solid.segment != f"{side}_hand"]
+        solids += [hull_of(solid) if detail == "hulls" else solid for solid in _solids(size, side, parts)]
+    return replace(spec, links=tuple(links), joints=tuple(joints), landmarks=tuple(marks), solids=tuple(solids))
+
+
+def _parts(size: Dimensions, side: str) -> Iterator[_Part]:
+    for finger, names in FINGERS.items():
+        parent = f"{side}_hand"
+        origin = _zero_metacarpal(size, side) if finger == "thumb" else finger_base(size, side, finger)
+        for name in ("mc", *names) if finger == "thumb" else names:
+            key, segment = f"{finger}_{name}", f"{side}_{finger}_{SEGMENTS[name]}"
+            yield _Part(key, segment, parent, origin)
+            parent, origin = segment, place(z=-keyed_hand(key, "length") * size.hand_length)
+
+
+def _zero_metacarpal(size: Dimensions, side: str) -> pin.SE3:
+    """Placement of the thumb's metacarpal at zero: it rests where the table has its abduction."""
+    rest = math.radians(finger_degrees({})["thumb_cmc_abduction"])
+    return thumb_metacarpal(size, side) * place(rotation=pin.utils.rotate("y", rest))
+
+
+def _tips(size: Dimensions, side: str) -> Iterator[Landmark]:
+    for finger in FINGERS:
+        end = place(z=-keyed_hand(f"{finger}_dp", "length") * size.hand_length, rotation=palm_axes(side))
+        yield Landmark(f"{side}_{finger}_tip", f"{side}_{finger}_distal", end)
+
+
+def _solids(size: Dimensions, side: str, parts: list[_Part]) -> Iterator[Solid]:
+    """The palm up to the knuckles as a box, each part of a finger as a capsule that ends at the fingertip."""
+    palm = FINGER_BASES["middle"][1] * size.hand_length + 0.5 * _radius(size, "middle_pp")
+    box = coal.Box(size.hand_breadth, 2.0 * size.palm_half_thickness, palm)
+    yield Solid(f"{side}_hand:0", f"{side}_hand", box, place(z=-0.5 * palm))
+    for part in parts:
+        length, radius = keyed_hand(part.key, "length") * size.hand_length, _radius(size, part.key)
+        start = 0.3 * length if part.key == "thumb_mc" else 0.0
+        end = length - radius if part.key.endswith("_dp") else length
+        yield Solid(part.segment, part.segment, coal.Capsule(radius, end - start), place(z=-0.5 * (start + end)))
+
+
+def _radius(size: Dimensions, key: str) -> float:
+    return 0.5 * (keyed_hand(key, "width") + keyed_hand(key, "depth")) * size.hand_breadth
+
+
+def is_finger(segment: str) -> bool:
+    """Whether a segment without its side, such as "index_middle", is of a finger."""
+    return segment.partition("_")[0] in FINGERS
+
+
+def finger_pair(a: str, b: str) -> str | None:
+    """Why two segments of one hand are not tested against each other; None if they are.
+
+    Args:
+        a: segment without its side, such as "hand" or "index_middle".
+        b: the other one.
+    """
+    first, second = sorted((a, b), key=_order)
+    finger, _, part = second.partition("_")
+    if finger not in FINGERS:
+        return None
+    if first in ("hand", "forearm"):
+        near = part == "metacarpal" or (part == "proximal" and first == "hand")
+        return "neighbours that overlap at their joint" if near else None
+    other, _, _ = first.partition("_")
+    if other not in FINGERS:
+        return None
+    if other == finger:
+        return "neighbours that overlap at their joint"
+    order = list(FINGERS)
+    beside = abs(order.index(other) - order.index(finger)) == 1 and "thumb" not in (other, finger)
+    return "fingers rest side by side" if beside else None
+
+
+def _order(segment: str) -> int:
+    finger = segment.partition("_")[0]
+    return list(FINGERS).index(finger) if finger in FINGERS else -1

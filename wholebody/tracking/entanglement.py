@@ -1,0 +1,98 @@
+"""Two limbs that hold each other back from a tracked posture: one of them gives way.
+
+Tracked limbs pass through each other, shown ones go around each other. When the tracked posture is free again, the
+shown limbs may be on the wrong sides: each holds the other, and no small motion of both brings them nearer. The nearest
+posture by equal weights is then a local minimum. With a lower weight of one limb it is none, as the other limb pushes
+it aside.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.geometry.proximity import PENETRATION, Contacts
+from wholebody.methods.ccd.overlap_resolution.resolver import chains_of
+from wholebody.scene import Scene
+from wholebody.workspace import Workspace
+
+FAR = 0.05
+"""Distance of a degree of freedom from its tracked value, radians and metres, below which nothing holds it back: the
+clearance keeps it off by less."""
+
+GAIN = 0.2
+"""Share of the possible approach of a frame below which limbs in contact hold each other. More lets limbs give way that
+only slide along each other."""
+
+GIVES_WAY = 0.1
+"""Weight of a limb that gives way, relative to the others. Damping slows it down in proportion: with 0.01 it comes back
+in a second only after it was pushed aside."""
+
+PATIENCE = 10
+"""Frames after which the other limb gives way instead."""
+
+
+class Entanglement:
+    """Looks whether two limbs hold each other, and which of them gives way."""
+
+    def __init__(self, scene: Scene, workspace: Workspace, pace: Array) -> None:
+        """Prepare.
+
+        Args:
+            scene: the figure among things.
+            workspace: of the run.
+            pace: (nv,) largest motion of each degree of freedom in a frame, radians and metres.
+        """
+        self._model, self._workspace, self._pace = scene.model, workspace, pace
+        limb_of = np.full(scene.model.njoints, -1)
+        self._dofs: list[Array] = []
+        for number, (joints, _) in enumerate(chains_of(scene.figure).values()):
+            limb_of[joints] = number
+            first = [scene.model.joints[joint] for joint in joints]
+            self._dofs.append(np.concatenate([np.arange(joint.idx_v, joint.idx_v + joint.nv) for joint in first]))
+        self._limb = limb_of[workspace.table.joint]
+        self._holding: tuple[int, int] | None = None
+        self._giving, self._frames = 0, 0
+
+    def weights(self, shown: Array, tracked: Array) -> Array:
+        """(nv,) factors of the weights for a frame from the posture `shown` towards `tracked`, both (nq,)."""
+        factors = np.ones(self._model.nv)
+        if self._holding is not None and self._free(tracked):
+            away = np.abs(pin.difference(self._model, shown, tracked))
+            if not self._frames:  # the limb that is nearer to where it belongs has less to lose
+                self._giving = int(np.argmin([away[self._dofs[limb]].max() for limb in self._holding]))
+            elif not self._frames % PATIENCE:
+                self._giving = 1 - self._giving
+            self._frames += 1
+            factors[self._dofs[self._holding[self._giving]]] = GIVES_WAY
+        else:
+            self._frames = 0
+        return factors
+
+    def look(self, before: Array, shown: Array, tracked: Array, contacts: Contacts) -> None:
+        """Look at a frame that led from `before` to `shown`.
+
+        Args:
+            before: (nq,) posture of the frame before.
+            shown: (nq,) posture of this frame.
+            tracked: (nq,) the tracked posture.
+            contacts: the pairs that touch at `shown`.
+        """
+        pairs = self._limb[contacts.pair]
+        pairs = pairs[(pairs >= 0).all(axis=1) & (pairs[:, 0] != pairs[:, 1])]
+        if not len(pairs):
+            self._holding = None
+            return
+        pair = (int(pairs[0, 0]), int(pairs[0, 1]))
+        if self._frames and self._holding is not None and set(pair) == set(self._holding):
+            return
+        self._frames = 0
+        dofs = np.concatenate([self._dofs[limb] for limb in pair])
+        was, now = (np.abs(pin.difference(self._model, q, tracked))[dofs] for q in (before, shown))
+        possible = np.minimum(was, self._pace[dofs]).max()
+        held = now.max() > FAR and was.max() - now.max() < GAIN * possible
+        self._holding = pair if held else None
+
+    def _free(self, tracked: Array) -> bool:
+        return not len(self._workspace.near(tracked, -PENETRATION).distance)
