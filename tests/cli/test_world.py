@@ -66,3 +66,59 @@ def test_objects_of_a_task_file_fall_where_they_have_a_mass(tmp_path: Path, caps
     task.write_text(TASK.format(body="mass = 2.0\ndensity = 300.0"))
     assert main(["world", str(task), "--out", str(out)]) == 2
     assert "give one of them" in capsys.readouterr().err
+
+
+DOOR = """
+[[object]]
+name = "wall"
+shape = "box"
+size = [0.1, 0.5, 2.0]
+at = [1.0, -0.72, 1.0]
+
+[[object]]
+name = "door"
+shape = "box"
+size = [0.04, 0.9, 2.0]
+at = [1.0, 0.0, 1.01]
+mass = 12.0
+angular_velocity = [0.0, 0.0, 1.5]
+{joints}
+"""
+
+
+def test_a_door_of_a_task_file_swings_on_its_hinge(tmp_path: Path) -> None:
+    """The hinge keeps the angular momentum about the centre as that about its axis; then nothing resists."""
+    task, out = tmp_path / "door.toml", tmp_path / "out"
+    joints = 'joints = [{ type = "hinge", at = [0.0, -0.45, 0.0], to = "wall" }]'
+    task.write_text(TASK.format(body="") + DOOR.format(joints=joints))
+    assert main(["world", str(task), "--frames", "12", "--out", str(out)]) == 0
+    _, rows = read_rows(out / "door.csv", WorldFrameRow)
+    about_centre = 12.0 * (0.9**2 + 0.04**2) / 12.0
+    turning = 0.5 * (about_centre * 1.5) ** 2 / (about_centre + 12.0 * 0.45**2)
+    assert rows[-1].energy - 12.0 * 9.81 * 1.01 == pytest.approx(turning, rel=1e-3)
+    assert rows[-1].energy == pytest.approx(rows[0].energy, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("joints", "said"),
+    [
+        ('joints = [{ type = "hinge", to = "wal" }]', "did you mean wall"),
+        ('joints = [{ type = "hinge", to = "door" }]', "the thing cannot hold itself"),
+        ('joints = [{ type = "slider" }]', '"hinge" or "ball"'),
+        ("joints = [{ at = [0, 0, 0] }]", "the joint has no type"),
+        ('joints = [{ type = "ball", axis = [0, 0, 1] }]', "key of a joint of type 'ball' is called 'axis'"),
+        ('joints = [{ type = "hinge", axis = [0, 0, 0] }]', "give a direction"),
+        ('joints = [{ type = "hinge", at = [0, 0] }]', "write 3 numbers in brackets"),
+        ('joints = { type = "hinge" }', "is no list of joints"),
+        ("joints = [3]", "is no joint"),
+        ("joints = []", "is no list of joints"),
+    ],
+)
+def test_a_wrong_joint_is_named(joints: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    task = tmp_path / "door.toml"
+    task.write_text(TASK.format(body="") + DOOR.format(joints=joints))
+    assert main(["world", str(task), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert "door.toml" in error
+    assert "object 3, key joints" in error

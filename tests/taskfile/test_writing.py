@@ -63,6 +63,18 @@ def test_a_problem_of_a_script_goes_round(tmp_path: Path, root: Path) -> None:
     assert (tmp_path / "task-rock_one.obj").exists()
 
 
+def test_joints_of_things_go_round(tmp_path: Path) -> None:
+    hinge = wb.Hinge((0.0, -0.4, 0.0), axis=(0.0, 0.3, 0.4))
+    door = wb.Body(mass=12.0, joints=[hinge], angular_velocity=(0.0, 0.0, 1.5))
+    rope = wb.Body(density=300.0, joints=[wb.BallJoint((0.0, 0.0, 0.5), to="beam"), wb.BallJoint((0.0, 0.0, -0.5))])
+    scene = wb.Scene(wb.load("hand")).add(wb.Box((0.1, 1.0, 0.1)), name="beam", at=(2.0, 0.0, 2.0))
+    scene.add(wb.Box((0.04, 0.8, 2.0)), name="door", at=(3.0, 0.0, 1.0), body=door)
+    scene.add(wb.Capsule(0.01, 0.9), name="rope", at=(2.0, 0.0, 1.4), body=rope)
+    again = wb.read_task(wb.write_task(scene, tmp_path / "door.toml")).problem.scene
+    for name in ("door", "rope"):
+        assert again.objects[name].body == scene.objects[name].body
+
+
 def test_a_scene_alone_and_a_result(tmp_path: Path) -> None:
     scene = wb.Scene(wb.load("human", sex="female", stature=1.6)).add(wb.HalfSpace(), name="floor")
     task = wb.read_task(wb.write_task(scene, tmp_path / "scene.toml"))

@@ -101,6 +101,26 @@ def test_whoever_is_fast_enough_gets_out_of_the_way(kind: str, speed: float, tur
     assert touched > 3
 
 
+def test_nobody_ends_inside_where_the_root_could_have_gone_somewhere_free() -> None:
+    """At 20 m/s nobody can go along: but to stay, or to go aside as far as speeds allow, is often free at the end."""
+    limits = wb.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
+    aside = [4.0 * DT * sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
+    could = 0
+    for seed, kind in enumerate(("board", "plate", "rod", "board")):
+        throw = Throw(seed, kind, 20.0, 3.0)
+        problem = problem_of(throw.scene, constraints=[limits])
+        tracker, q = wb.QP().tracker(problem, DT), problem.start
+        for _ in range(throw.frames):
+            throw.next()
+            step = tracker.step(q)
+            moved = [q, *(np.append(q[:3] + way, q[3:]) for way in aside)]
+            if any(throw.ends(posture) < 5e-5 for posture in moved):
+                could += bool(step.collisions)
+                assert throw.ends(step.q) < 1e-4
+            q = step.q
+    assert could
+
+
 def hash_of(kind: str, speed: float) -> int:
     return 10 * list(SHAPES).index(kind) + int(speed)
 

@@ -132,16 +132,15 @@ class StepProgram:
         self._touching = np.concatenate([self._touching, gap <= SKIN + TOUCH])
         joined = (np.concatenate(both) for both in zip(self.points, with_values(points, gap=gap), strict=True))
         self.points = ContactPoints(*joined)
-        new, place = len(gap), np.full(len(gap), count)
         bodies, jacobian, answer, mobility = (
-            np.insert(one, place, other[:new], axis=0)
+            np.concatenate([one[:count], other[: len(gap)], one[count:]])
             for one, other in (
                 (laid.bodies, own.bodies), (laid.jacobian, own.jacobian), (laid.answer, own.answer),
                 (laid.mobility, own.mobility),
             )
         )  # fmt: skip
         axes = np.concatenate([laid.axes, own.axes])
-        self._laid = _Laid(bodies, axes, jacobian, answer, mobility, laid.held)
+        self._laid = _Laid(bodies.astype(np.intp), axes, jacobian, answer, mobility, laid.held)
         self.impulse = np.zeros((len(bodies), 3))
 
     def resolve_impacts(self) -> tuple[Array, bool]:

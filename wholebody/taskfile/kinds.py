@@ -11,6 +11,7 @@ from typing import Any
 from wholebody.checks import FAR, color, shown, slipped
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
+from wholebody.matter.joints import BallJoint, Hinge
 from wholebody.taskfile.where import Where
 from wholebody.tasks.inputs import FARTHEST
 
@@ -266,6 +267,50 @@ class Proportions(Kind):
             raise where.fault(f"{shown(value)} is not a table of dimensions; write {{ sitting_height = 0.93 }}")
         return {name: LENGTH.read(entry, where.at(name)) for name, entry in value.items()}
 
+
+@dataclass(frozen=True)
+class ThingJoints(Kind):
+    """Joints that hold a thing to others or to the world."""
+
+    @property
+    def words(self) -> str:
+        """Return how it is written."""
+        return (
+            'list of {type = "hinge" or "ball", at = [x, y, z], axis = [x, y, z], to = "thing"}; at is a point in the '
+            "thing's axes, m; axis is that of a hinge, z if left out; without to the world holds it"
+        )
+
+    def read(self, value: Any, where: Where) -> tuple[BallJoint, ...]:
+        """Return the joints."""
+        if not isinstance(value, list) or not value:
+            raise where.fault(
+                f'{shown(value)} is no list of joints; write [{{ type = "hinge", at = [0.0, 0.4, 0.0] }}]'
+            )
+        return tuple(self._joint(entry, where.at(f"[{i}]")) for i, entry in enumerate(value))
+
+    @staticmethod
+    def _joint(entry: Any, where: Where) -> BallJoint:
+        if not isinstance(entry, dict):
+            raise where.fault(f'{shown(entry)} is no joint; write {{ type = "hinge", at = [0.0, 0.4, 0.0] }}')
+        read: dict[str, Kind] = {
+            "at": POSITION,
+            "to": Text(),
+            **({"axis": DIRECTION} if entry.get("type") == "hinge" else {}),
+        }
+        if "type" not in entry:
+            raise where.fault('the joint has no type; write type = "hinge" or type = "ball"')
+        kind = Choice(tuple(JOINTS)).read(entry["type"], where.at("type"))
+        for name in entry:
+            if name != "type" and name not in read:
+                raise UnknownNameError(f"key of a joint of type {kind!r}", name, ("type", *read), str(where))
+        given = {name: read[name].read(one, where.at(name)) for name, one in entry.items() if name != "type"}
+        try:
+            return JOINTS[kind](**given)
+        except InputError as error:
+            raise where.fault(str(error)) from None
+
+
+JOINTS: dict[str, type[BallJoint]] = {"hinge": Hinge, "ball": BallJoint}
 
 _ROOT: dict[str, tuple[str, ...]] = {"free": ("root",), "fixed": ()}
 

@@ -18,6 +18,10 @@ _BODY = (
     Key("mass", Number(1e-9, 1e9, "kg"), "in place of a density"),
     Key("material", kinds.Choice(("wood", "human", "metal")), "for impacts and friction; wood if left out"),
     Key("velocity", kinds.Vector(3, Number(-1e3, 1e3, "m/s")), "of a thing that moves by itself; 0 if left out"),
+    Key(
+        "angular_velocity", kinds.Vector(3, Number(-1e3, 1e3, "rad/s")), "of it, along the world's axes; 0 if left out"
+    ),
+    Key("joints", kinds.ThingJoints(), "that hold a thing that moves by itself; free if left out"),
 )
 
 TOP = (

@@ -28,6 +28,7 @@ from wholebody.taskfile.reading import Contents, Entry, read_contents
 from wholebody.taskfile.where import Where
 
 _T = TypeVar("_T")
+_OF_BODIES = ("density", "mass", "material", "velocity", "angular_velocity", "joints")
 
 
 class View(NamedTuple):
@@ -172,7 +173,25 @@ def _scene(contents: Contents, figure: Figure) -> Scene:
         shape = _shape(entry, options)
         add: Callable[..., Scene] = scene.attach if "to" in thing else scene.add
         _said(entry.where, lambda add=add, shape=shape, thing=thing: add(shape, **thing))  # type: ignore[misc]
+    _check_joints(contents, scene)
     return scene
+
+
+def _check_joints(contents: Contents, scene: Scene) -> None:
+    """Look up what holds things.
+
+    Raises:
+        UnknownNameError: there is no such thing.
+        FileFormatError: a thing is to hold itself.
+    """
+    things = [name for name, thing in scene.objects.items() if thing.segment is None]
+    for entry in contents.tables.get("object", ()):
+        for number, joint in enumerate(entry.values.get("joints", ())):
+            where = entry.where.at("joints").at(f"[{number}]").at("to")
+            if joint.to is not None and joint.to not in things:
+                raise UnknownNameError("thing", joint.to, things, str(where))
+            if joint.to == entry.values["name"]:
+                raise where.fault("the thing cannot hold itself; name another thing, or leave to out for the world")
 
 
 def _body(options: dict[str, Any]) -> dict[str, Any]:
@@ -181,13 +200,9 @@ def _body(options: dict[str, Any]) -> dict[str, Any]:
     Raises:
         InputError: both a density and a mass.
     """
-    given: dict[str, Any] = {
-        name: options.pop(name) for name in ("density", "mass", "material", "velocity") if name in options
-    }
+    given: dict[str, Any] = {name: options.pop(name) for name in _OF_BODIES if name in options}
     if not given.keys() - {"material"}:
         return given
-    if "velocity" in given:
-        given["velocity"] = tuple(given["velocity"])
     return {"body": Body(**given)}
 
 

@@ -17,9 +17,11 @@ from wholebody.checks import path as checked_path
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Mesh
+from wholebody.matter.joints import BallJoint
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.scene_geometry import SceneObject
+from wholebody.taskfile.kinds import JOINTS
 from wholebody.taskfile.terms import CONSTRAINTS, GOALS, MEASURES
 from wholebody.taskfile.things import SHAPES
 
@@ -129,9 +131,18 @@ def _thing(thing: SceneObject, target: Path, beside: dict[Path, str]) -> dict[st
         found |= {name: value for name, value in given.items() if value is not None}
         if found.get("mass") is not None:
             found.pop("density", None)
-        if any(thing.body.velocity):
-            found["velocity"] = _plain(thing.body.velocity)
+        for name in ("velocity", "angular_velocity"):
+            if any(getattr(thing.body, name)):
+                found[name] = _plain(getattr(thing.body, name))
+        if thing.body.joints:
+            found["joints"] = [_joint(joint) for joint in thing.body.joints]
     return found
+
+
+def _joint(joint: BallJoint) -> dict[str, Any]:
+    kind = next(name for name, made in JOINTS.items() if made is type(joint))
+    found = {"type": kind, "at": list(joint.at), "to": joint.to, "axis": list(getattr(joint, "axis", ())) or None}
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def _mesh(shape: Mesh, name: str, target: Path, beside: dict[Path, str], found: dict[str, Any]) -> str:

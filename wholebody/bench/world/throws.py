@@ -18,6 +18,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.arrays import Array
+from wholebody.bench.world.free_postures import free_posture
 from wholebody.tracking.moving_goals import retarget
 
 DT = 1.0 / 60.0
@@ -33,6 +34,7 @@ WALK, PULL = 1.3, 1.0  # m/s: of the one who walks, and of the fingertip that is
 HUMAN = (12.0, 4.0)  # rad/s of joints, m/s of the root
 SPIN = 3.0  # rad/s
 WAY = 0.7  # m: that a thing flies
+DEEP = 1e-4  # m: an end that is deeper is none
 NAMED = 1.2e-4  # m: what is deeper at an end has to be named
 DIP = 4e-4  # m: what is deeper on every way has to be named
 PARTS = 60  # of a way
@@ -48,7 +50,8 @@ class ThrowRow:
         speed: of the thing, m/s.
         frames: of all throws.
         deepest_mm: at the end of any frame.
-        deep: frames that end deeper than 0.1 mm.
+        deep: frames that end deeper than 0.1 mm ...
+        avoidable: ... of them those with a free posture within speeds, which a search of its own found.
         named: frames in which something is named that could not be avoided.
         silent: frames that end deeper, or in which something passes on every way, and nothing is named.
         median_ms: processor time of a frame.
@@ -61,6 +64,7 @@ class ThrowRow:
     frames: int
     deepest_mm: float
     deep: int
+    avoidable: int
     named: int
     silent: int
     median_ms: float
@@ -101,11 +105,16 @@ class _Throw:
                 worst = max(worst, float(-near.distance[rows].min(initial=0.0)))
         return worst
 
+    def avoidable(self, q: Array, most: Array, rng: np.random.Generator) -> bool:
+        """Whether a posture within displacements (nv,) of another (nq,) is free of the thing where it is now."""
+        self._truth.move("thing", at=self._at)
+        return free_posture(self._truth, q, most, rng) is not None
+
 
 def throws(thing: str, speed: float, person: str, swift: bool, count: int, seed: int = 0) -> ThrowRow:
     """Throw a thing at a person who is posed by "qp", several times."""
     rng = np.random.default_rng([seed, *map(ord, thing + person), int(10.0 * speed)])
-    depths, times, named, silent = [], [], 0, 0
+    depths, times, named, silent, avoidable = [], [], 0, 0, 0
     for _ in range(count):
         throw = _Throw(rng, thing, speed)
         turning, going = (max(HUMAN[0], 3.0 * speed), max(HUMAN[1], 1.6 * speed)) if swift else HUMAN
@@ -126,6 +135,11 @@ def throws(thing: str, speed: float, person: str, swift: bool, count: int, seed:
             times.append(time.process_time() - began)
             end = throw.deepest(((1.0, step.q), (1.0, step.q)), way, 1)
             depths.append(end)
+            avoidable += end > DEEP and throw.avoidable(
+                q,
+                np.repeat([going, 1.5 * going, turning], [3, 3, throw.scene.model.nv - 6]) * DT,
+                np.random.default_rng(seed),
+            )
             named += bool(step.collisions)
             began_in = throw.deepest(((0.0, q), (0.0, q)), way, 1)  # what was in before was named then
             if not step.collisions and began_in < NAMED:
@@ -137,5 +151,5 @@ def throws(thing: str, speed: float, person: str, swift: bool, count: int, seed:
             q = step.q
     return ThrowRow(
         "swift" if swift else "human", person, thing, speed, len(depths), 1e3 * max(depths),
-        int((np.array(depths) > 1e-4).sum()), named, silent, 1e3 * float(np.median(times)),
+        int((np.array(depths) > DEEP).sum()), avoidable, named, silent, 1e3 * float(np.median(times)),
     )  # fmt: skip

@@ -15,10 +15,10 @@ from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.linearisation import Passing
 from wholebody.methods.base import Method, goal_error, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
+from wholebody.methods.qp.escaping import free_end
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
-from wholebody.methods.qp.subproblem import Rows
-from wholebody.methods.qp.turning import OFF, Turning
+from wholebody.methods.qp.turning import INSIDE, OFF, UNSEEN, Turning, foreseen, unseen_by_rows
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.moving_things import MOST_SHARES, Collision, FrameMotion
 from wholebody.pool import OneAtATime
@@ -30,8 +30,6 @@ from wholebody.tasks import StepLimit
 LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
 LARGEST_WITHIN = 0.5
 HEADROOM = 2.5  # pairs within this many times the last step's motion get rows, so that the next may be longer
-UNSEEN = 1e-4  # m: by which turning may bring things nearer than the linearisation says without being looked after
-INSIDE = 5e-6  # m: the same of pairs whose clearance is less; beside coal's accuracy, so that none ends inside
 SPARE = 10.0  # times what turning brings nearer, roughly: a step that leaves all pairs more room is not looked at
 MIDWAY = 4.0  # times that much and more at the end is too much half way too, where a straight way bows by a quarter
 CORRECTIONS = 3  # programs that ask again for what turning brought nearer, before the step is cut
@@ -214,7 +212,7 @@ class QPTracker:
                 following = motion.next_share(share, workspace.near(here, self._query_distance), self._query_distance)
                 workspace.place(motion.placements(following))
             else:
-                following, depth = share, -float(workspace.near(here, 0.0).distance.min(initial=0.0))
+                following, depth = share, self._overlap(here)
                 if depth <= OUT or depth > WORTH * before or len(steps) > MOST_SHARES:
                     break
                 before = depth
@@ -222,11 +220,25 @@ class QPTracker:
             self._program.take((following - share) * self.dt)
             steps.append(self._step(here, measures and following > share))
             path.append((following, steps[-1].q))
+        if depth > OUT:
+            free = free_end(model, q, most, OUT, self._overlap, self._out_of_overlap)
+            if free is not None:
+                path, steps = [(0.0, q), (1.0, free)], [with_values(steps[-1], q=free)]
         self._left = None
         self._program.take(self.dt)
         collisions = motion.collisions(path)
         workspace.keep(motion, collisions)
         return with_values(_together(model, path, steps, self.dt), collisions=collisions)
+
+    def _overlap(self, q: Array) -> float:
+        """Greatest depth of any pair at a posture (nq,), metres."""
+        return -float(self.workspace.near(q, 0.0).distance.min(initial=0.0))
+
+    def _out_of_overlap(self, q: Array, left: Array | None) -> Array:
+        """The posture (nq,) after a program that takes no time and goes by at most (2, nv)."""
+        self._left = left
+        self._program.take(0.0)
+        return self._step(q, measures=False).q
 
     def _speeds(self, q: Array) -> Array | None:
         """Largest displacements (2, nv) of the step from q (nq,) that bounds on speeds allow; None without."""
@@ -258,7 +270,7 @@ class QPTracker:
         displacement = answer.x.copy() if share == 1.0 else share * answer.x
         following, curved = None, share * motion * (share * answer.turn + OFF)  # roughly, and rather too much
         if curved > INSIDE and answer.spare < 0.5 * SPARE * curved:
-            unseen = _unseen(at.clearance[: len(at.contacts.distance)])
+            unseen = unseen_by_rows(at.clearance[: len(at.contacts.distance)])
             if curved > np.minimum.reduce(unseen, initial=np.inf):
                 bent = self._turning.bent(at, program.rows(at), displacement, unseen)
                 if bent > 0.0:
@@ -294,7 +306,7 @@ class QPTracker:
         rows, groups = self._program.rows(at), None
         for _ in range(CORRECTIONS):
             short, q = self._shortfall(
-                at, displacement, np.maximum(began, _foreseen(rows, asked, displacement)), began, midway
+                at, displacement, np.maximum(began, foreseen(rows, asked, displacement)), began, midway
             )
             if not (short > unseen).any():
                 return displacement, share, q
@@ -383,17 +395,3 @@ def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequ
         share=min(step.share for step in steps),
         path=tuple(path),
     )
-
-
-def _unseen(asked: Array) -> Array:
-    """By how much each contact (k,) may end nearer than its rows say, where this distance (k,) is asked of it."""
-    unseen: Array = np.minimum(np.maximum(asked, INSIDE), UNSEEN)
-    return unseen
-
-
-def _foreseen(rows: Rows, asked: Array, displacement: Array) -> Array:
-    """Distance (k,) of each contact after a displacement (nv,) as its rows have it, at most what is asked (k,)."""
-    violated = np.zeros(rows.contacts)
-    np.maximum.at(violated, rows.contact, rows.elastic_violation - rows.elastic @ displacement)
-    foreseen: Array = asked - violated[rows.contacts - len(asked) :]
-    return foreseen

@@ -20,6 +20,9 @@ from wholebody.workspace import Workspace
 ROOM = 2.0  # times what a pair may get nearer by turning: with more room after a step it is not looked at
 OFF = 6e-3  # rad: by which coal's normal may be off, as it stops within 1e-6 m of the distance
 
+UNSEEN = 1e-4  # m: by which turning may bring things nearer than the linearisation says without being looked after
+INSIDE = 5e-6  # m: the same of pairs whose clearance is less; beside coal's accuracy, so that none ends inside
+
 
 class Turning:
     """Bounds what the steps of one run turn nearer."""
@@ -70,3 +73,16 @@ def compiled_kernel() -> Any:
         none, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(4),
     )  # fmt: skip
     return turning_kernel
+
+
+def unseen_by_rows(asked: Array) -> Array:
+    """By how much each contact (k,) may end nearer than its rows say, where this distance (k,) is asked of it."""
+    unseen: Array = np.minimum(np.maximum(asked, INSIDE), UNSEEN)
+    return unseen
+
+
+def foreseen(rows: Rows, asked: Array, displacement: Array) -> Array:
+    """Distance (k,) of each contact after a displacement (nv,) as its rows have it, at most what is asked (k,)."""
+    violated = np.zeros(rows.contacts)
+    np.maximum.at(violated, rows.contact, rows.elastic_violation - rows.elastic @ displacement)
+    return np.asarray(asked - violated[rows.contacts - len(asked) :])
