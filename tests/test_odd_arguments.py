@@ -275,6 +275,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         ),
     )
     near = there.contacts(q, within=1.0)
+    yield "Contacts.nearer", Call(near.nearer, {"distance": 0.5})
     yield "Contacts.nearest_first", Call(near.nearest_first, {})
     yield "Scene.penetration", Call(there.penetration, {"q": q})
     yield "Scene.borrow", Call(there.borrow, {})

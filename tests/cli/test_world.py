@@ -121,4 +121,4 @@ def test_a_wrong_joint_is_named(joints: str, said: str, tmp_path: Path, capsys: 
     error = capsys.readouterr().err
     assert said in error
     assert "door.toml" in error
-    assert "object 3, key joints" in error
+    assert "object 4, key joints" in error

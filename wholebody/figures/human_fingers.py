@@ -14,8 +14,7 @@ from typing import NamedTuple
 import coal
 import pinocchio as pin
 
-from wholebody.checks import known
-from wholebody.errors import InputError
+from wholebody.checks import choice, known
 from wholebody.figures.body_spec import BodySpec, Landmark, Link, Solid, place
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.hand import (
@@ -32,6 +31,8 @@ from wholebody.figures.human_hulls import hull_of
 
 HANDS = ("rigid", "fingers")
 """What a person's hands can be: one segment each, or palms with fingers."""
+
+SIDES = ("left", "right")
 
 SEGMENTS = {"mc": "metacarpal", "pp": "proximal", "mp": "middle", "dp": "distal"}
 
@@ -98,9 +99,7 @@ def finger_angles(shape: str, side: str | None = None) -> dict[str, float]:
         InputError: another side.
     """
     degrees = SHAPES[known(shape, SHAPES, "shape of a hand", "finger_angles")]
-    if side not in (None, "left", "right"):
-        raise InputError(f"finger_angles: side is {side!r}; give 'left' or 'right', or leave it out for both")
-    sides = ("left", "right") if side is None else (side,)
+    sides = SIDES if side is None else (choice(side, SIDES, "finger_angles: side"),)
     return {
         f"{which}_{joint}": math.radians(angle) for which in sides for joint, angle in finger_degrees(degrees).items()
     }
@@ -116,7 +115,7 @@ def with_fingers(spec: BodySpec, size: Dimensions, detail: str) -> BodySpec:
     """
     links: list[Link] = [link for link in spec.links if link.name not in ("left_hand", "right_hand")]
     joints, marks, solids = list(spec.joints), list(spec.landmarks), list(spec.solids)
-    for side in ("left", "right"):
+    for side in SIDES:
         parts = list(_parts(size, side))
         added = [
             joint

@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array, Indices
+from wholebody.checks import number
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields, placement_view, read_result, result_view
 from wholebody.geometry.swept_points import SweptPoints, swept_points
@@ -55,7 +56,12 @@ class Contacts(NamedTuple):
         return self._rows(np.argsort(self.distance, kind="stable"))
 
     def nearer(self, distance: float) -> Contacts:
-        """Those that are nearer than a distance, metres."""
+        """Those that are nearer than a distance, metres.
+
+        Raises:
+            InputError: the distance is no number.
+        """
+        distance = number(distance, "nearer: distance", -np.inf, np.inf, "m")
         return self._rows(np.flatnonzero(self.distance < distance))
 
     def _rows(self, rows: Indices) -> Contacts:

@@ -204,21 +204,14 @@ def _power(place: inputs.Place, hand: Surface, thing: Surface, state: State, whe
         InputError: the thing has no longest axis.
     """
     at = thing.placed(0, state)
+    bounded = [(shape, thing.placed(k, state)) for k, shape in enumerate(thing.shapes) if np.isfinite(thing.reach[k])]
+    if not bounded:
+        raise InputError(f"{where}: {thing.name!r} has no end, so no hand closes around it; take it by the palm")
     center, half = np.zeros(3), np.zeros(3)
-    for axis in range(3):
-        ends = [
-            float((outermost(shape, thing.placed(k, state), sign * at.rotation[:, axis]) @ at.rotation[:, axis]).max())
-            if sign > 0
-            else float((outermost(shape, thing.placed(k, state), -at.rotation[:, axis]) @ at.rotation[:, axis]).min())
-            for sign in (1, -1)
-            for k, shape in enumerate(thing.shapes)
-            if np.isfinite(thing.reach[k])
-        ]
-        if not ends:
-            raise InputError(f"{where}: {thing.name!r} has no end, so no hand closes around it; take it by the palm")
-        low, high = min(ends), max(ends)
-        offset = float(at.translation @ at.rotation[:, axis])
-        center[axis], half[axis] = 0.5 * (low + high) - offset, 0.5 * (high - low)
+    for axis, along in enumerate(at.rotation.T):
+        ends = [outermost(shape, placed, sign * along) @ along for shape, placed in bounded for sign in (1.0, -1.0)]
+        low, high = float(np.concatenate(ends).min()), float(np.concatenate(ends).max())
+        center[axis], half[axis] = 0.5 * (low + high) - float(at.translation @ along), 0.5 * (high - low)
     longest = int(np.argmax(half))
     others = [k for k in range(3) if k != longest]
     # a "face" through the middle of the bar, whose normal is the bar's axis

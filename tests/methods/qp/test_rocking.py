@@ -46,7 +46,8 @@ def distances(scene, q):
 @pytest.fixture(autouse=True)
 def rows_alone(monkeypatch):
     """What is tested here is the rows alone: steps that turn are not looked at where they end."""
-    monkeypatch.setattr("wholebody.methods.qp.tracking.UNSEEN", np.inf)
+    for module in ("tracking", "turning"):
+        monkeypatch.setattr(f"wholebody.methods.qp.{module}.UNSEEN", np.inf)
 
 
 @pytest.mark.parametrize("push", PUSHES.values(), ids=PUSHES.keys())
