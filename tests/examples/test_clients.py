@@ -51,6 +51,18 @@ def test_plain_pinocchio(root: Path, folder: Path, tmp_path: Path) -> None:
     assert all(one.seconds > 0.0 for one in verdict.judged if one.outcome == "answered")
 
 
+def test_small_pinocchio(root: Path, folder: Path, tmp_path: Path) -> None:
+    """It reaches an arm's goal; it does not look at contacts, and says what it does not express."""
+    script = root / "examples" / "clients" / "small_pinocchio.py"
+    assert len(script.read_text().splitlines()) <= 60
+    verdict = answered(script, folder, tmp_path)
+    found = outcomes(verdict)
+    assert len(found) == 2 * len(SETS)
+    assert {found[name, "near"] for name in ("balance", "drag")} == {"only places in the world are expressed"}
+    (arm,) = [one for one in verdict.judged if (one.set, one.seed) == ("robot_arm", "near")]
+    assert arm.score.goal_error < 2e-3
+
+
 def test_plain_mujoco(root: Path, folder: Path, tmp_path: Path) -> None:
     """Another engine reads the same files: what it takes for free of overlap is so for Pinocchio and coal."""
     pytest.importorskip("mujoco")
