@@ -175,5 +175,5 @@ def test_wrong_hands_are_refused_in_one_sentence(options, sentence):
         wb.load("human", **options)
     with pytest.raises(wb.WholebodyError, match="open"):
         wb.finger_angles("open")
-    with pytest.raises(wb.InputError, match="both"):
+    with pytest.raises(wb.InputError, match=r"give .left. or .right."):
         wb.finger_angles("flat", "up")
